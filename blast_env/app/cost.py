@@ -38,9 +38,9 @@ class ReportCost:
 
         threats = threats_of(scenario, options)
         charge = threats[0].charge
-        one = {size: GasEngine(cell_m=size).cost(scenario, charge) for size in options.sizes_m}
+        one = {size: GasEngine.with_cells(size).cost(scenario, charge) for size in options.sizes}
         parts = blasts_of(scenario, layout, options, threats)
-        return cls(tuple((label, (one[cell_m],) * count) for label, count, cell_m in parts))
+        return cls(tuple((label, (one[size],) * count) for label, count, size in parts))
 
     @property
     def blasts(self) -> tuple[CostGuess, ...]:

@@ -114,7 +114,7 @@ class FilmTask(LayoutTask):
 class ReportChoice(Kept):
     """What is to be in a report; see `StudyOptions`."""
 
-    cells_m: tuple[float, float] = (0.5, 0.25)
+    cells: tuple[float | str, float | str] = (0.5, 0.25)
     items: bool = True
     target: int = LevelOfProtection.LOW
 
@@ -128,7 +128,7 @@ class ReportChoice(Kept):
 
         return StudyOptions(
             charges=tuple(charges),
-            cells_m=self.cells_m,
+            cells=self.cells,
             items=self.items,
             target=LevelOfProtection(self.target),
             cache=cache,

@@ -1,5 +1,6 @@
 """`blast-env report`: what an engineer hands over."""
 
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,7 +9,8 @@ from blast_env.app.cost import ReportCost, cost_words
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, TARGET_HELP, CacheOptions, ProcessOptions
 from blast_env.cli.output import message_console, print_line, print_written, progress_bar
-from blast_env.engines import JUDGE, find_engine
+from blast_env.errors import BlastEnvError, value_text
+from blast_env.physics.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import check_layout, load_layout, load_scenario
@@ -39,9 +41,10 @@ class ReportCommand(ProcessOptions, CacheOptions):
         show_default="of each charge source the place nearest to what is protected",
     )
     most_threats: int = option(2, "How many of those, 1 to 6.", flag="--threats")
-    cells_m: tuple[float, float] = option(
-        (0.5, 0.25),
-        "Sides of the cells of gas dynamics, m; the same twice is one size.",
+    cells: tuple[str, str] = option(
+        ("0.5", "0.25"),
+        "Sides of the cells of gas dynamics, m; the same twice is one size. On large sites coarse "
+        "fine.",
         metavar="COARSE FINE",
     )
     limits: tuple[str, ...] = option(
@@ -82,8 +85,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
             message_console().print(
                 f"stopped before: {study.stopped}; what was done by then is written"
             )
-        coarse_m, fine_m = self.cells_m
-        print_line(f"{find_engine(JUDGE, coarse_m).describe()} and of {fine_m:g} m")
+        print_line(" and ".join((options.coarse.describe(), options.words[1])))
         print_written(write_report(study, self.out, self.pdf))
 
     def _study_options(self) -> "StudyOptions":
@@ -96,5 +98,21 @@ class ReportCommand(ProcessOptions, CacheOptions):
         given["charges"] = tuple(Charge((x_m, y_m), tnt_kg) for x_m, y_m, tnt_kg in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units
+        given["cells"] = tuple(_cells(each) for each in self.cells)
         given["target"] = None if self.target is None else LevelOfProtection.named(self.target)
         return StudyOptions(**given)
+
+
+def _cells(text: str) -> Cells:
+    """Return cells as they were given.
+
+    Raises:
+        BlastEnvError: If they are no length, nor a way of growing.
+    """
+    with suppress(ValueError):
+        return float(text)
+    growing = [each for each in CELLS if each != UNIFORM]
+    if text not in growing:
+        known = ", ".join(growing)
+        raise BlastEnvError(f"--cells is {value_text(text)}, must be a length in m, or {known}")
+    return text

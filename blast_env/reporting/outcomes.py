@@ -9,6 +9,7 @@ from math import inf, isfinite
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Layout, Rectangle
+from blast_env.physics.gas.settings import Cells
 from blast_env.reporting.loads import ReportedBuilding, TargetLoad, UnitSystem
 from blast_env.reporting.threats import NamedCharge
 from blast_env.statistics import reductions
@@ -81,14 +82,14 @@ class LoadPair:
     Attributes:
         target: The building.
         threat: The threat.
-        cell_m: Side of the cells.
+        cells: The cells.
         bare: Without the layout.
         walled: With it.
     """
 
     target: ReportedBuilding
     threat: NamedCharge
-    cell_m: float
+    cells: Cells
     bare: TargetLoad
     walled: TargetLoad
 

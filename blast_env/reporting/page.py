@@ -130,7 +130,7 @@ def report_html(study: Study, commands: list[str]) -> str:
 
 def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     scenario, options = study.scenario, study.options
-    coarse, fine = options.cells_m
+    coarse, fine = options.cells
     protected = [each for each in study.targets if each.protected]
     layout_json = _layout_file(study)
     places = [
@@ -143,6 +143,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "units": options.units,
         "coarse": coarse,
         "fine": fine,
+        "coarse_words": options.words[0],
+        "fine_words": options.words[1],
         "protected": protected,
         "others": [each for each in study.targets if not each.protected],
         "plan": site_plan(scenario, study.threats, study.layout),
@@ -158,7 +160,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "noun": study.scenario.objective.noun,
         "bay_tables": _bay_tables(study),
         "two_sizes": coarse != fine,
-        "cells": f"cells of {' and '.join(f'{cell_m} m' for cell_m in options.sizes_m)}",
+        "cells": " and ".join(dict.fromkeys(options.words)),
         "grid_error": study.grid_error,
         "worth_map": worth_map(scenario, study.items) if study.items else None,
         "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
@@ -195,13 +197,13 @@ class SummaryLine:
 
 
 def _summary(study: Study) -> list[SummaryLine]:
-    fine = study.options.cells_m[1]
+    fine = study.options.cells[1]
     lines = []
     for target in study.targets:
         own = [
             each
             for each in study.pairs
-            if each.target.name == target.name and each.cell_m == fine and target.protected
+            if each.target.name == target.name and each.cells == fine and target.protected
         ]
         if own:
             gone = [each.reduction for each in own]
@@ -275,12 +277,12 @@ Source = tuple[str, str, str]
 
 def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine]) -> list[Source]:
     """Return every number of the summary with where it comes from."""
-    units, fine = study.options.units, study.options.cells_m[1]
+    units, fine = study.options.units, study.options.words[1]
     digests = dict(study.digests)
 
     def blasts(words: str) -> str:
         found = (
-            f"{each.name}: {digests[f'{each.name} {words}, cells of {fine:g} m'][:_HASH_DIGITS]}"
+            f"{each.name}: {digests[f'{each.name} {words}, {fine}'][:_HASH_DIGITS]}"
             for each in study.threats
         )
         return "blast " + ", ".join(found)
@@ -301,7 +303,7 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
             (*sides[0], line.worst.bare),
             (*sides[1], line.worst.walled),
         ):
-            label = f"{line.worst.threat.name} {of_blast}, cells of {fine:g} m"
+            label = f"{line.worst.threat.name} {of_blast}, {fine}"
             where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
             impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
             peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
@@ -331,7 +333,6 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
 
 def _front(study: Study) -> bytes:
     """Return the front with the layout of the report, on the same cells."""
-    coarse = study.options.cells_m[0]
     weighted = []
     for threat in study.threats:
         outcomes = {each.name: each for each in study.masses[threat.name]}
@@ -339,7 +340,7 @@ def _front(study: Study) -> bytes:
         if own is not None:
             weighted.append(own.reduction)
     if not weighted:
-        raise AssertionError(f"no threat was run with cells of {coarse:g} m")
+        raise AssertionError(f"no threat was run with {study.options.words[0]}")
     return front_figure(study.front, (study.cost, float(np.mean(weighted))), len(weighted))
 
 

@@ -17,6 +17,7 @@ from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Element, Layout, Piece, layout_text, standing
+from blast_env.physics.gas.settings import Cells
 from blast_env.reporting.figures import (
     Picture,
     blast_pictures,
@@ -67,8 +68,9 @@ class StudyOptions:
     Attributes:
         charges: The threats; without any, the worst place of each source.
         most_threats: How many of those at most, 1 to 6.
-        cells_m: Sides of cells, two of them, the coarser one first: loads with both say what the
-            grid does. The same twice is one size, and nothing is said of that.
+        cells: Sides of cells in m, two of them, the coarser one first: loads with both say what the
+            grid does. The same twice is one size, and nothing is said of that. For large sites
+            "coarse" and "fine", which grow.
         limits: What buildings may take.
         target: Level of protection that buildings with facades must reach; `None` for that of the
             scenario's objective, or low if it has none.
@@ -86,7 +88,7 @@ class StudyOptions:
 
     charges: tuple[AnyCharge, ...] = ()
     most_threats: int = 2
-    cells_m: tuple[float, float] = (0.5, 0.25)
+    cells: tuple[Cells, Cells] = (0.5, 0.25)
     limits: tuple[Limit, ...] = ()
     target: LevelOfProtection | None = None
     units: UnitSystem = field(default_factory=lambda: UNITS["si"])
@@ -107,23 +109,28 @@ class StudyOptions:
         ):
             if not low <= value <= high:
                 raise BlastEnvError(f"{name} is {value}, must be {low} to {high}")
-        coarse, fine = self.cells_m
-        if not coarse >= fine:
+        coarse, fine = (GasEngine.with_cells(each) for each in self.cells)
+        if not coarse.smallest_m >= fine.smallest_m:
             raise BlastEnvError(
-                f"cells are {coarse:g} m and {fine:g} m, must be two sizes, the coarser one first"
+                f"cells are {coarse.smallest_m:g} m and {fine.smallest_m:g} m, must be two sizes, "
+                "the coarser one first"
             )
-        for cell_m in self.cells_m:
-            GasEngine(cell_m=cell_m)
 
     @property
-    def sizes_m(self) -> tuple[float, ...]:
-        """The sides of cells, each once."""
-        return tuple(dict.fromkeys(self.cells_m))
+    def sizes(self) -> tuple[Cells, ...]:
+        """The cells, each once."""
+        return tuple(dict.fromkeys(self.cells))
 
     @property
     def coarse(self) -> GasEngine:
         """The engine of what is run many times."""
-        return GasEngine(cell_m=self.cells_m[0])
+        return GasEngine.with_cells(self.cells[0])
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """The coarser and the finer cells, for people."""
+        coarse, fine = (GasEngine.with_cells(each).cell_words for each in self.cells)
+        return coarse, fine
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,19 +189,18 @@ class Study:
         asked = (self.options.target, self.scenario.objective.level, LevelOfProtection.LOW)
         return next(each for each in asked if each is not None)
 
-    def pair(self, target: ReportedBuilding, threat: NamedCharge, cell_m: float) -> LoadPair:
+    def pair(self, target: ReportedBuilding, threat: NamedCharge, cells: Cells) -> LoadPair:
         """Return the loads on a building under a threat with one size of cells."""
         return next(
             each
             for each in self.pairs
-            if (each.target.name, each.threat.name, each.cell_m)
-            == (target.name, threat.name, cell_m)
+            if (each.target.name, each.threat.name, each.cells) == (target.name, threat.name, cells)
         )
 
     @property
     def grid_error(self) -> float:
         """Largest difference of a reduction between the two sizes of cells; NaN with one."""
-        coarse, fine = self.options.cells_m
+        coarse, fine = self.options.cells
         if coarse == fine:
             return float("nan")
         differences = [
@@ -252,7 +258,7 @@ def run_study(
     items: tuple[ItemWorth, ...] = ()
     places: tuple[Outcome, ...] = ()
     points: tuple[FrontPoint, ...] = ()
-    part = f"cells of {options.cells_m[1]:g} m"
+    part = options.words[1]
     try:
         runs.run_threats()
         part = _FILM
@@ -269,7 +275,7 @@ def run_study(
     except KeyboardInterrupt:
         options = runs.options_of_what_is_done()
         progress(f"stopped before: {part}", 1.0)
-    coarse_m, fine_m = options.cells_m
+    coarse, fine = options.cells
     return Study(
         scenario=scenario,
         layout=cells,
@@ -278,11 +284,11 @@ def run_study(
         threats=threats,
         bill=bill,
         cost=Placement.of(scenario, cells).cost,
-        pairs=tuple(each for each in runs.pairs if each.cell_m in options.cells_m),
-        bare=runs.consequences(fine_m, walled=False),
-        walled=runs.consequences(fine_m, walled=True),
-        walled_coarse=runs.consequences(coarse_m, walled=True),
-        pictures=runs.pictures[fine_m],
+        pairs=tuple(each for each in runs.pairs if each.cells in options.cells),
+        bare=runs.consequences(fine, walled=False),
+        walled=runs.consequences(fine, walled=True),
+        walled_coarse=runs.consequences(coarse, walled=True),
+        pictures=runs.pictures[fine],
         stills=stills,
         items=items,
         masses=masses,
@@ -297,26 +303,31 @@ def run_study(
 
 def blasts_of(
     scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[NamedCharge]
-) -> tuple[tuple[str, int, float], ...]:
-    """Return the parts of a report in their order: label, blasts, and side of their cells.
+) -> tuple[tuple[str, int, Cells], ...]:
+    """Return the parts of a report in their order: label, blasts, and their cells.
 
     Labels are those that `run_study` tells; of parts with several, what they begin with.
     """
-    coarse_m = options.cells_m[0]
+    coarse = options.cells[0]
     count, items = len(threats), len(standing(layout)) if options.items else 0
-    parts: list[tuple[str, int, float]] = [
-        (f"{threat.name} {words}, cells of {cell_m:g} m", 1, cell_m)
-        for cell_m in options.sizes_m
+    parts: list[tuple[str, int, Cells]] = [
+        (_label(threat, words, size), 1, size)
+        for size in options.sizes
         for threat in threats
         for words in (_BARE, _WALLED)
     ]
-    parts.append((_FILM, 2 if options.stills else 0, coarse_m))
-    parts += [(f"{each.name}, {_MASSES_PART}", 2 * len(_MASSES), coarse_m) for each in threats]
-    parts.append((_ITEMS, count * (items + 2) if items else 0, coarse_m))
-    parts.append((_PLACES, 2 * len(other_places(scenario, options.places)), coarse_m))
+    parts.append((_FILM, 2 if options.stills else 0, coarse))
+    parts += [(f"{each.name}, {_MASSES_PART}", 2 * len(_MASSES), coarse) for each in threats]
+    parts.append((_ITEMS, count * (items + 2) if items else 0, coarse))
+    parts.append((_PLACES, 2 * len(other_places(scenario, options.places)), coarse))
     front = len(front_layouts(options.front, scenario))
-    parts.append((_FRONT, count * (front + 1) if front else 0, coarse_m))
+    parts.append((_FRONT, count * (front + 1) if front else 0, coarse))
     return tuple(parts)
+
+
+def _label(threat: NamedCharge, words: str, cells: Cells) -> str:
+    """Return what a blast of the threats is called while it runs, and where its digest is."""
+    return f"{threat.name} {words}, {GasEngine.with_cells(cells).cell_words}"
 
 
 def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[NamedCharge, ...]:
@@ -341,10 +352,10 @@ class Runs:
         self.scenario, self.layout, self.options = scenario, layout, options
         self.targets, self.threats, self.progress = targets, threats, progress
         self.pairs: list[LoadPair] = []
-        self.pictures: dict[float, dict[str, tuple[Picture, ...]]] = {}
+        self.pictures: dict[Cells, dict[str, tuple[Picture, ...]]] = {}
         self.notes: list[str] = []
         self.digests: list[tuple[str, str]] = []
-        self._found: dict[tuple[float, bool], list[Consequences]] = {}
+        self._found: dict[tuple[Cells, bool], list[Consequences]] = {}
         self._evaluator = BlastEvaluator(scenario, options.coarse, cache=options.cache)
 
     def run_threats(self) -> None:
@@ -352,17 +363,17 @@ class Runs:
 
         The coarser ones first: with them alone there is a report, if it is stopped then.
         """
-        for cell_m in self.options.sizes_m:
+        for size in self.options.sizes:
             for threat in self.threats:
-                both = [self._measured(threat, cell_m, layout) for layout in ((), self.layout)]
-                self.pairs += self._pairs(threat, cell_m, both[0], both[1])
+                both = [self._measured(threat, size, layout) for layout in ((), self.layout)]
+                self.pairs += self._pairs(threat, size, both[0], both[1])
                 for is_walled, measured in enumerate(both):
                     charge = threat.against(self.scenario, self.layout if is_walled else ())
                     found = consequences_of(self.scenario, measured.result, charge)
-                    self._found.setdefault((cell_m, bool(is_walled)), []).append(found)
+                    self._found.setdefault((size, bool(is_walled)), []).append(found)
                 # Drawn now, because only these two results are in memory at once.
-                self.pictures.setdefault(cell_m, {})[threat.name] = (
-                    *self._damage_pictures(threat.name, cell_m),
+                self.pictures.setdefault(size, {})[threat.name] = (
+                    *self._damage_pictures(threat.name, size),
                     risk_picture(*both),
                     *blast_pictures(both[0], both[1], self.options.units),
                 )
@@ -373,38 +384,39 @@ class Runs:
         Raises:
             KeyboardInterrupt: If not even these are done.
         """
-        done = [self.options.cells_m[0], self.options.cells_m[1]]
         done = [
-            cell_m for cell_m in done if len(self.pictures.get(cell_m, {})) == len(self.threats)
+            size
+            for size in self.options.cells
+            if len(self.pictures.get(size, {})) == len(self.threats)
         ]
         if not done:
             raise KeyboardInterrupt
-        return replace(self.options, cells_m=(done[0], done[-1]))
+        return replace(self.options, cells=(done[0], done[-1]))
 
-    def consequences(self, cell_m: float, *, walled: bool) -> Consequences:
+    def consequences(self, cells: Cells, *, walled: bool) -> Consequences:
         """Return what all threats did, with such cells, without the layout or with it."""
-        return Consequences.together(self._found[cell_m, walled])
+        return Consequences.together(self._found[cells, walled])
 
-    def _damage_pictures(self, threat: str, cell_m: float) -> tuple[Picture, ...]:
-        bare, walled = (self._found[cell_m, is_walled][-1] for is_walled in (False, True))
+    def _damage_pictures(self, threat: str, cells: Cells) -> tuple[Picture, ...]:
+        bare, walled = (self._found[cells, is_walled][-1] for is_walled in (False, True))
         return damage_pictures(self.scenario, self.layout, bare, walled, threat)
 
-    def _measured(self, threat: NamedCharge, cell_m: float, layout: Layout) -> MeasuredBlast:
-        words = _WALLED if layout else _BARE
-        label = f"{threat.name} {words}, cells of {cell_m:g} m"
-        blast = GasBlast(self.scenario, layout, 0, GasEngine(cell_m=cell_m), threat.charge)
+    def _measured(self, threat: NamedCharge, cells: Cells, layout: Layout) -> MeasuredBlast:
+        label = _label(threat, _WALLED if layout else _BARE, cells)
+        engine = GasEngine.with_cells(cells)
+        blast = GasBlast(self.scenario, layout, 0, engine, threat.charge)
         measured = measure(blast, self.targets, partial(self.progress, label))
         self.notes += [f"{label}: {note}" for note in measured.notes]
         self.digests.append((label, measured.result.digest))
         return measured
 
     def _pairs(
-        self, threat: NamedCharge, cell_m: float, bare: MeasuredBlast, walled: MeasuredBlast
+        self, threat: NamedCharge, cells: Cells, bare: MeasuredBlast, walled: MeasuredBlast
     ) -> Iterator[LoadPair]:
         for target in self.targets:
             if target.name in bare.loads and target.name in walled.loads:
                 loads = bare.loads[target.name], walled.loads[target.name]
-                yield LoadPair(target, threat, cell_m, *loads)
+                yield LoadPair(target, threat, cells, *loads)
 
     def film(self) -> tuple[Picture, ...]:
         """Return moments of the first threat, without and with the layout."""

@@ -131,10 +131,10 @@ def verdict_of(study: Study) -> ReportVerdict:
 
 
 def _limits(study: Study) -> Iterator[KeptLimit]:
-    fine = study.options.cells_m[1]
+    fine = study.options.cells[1]
     for limit in study.options.limits:
         for pair in study.pairs:
-            if pair.target.name == limit.target and pair.cell_m == fine:
+            if pair.target.name == limit.target and pair.cells == fine:
                 yield KeptLimit(limit, pair, limit.is_kept(pair.walled), limit.is_kept(pair.bare))
 
 

@@ -1,6 +1,6 @@
 """What cells that grow with the blast do to the loads on each wall of a large site, and cost."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
 from typing import Final
 
@@ -49,9 +49,8 @@ class CellChoice:
 def engine_with(choice: str, until_s: float | None = None) -> GasEngine:
     """Return the engine with cells that are `coarse` or `fine`, or of one side in m."""
     until = "structures" if until_s is None else until_s
-    if choice in CELLS:
-        return GasEngine(cells=choice, until=until)
-    return GasEngine(cell_m=float(choice), until=until)
+    cells = choice if choice in CELLS else float(choice)
+    return replace(GasEngine.with_cells(cells), until=until)
 
 
 def cell_choice(scenario: Scenario, layout: Layout, engine: GasEngine) -> CellChoice:

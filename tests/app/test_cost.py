@@ -69,7 +69,7 @@ def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
     assert shares[-1] == pytest.approx(1.0)
     assert shares == sorted(shares)
     assert cost.share("no part", 0.5) is None
-    one = ReportCost.of(hut(), WALL, replace(options, cells_m=(0.5, 0.5), items=False))
+    one = ReportCost.of(hut(), WALL, replace(options, cells=(0.5, 0.5), items=False))
     assert len(one.blasts) == 2 + 2 + 4 + 2
 
 

@@ -501,7 +501,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     with pytest.raises(BlastEnvError, match="layout A is empty"):
         session.report(tmp_path / "r.html")
     session.put("wall", session.design.with_layout(WALL))
-    choice = ReportChoice(cells_m=(0.5, 0.5), items=False, target=3)
+    choice = ReportChoice(cells=(0.5, 0.5), items=False, target=3)
     session.report(tmp_path / "r.html", tmp_path / "r.pdf", choice)
     cost = session.cost_of_report(choice)
     shares = [cost.share("film", 0.5), cost.share("other places", 0.5)]
@@ -512,7 +512,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     charges = tuple(each.charge for each in session.chosen_threats())
     options = StudyOptions(
         charges=charges,
-        cells_m=(0.5, 0.5),
+        cells=(0.5, 0.5),
         items=False,
         target=LevelOfProtection.MEDIUM,
         cache=session.work.cache,

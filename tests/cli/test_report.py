@@ -27,6 +27,11 @@ def files(tmp_path: Path) -> tuple[str, ...]:
         (("--charge", "7,4,5"), "must keep clear of it"),
         (("--charge", "4.25,4,5"), "closer than the charge's radius"),
         (("--cells", "0.25", "0.5"), "the coarser one first"),
+        (("--cells", "fine", "coarse"), "the coarser one first"),
+        (
+            ("--cells", "rough", "fine"),
+            "--cells is 'rough', must be a length in m, or coarse, fine",
+        ),
         (("--threats", "9"), "threats is 9, must be 1 to 6"),
         (("--pdf", "a.doc"), "a.doc: suffix is '.doc', must be .pdf"),
         (("--front", "no.csv"), "no.csv: is not the front.csv of a search"),

@@ -180,8 +180,8 @@ def test_units() -> None:
     ("options", "words"),
     [
         ({"most_threats": 7}, "threats is 7, must be 1 to 6"),
-        ({"cells_m": (0.25, 0.5)}, "must be two sizes, the coarser one first"),
-        ({"cells_m": (0.5, 0.3)}, "cell_m is 0.3"),
+        ({"cells": (0.25, 0.5)}, "must be two sizes, the coarser one first"),
+        ({"cells": (0.5, 0.3)}, "cell_m is 0.3"),
         ({"places": 0}, "places is 0"),
         ({"stills": 13}, "stills is 13"),
     ],

@@ -16,6 +16,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import Consequences
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Layout, Measure, layout_text
+from blast_env.physics.gas.settings import Cells
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, Study, StudyOptions, run_study, write_report
 from blast_env.reporting.loads import MeasuredBlast, measure, targets_of
@@ -63,7 +64,7 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     assert pair.walled.wall_impulse_pa_s == pytest.approx(row["most_loaded_pa_s"])
     assert pair.walled == measured.loads["hut"]
     assert 0.1 < pair.reduction < 0.5
-    assert {each.cell_m for each in study.pairs} == {0.5, 0.25}
+    assert {each.cells for each in study.pairs} == {0.5, 0.25}
     fine = study.pair(target, threat, 0.25)
     assert study.grid_error == pytest.approx(abs(pair.reduction - fine.reduction))
     digests = dict(study.digests)
@@ -299,15 +300,26 @@ def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) ->
 
 
 @pytest.mark.usefixtures("_without_pictures")
-def test_a_report_that_is_stopped_has_what_was_done(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ((0.5, 0.5), "cells of 0.5 m"),
+        (("coarse", "fine"), "coarse cells from 0.5 m and fine cells from 0.25 m"),
+    ],
+)
+def test_a_report_that_is_stopped_has_what_was_done(
+    cells: tuple[Cells, Cells], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def stop(_: Runs) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Runs, "other_masses", stop)
-    stopped = run_study(small_hut(), LAYOUT, StudyOptions(stills=0, cells_m=(0.5, 0.5)))
+    stopped = run_study(small_hut(), LAYOUT, StudyOptions(stills=0, cells=cells))
     assert stopped.stopped == "other masses"
-    assert stopped.pairs
-    assert "This report was stopped before: other masses" in report_html(stopped, ["blast-env"])
+    assert {each.cells for each in stopped.pairs} == {*cells}
+    page = report_html(stopped, ["blast-env"])
+    assert "This report was stopped before: other masses" in page
+    assert f"three dimensions), {words}." in page
 
 
 @pytest.mark.usefixtures("_without_pictures")
@@ -326,14 +338,14 @@ def test_stopped_among_the_finer_cells_a_report_has_the_coarser_ones(
     stopped = run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0))
     assert sizes == [0.5, 0.5, 0.25, 0.25]
     assert stopped.stopped == "cells of 0.25 m"
-    assert {each.cell_m for each in stopped.pairs} == {0.5}
+    assert {each.cells for each in stopped.pairs} == {0.5}
     page = report_html(stopped, ["blast-env"])
     assert "This report was stopped before: cells of 0.25 m" in page
     assert "there is one size of cells alone" in page
     assert not re.search(r"\bnan\b", re.sub(r"base64,[^\"]*", "", page))
     sizes[:] = [0.5] * 2
     with pytest.raises(KeyboardInterrupt):  # nothing is done yet
-        run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0, cells_m=(0.5, 0.5)))
+        run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0, cells=(0.5, 0.5)))
 
 
 def test_other_glass_has_the_price_of_the_measures_that_put_it_into_all_windows(

@@ -16,14 +16,15 @@ from blast_env.app.work import ReportChoice
 from blast_env.errors import BlastEnvError
 from blast_env.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.files import scratch_folder
+from blast_env.physics.gas.settings import Cells
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario
 
-_TWO_SIZES: Final = "both"
-_CELLS: Final = {
-    _TWO_SIZES: "0.5 and 0.25 m: says what the grid does",
-    "coarse": "0.5 m alone: much quicker",
+_CELLS: Final[dict[tuple[Cells, Cells], str]] = {
+    (0.5, 0.25): "0.5 and 0.25 m: says what the grid does",
+    (0.5, 0.5): "0.5 m alone: much quicker",
+    ("coarse", "fine"): "coarse and fine: they grow, for sites of 40 m and more",
 }
 _LEVELS: Final = {
     int(level): f"level of protection: {level.label}"
@@ -149,7 +150,7 @@ class ReportDialog:
             ui.label(f"Report on layout {SLOTS[session.design.active]}: {kind}").style(
                 "font-weight: 600"
             )
-            self._cells = ui.select(_CELLS, value=_TWO_SIZES, label="cells of gas dynamics")
+            self._cells = ui.select(_CELLS, value=(0.5, 0.25), label="cells of gas dynamics")
             wanted = session.scenario.objective.level or ReportChoice().target
             self._target = ui.select(_LEVELS, value=wanted, label="has to reach")
             self._target.visible = bool(session.scenario.bays)
@@ -170,9 +171,9 @@ class ReportDialog:
 
     @property
     def _choice(self) -> ReportChoice:
-        sizes = (0.5, 0.25) if self._cells.value == _TWO_SIZES else (0.5, 0.5)
+        cells = (*self._cells.value,)
         return ReportChoice(
-            cells_m=sizes, items=bool(self._items.value), target=int(self._target.value)
+            cells=cells, items=bool(self._items.value), target=int(self._target.value)
         )
 
     def _say_cost(self) -> None:

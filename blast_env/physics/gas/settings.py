@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import floor, inf, isclose, log2, nan
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Self, TypeAlias
 
 import numpy as np
 
@@ -50,6 +50,9 @@ _GROWING: Final[Mapping[str, _Growth]] = MappingProxyType(
 )
 CELLS: Final = (UNIFORM, *_GROWING)
 """What cells can be."""
+
+Cells: TypeAlias = float | str
+"""Side of cells in m, or "coarse" or "fine" for cells that grow."""
 
 SOUND_M_S: Final = 340.0
 # A charge sends more than one wave: its products swing between too wide and too narrow. All times
@@ -117,6 +120,15 @@ class GasSettings:
             raise BlastEnvError(f"settled_s is {self.settled_s:g}, must be above 0")
         if self.until not in _WAITED_FOR:
             object.__setattr__(self, "until", _seconds(self.until))
+
+    @classmethod
+    def with_cells(cls, cells: Cells) -> Self:
+        """Return settings with cells of one side in m, or with those that "coarse" or "fine" name.
+
+        Raises:
+            BlastEnvError: If it is neither.
+        """
+        return cls(cells=cells) if isinstance(cells, str) else cls(cell_m=cells)
 
     @property
     def is_growing(self) -> bool:
