@@ -3,10 +3,9 @@
 `python -m studies.response` prints those that need no blast; its commands are the others.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
 from math import pi, sin
-from time import process_time
 from typing import Annotated, Final
 
 import numpy as np
@@ -18,7 +17,6 @@ from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.consequences import side_on_impulse_pa_s, side_on_peak_pa
-from blast_env.geometry import Layout, Piece
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import level_of
 from blast_env.response.facade import (
@@ -440,51 +438,6 @@ def _levels_helped_by_suction(
         else panel_responses(panels, time_s, pressure_pa).damage
     )
     return np.array([float(level_of(each)) for each in damage.tolist()])
-
-
-@app.command()
-def recording(
-    repeats: Annotated[int, typer.Option(min=1, help="Blasts of each kind.")] = 5,
-) -> None:
-    """Print what recording bays and pieces costs: processor time, and memory."""
-    with user_errors():
-        site, layout = recorded_site()
-        blasts: dict[str, Callable[[GasBlast], object]] = {
-            "nothing but loads": _run_alone,
-            "bays and both sides of the pieces": GasBlast.run,
-        }
-        times: dict[str, list[float]] = {name: [] for name in blasts}
-        for _ in range(repeats + 1):  # the first blast compiles
-            for name, run in blasts.items():
-                blast = GasBlast(site, layout)
-                begin = process_time()
-                run(blast)
-                times[name].append(process_time() - begin)
-        rows = [(name, f"{min(each[1:]):.2f}") for name, each in times.items()]
-        print_line(markdown_table(("recorded", "processor s, least of the blasts"), rows))
-        result = GasBlast(site, layout).run()
-        assert result.bay_loads is not None
-        assert result.piece_loads is not None
-        recorders = result.bay_loads.recorder, result.piece_loads.recorder
-        patches, steps = sum(len(each.faces) for each in recorders), result.steps
-        print_line(f"{patches} histories of {steps} steps: {4e-6 * patches * steps:.2f} MB")
-
-
-def recorded_site() -> tuple[Scenario, Layout]:
-    """Return a forecourt with an office of 90 bays behind twelve walls."""
-    document = open_wall(22.0, 20.0, 10.5, 60.0).model_dump(mode="json")
-    document["structures"][0] |= {"columns": 24, "faces": ["west", "south", "north"]}
-    document["site"]["width_m"] = 42.0
-    item = {"from_catalogue": "t_wall_3_6", "stock": 20}
-    zone = {"corner_m": [9.0, 5.0], "rows": 36, "columns": 8, "items": [item]}
-    site = Scenario.from_document(document | {"build_zone": zone}, "forecourt")
-    return site, tuple(Piece(3 * row, 2, "t_wall_3_6", True) for row in range(12))
-
-
-def _run_alone(blast: GasBlast) -> None:
-    """Run a blast with nothing but its loads and gauges."""
-    run = blast.engine.start_on(blast.site)
-    run.advance(float("inf"))
 
 
 if __name__ == "__main__":

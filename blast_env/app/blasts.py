@@ -219,8 +219,7 @@ def _mean_loads(loads: Sequence[BlastLoads]) -> tuple[Load, ...]:
 def _gas(
     task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, folder: Path, tell: Tell
 ) -> dict[str, Any]:
-    engine = GasEngine().configured(cell_m=task.engine.cell_m)
-    blast = GasBlast(scenario, layout, 0, engine, charge)
+    blast = GasBlast(scenario, layout, 0, task.engine.gas, charge)
     section = default_section(blast.site)
     height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
     told = share_of(tell, 0, 100, 60)

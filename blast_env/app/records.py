@@ -12,10 +12,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import read_text
+from blast_env.engines import Engine, find_engine
 from blast_env.engines.contract import CALIBRATED_ENGINES
+from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
+from blast_env.physics.gas.settings import UNIFORM
 from blast_env.physics.scene import Charge
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.scenario.placement import met_by_blasts
@@ -49,10 +52,12 @@ class EngineRecord(Kept):
     Attributes:
         name: `event` (particles) or `gas`.
         cell_m: Side of the cells of gas dynamics.
+        cells: Whether they grow, see `GasSettings`.
     """
 
     name: str = "event"
     cell_m: float | None = None
+    cells: str = UNIFORM
 
     @property
     def is_first_look(self) -> bool:
@@ -64,7 +69,17 @@ class EngineRecord(Kept):
         """The engine in words, for people who have to know what a number rests on."""
         if self.is_first_look:
             return "particles (first look)"
-        return f"{self.name}, cells of {self.cell_m or 0.5:g} m"
+        return f"{self.name}, {self.gas.cell_words}"
+
+    @property
+    def gas(self) -> GasEngine:
+        """Gas dynamics with its cells."""
+        return GasEngine(cells=self.cells).configured(cell_m=self.cell_m)
+
+    @property
+    def found(self) -> Engine:
+        """The engine itself."""
+        return find_engine(self.name, self.cell_m) if self.is_first_look else self.gas
 
 
 class Load(Kept):
@@ -221,7 +236,7 @@ def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: Engine
         sorted(map(tuple, met_by_blasts(layout))),
         tuple(charge),
         engine.name,
-        engine.cell_m or 0.5,
+        engine.gas.smallest_m if engine.cells == UNIFORM else engine.cells,
     )
     return sha256(repr(depends).encode()).hexdigest()[:24]
 

@@ -36,7 +36,6 @@ from blast_env.app.work import (
     Status,
     Task,
 )
-from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Measure
 from blast_env.scenario import AnyCharge, Scenario
@@ -339,7 +338,7 @@ class Session:
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
 
     def _cost(self, charge: AnyCharge) -> CostGuess:
-        return GasEngine(cell_m=self.engine.cell_m or 0.5).cost(self.scenario, charge)
+        return self.engine.gas.cost(self.scenario, charge)
 
     # Results.
 
@@ -422,7 +421,7 @@ class Session:
     def _facades(self, shown: Shown, threat: NamedThreat) -> FacadeVerdict | None:
         charge = charge_against(self.scenario, shown.layout, threat.charge)
         folder = self.folder.blast_of(shown.key)
-        cell_m = self.engine.cell_m or 0.5
+        cell_m = self.engine.gas.smallest_m
         return FacadeVerdict.read(self.scenario, shown.layout, charge, cell_m, folder)
 
     def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:

@@ -27,7 +27,7 @@ from blast_env.app.work import (
     read_task,
     write_status,
 )
-from blast_env.engines import JUDGE, find_engine
+from blast_env.engines import JUDGE
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
@@ -126,7 +126,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
     scenario = task.site
     begin_with = placing.layout_from(scenario, task.begin_with)
     method = find_proposer(task.method, (begin_with,) if begin_with else ())
-    engine = find_engine(task.engine.name, task.engine.cell_m)
+    engine = task.engine.found
     problem = LayoutProblem(
         BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
     )
@@ -171,7 +171,7 @@ def practice_case(scenario: Scenario, task: SearchTask) -> Case:
 def _film(task: FilmTask, teller: Teller) -> None:
     scenario, charge = task.site, task.threats[0].charge
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
-    engine = find_engine(task.engine.name, task.engine.cell_m)
+    engine = task.engine.found
     bare, own = (engine.blast(scenario, each, 0, charge) for each in ((), layout))
     write: Callable[..., object]
     if task.engine.is_first_look:

@@ -31,7 +31,7 @@ from blast_env.app.threats import NamedThreat, threats_of
 from blast_env.app.verdicts import verdict_rows
 from blast_env.app.work import ReportChoice, Status, read_status, write_status
 from blast_env.engines import find_engine
-from blast_env.engines.gas import GasBlast
+from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.evaluation.consequences import consequences
@@ -276,10 +276,11 @@ def test_keys_know_what_a_result_depends_on() -> None:
         blast_key(site, WALL[:-1], charge, engine),
         blast_key(site, WALL, charge._replace(tnt_kg=6.0), engine),
         blast_key(site, WALL, charge, EngineRecord(name="gas", cell_m=0.25)),
+        blast_key(site, WALL, charge, EngineRecord(name="gas", cells="coarse")),
         blast_key(glazed_hut(), WALL, charge, engine),  # with bays
         blast_key(hut(objective={"quantity": "peak"}), WALL, charge, engine),
     }
-    assert len(others | {key}) == 6
+    assert len(others | {key}) == 7
 
 
 @pytest.mark.parametrize("proposer", offers.rules(load_scenario("courtyard")))
@@ -328,6 +329,23 @@ def test_work_that_fails_says_why(tmp_path: Path, act: object, words: str) -> No
     act(session)  # type: ignore[operator]
     assert state_of(session).state == "failed"
     assert words in state_of(session).text
+
+
+def test_a_blast_has_cells_that_grow(tmp_path: Path) -> None:
+    session = session_on(tmp_path, glazed_hut())
+    session.engine = EngineRecord(name="gas", cells="coarse")
+    assert session.engine.label == "gas, coarse cells from 0.5 m"
+    (threat,) = session.chosen_threats()
+    (cost,) = session.cost([0])
+    assert cost == GasEngine(cells="coarse").cost(session.scenario, threat.charge)
+    session.blast([0])
+    assert state_of(session).state == "done", state_of(session).text
+    bare, *_ = session.shown(threat)
+    record = session.folder.record_of(bare.key)
+    assert record is not None
+    result = GasBlast(session.scenario, (), 0, GasEngine(cells="coarse"), threat.charge).run()
+    load = next(each for each in record.loads if each.structure == "hut")
+    assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s, rel=1e-6)
 
 
 def test_a_site_too_large_for_memory_is_a_message(tmp_path: Path) -> None:

@@ -25,6 +25,14 @@ from blast_env.scenario import Scenario
 _ENGINES: Final = {
     "gas 0.5": (EngineRecord(name="gas", cell_m=0.5), "gas, cells of 0.5 m"),
     "gas 0.25": (EngineRecord(name="gas", cell_m=0.25), "gas, cells of 0.25 m (16 times as long)"),
+    "gas coarse": (
+        EngineRecord(name="gas", cells="coarse"),
+        "gas, coarse cells that grow: for sites of 40 m and more",
+    ),
+    "gas fine": (
+        EngineRecord(name="gas", cells="fine"),
+        "gas, fine cells that grow: for final statements there",
+    ),
     "particles": (EngineRecord(name="event"), "particles: a first look"),
 }
 """The engines that are offered, the one that judges first."""
