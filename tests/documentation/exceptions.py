@@ -414,6 +414,10 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.gas growing --scenario car_park --until 0.3": (
         "--choices coarse,0.5 --until 0.1"
     ),
+    "python -m studies.gas cells --scenario campus --random-layouts 18"
+    " --sizes coarse,0.5,fine,0.25 --until 0.15": (
+        "--random-layouts 0 --sizes coarse,0.5 --until 0.02"
+    ),
     "python -m studies.gas refinement": "--scenario visitor_entrance --every 0.05",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
