@@ -108,7 +108,7 @@ def annealing(
     seeds: Annotated[int, typer.Option(min=1, help="Runs on each.")] = 6,
     processes: Annotated[int, typer.Option(min=1)] = 2,
 ) -> None:
-    """Tune annealing of one walker and of several; check the best of each on other sites."""
+    """Tune annealing from the rules, of one walker and several; check the best on other sites."""
     with user_errors():
         tried = settings()
         tuned = _played(tried, "to tune", sites, seeds, processes)
@@ -129,7 +129,7 @@ def _played(
     found, played = sites_for(purpose, sites), {}
     with progress_bar(f"sites {purpose}") as progress:
         for number, each in enumerate(tried, 1):
-            played[each] = on_sites(each.search, found, seeds, processes)
+            played[each] = on_sites(each, found, seeds, processes)
             progress(number / len(tried))
     return played
 

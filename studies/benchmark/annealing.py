@@ -1,4 +1,4 @@
-"""Annealing tuned for 50 blasts, on generated sites where the surrogate stands for gas dynamics."""
+"""Annealing from the rules' layouts, tuned for 50 blasts; the surrogate stands for gas dynamics."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 from blast_agents.benchmark import method_of
-from blast_agents.search import AnnealingSearch, Search, WinnersSearch
+from blast_agents.search import AnnealingSearch, FromRulesSearch, WinnersSearch
 
 from blast_env.arrays import FloatArray
 from blast_env.problems import Definition, make, secret_sites
@@ -58,15 +58,17 @@ def sites_for(purpose: str, count: int) -> tuple[Definition, ...]:
     return secret_sites(f"annealing, {purpose}", count)
 
 
-def taken_off_percent(search: Search, seeds: int, site: Definition) -> float:
-    """Return what a search takes off on a site, the mean over its seeds."""
-    propose, found = method_of(search), []
+def taken_off_percent(setting: Setting, seeds: int, site: Definition) -> float:
+    """Return what a search from the rules takes off on a site, the mean over its seeds."""
+    propose, found = method_of(FromRulesSearch(setting.search)), []
     for seed in range(seeds):
         layout = propose(make(site, _BUDGET, engine="surrogate"), seed)
         found.append(1.0 - make(site, _BUDGET, engine="surrogate").evaluate(layout))
     return 100.0 * float(np.mean(found))
 
 
-def on_sites(search: Search, sites: tuple[Definition, ...], seeds: int, workers: int) -> FloatArray:
+def on_sites(
+    setting: Setting, sites: tuple[Definition, ...], seeds: int, workers: int
+) -> FloatArray:
     """Return what a search takes off on each site, in per cent (sites,)."""
-    return np.array(run_all(partial(taken_off_percent, search, seeds), sites, workers))
+    return np.array(run_all(partial(taken_off_percent, setting, seeds), sites, workers))

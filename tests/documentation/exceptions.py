@@ -418,6 +418,7 @@ SMALLER: Final[dict[str, str]] = {
     " --sizes coarse,0.5,fine,0.25 --until 0.15": (
         "--random-layouts 0 --sizes coarse,0.5 --until 0.02"
     ),
+    "python -m studies.benchmark annealing": "--sites 2 --seeds 1",
     "python -m studies.gas refinement": "--scenario visitor_entrance --every 0.05",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,
