@@ -141,7 +141,6 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "study": study,
         "scenario": scenario,
         "units": options.units,
-        "coarse": coarse,
         "fine": fine,
         "coarse_words": options.words[0],
         "fine_words": options.words[1],

@@ -116,8 +116,8 @@ def annealing(
             max((each for each in tried if each.kind == kind), key=lambda each: tuned[each].mean())
             for kind in dict.fromkeys(each.kind for each in tried)
         ]
-        packaged = [each for each in tried if each.is_packaged]
-        checked = _played([*packaged, *best], "to check", sites, seeds, processes)
+        again = dict.fromkeys([*(each for each in tried if each.is_packaged), *best])
+        checked = _played([*again], "to check", sites, seeds, processes)
         rows = [*_annealing_rows("tuned on", tuned), *_annealing_rows("checked on", checked)]
         headers = ("sites", "search", "begins with (%)", "temperatures", "taken off (%)")
         print_line(markdown_table((*headers, "points more than packaged"), rows))

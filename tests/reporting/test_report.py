@@ -320,6 +320,8 @@ def test_a_report_that_is_stopped_has_what_was_done(
     page = report_html(stopped, ["blast-env"])
     assert "This report was stopped before: other masses" in page
     assert f"three dimensions), {words}." in page
+    assert f"take those with {words.split(' and ')[-1]} as a lower bound" in page
+    assert not re.search(r"\b(coarse|fine) m\b", page)
 
 
 @pytest.mark.usefixtures("_without_pictures")
