@@ -3,7 +3,9 @@
 import gc
 import os
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -36,8 +38,10 @@ def test_what_was_there_outlives_a_full_device(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where only the last byte has no room, as with a film whose index comes last."""
-    # A drawing says when it was made, in as many digits as the moment needs.
+    # Drawings and reports say when they were made, in as many bytes as the moment needs.
     monkeypatch.setattr("ezdxf.options.write_fixed_meta_data_for_testing", True)
+    then = SimpleNamespace(now=lambda zone: datetime(2026, 1, 1, tzinfo=zone))
+    monkeypatch.setattr("blast_env.reporting.page.datetime", then)
     path = tmp_path / name
     WRITERS[name](path)
     size = path.stat().st_size
