@@ -22,7 +22,14 @@ from blast_env.files import make_folder
 from blast_env.provenance import versions
 from blast_env.recording.parquet import write_table
 from blast_env.scenario import Scenario, bundled_scenarios
-from blast_env.sites import FAMILIES, HELD_OUT_SITES, ITEM_SITES, generate_site
+from blast_env.sites import (
+    FAMILIES,
+    HELD_OUT_SITES,
+    ITEM_SITES,
+    LARGE_SITES,
+    generate_site,
+    large_ranges,
+)
 from blast_env.tables import Column, table_of
 
 COLUMNS: Final = (
@@ -48,10 +55,23 @@ SITE_NAME: Final = "item_sites/"
 """What the names of generated sites in the table begin with; their seed follows."""
 
 
+def site_name(seed: int, side_m: float | None = None) -> str:
+    """Return what a generated site is called in the table.
+
+    Args:
+        seed: Its seed.
+        side_m: Its side, if it is of `large_sites`; otherwise it is of `item_sites`.
+    """
+    return f"{SITE_NAME}{seed}" if side_m is None else f"{LARGE_SITES}/{side_m:g}/{seed}"
+
+
 def scenario_of(name: str) -> Scenario:
     """Return the scenario of a name in the table."""
     if name.startswith(SITE_NAME):
         return generate_site(int(name.removeprefix(SITE_NAME)), FAMILIES[ITEM_SITES])
+    if name.startswith(f"{LARGE_SITES}/"):
+        side_m, seed = name.removeprefix(f"{LARGE_SITES}/").split("/")
+        return generate_site(int(seed), large_ranges(float(side_m)))
     return load_scenario(name)
 
 
@@ -61,6 +81,9 @@ def main(
     sites: Annotated[
         int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
     ] = 0,
+    side: Annotated[
+        list[float] | None, typer.Option(help="As many of large_sites with this side, m.")
+    ] = None,
     scenario: Annotated[
         list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")
     ] = None,
@@ -73,9 +96,10 @@ def main(
     with user_errors():
         known = (*bundled_scenarios(), *(scenario or ()))
         names = {load_scenario(name).content_hash: name for name in known}
-        for number in range(sites):
-            name = f"{SITE_NAME}{HELD_OUT_SITES + number}"
-            names[scenario_of(name).content_hash] = name
+        for side_m in (None, *(side or ())):
+            for number in range(sites):
+                name = site_name(HELD_OUT_SITES + number, side_m)
+                names[scenario_of(name).content_hash] = name
         for folder in run or ():
             names |= _sites_of(folder)
         rows: dict[str, list[dict[str, object]]] = {}

@@ -7,6 +7,7 @@ may: nothing depends on this but the time.
 from typing import Literal
 
 import numpy as np
+from blast_agents.surrogate.relations import relations
 from blast_agents.surrogate.ways import Ways
 
 from blast_env import load_scenario, simulate
@@ -45,7 +46,9 @@ def gas_engine(precision: Literal["single", "double"]) -> None:
 
 def surrogate() -> None:
     piece = np.array([[4.0, -1.0, 5.0, 1.0, 2.0]])
-    Ways.between(np.zeros(3), np.array([[9.0, 0.0, 1.0]]), 100.0, piece).shares(piece)
+    points = np.array([[9.0, 0.0, 1.0]])
+    Ways.between(np.zeros(3), points, 100.0, piece).shares(piece)
+    relations(np.zeros(3), points, np.array([[-1.0, 0.0]]), 1.0, piece)
 
 
 def driving() -> None:

@@ -16,6 +16,7 @@ TABLES: Final = (
     "gas_blasts",
     "site_blasts",
     "site_agent_blasts",
+    "many_site_blasts",
     "street_blasts",
     "street_agent_blasts",
 )

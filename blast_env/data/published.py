@@ -1,6 +1,7 @@
 """The published blasts as a cache: what was run once need not be run again."""
 
 import json
+import re
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from blast_env.evaluation import BlastCache, BlastKey
 from blast_env.scenario import Scenario
 
 _CELLS: Final = "cell_m=0.5"
+_GROWING: Final = r"cells='(?:coarse|fine)'"
 _COLUMNS: Final = (
     "scenario_hash",
     "layout",
@@ -32,7 +34,7 @@ ChargeNumbers = tuple[float, float, float, float]
 
 @dataclass(eq=False)
 class PublishedBlasts:
-    """The blasts of `load("gas_blasts")` as a cache for gas dynamics with cells of 0.5 m.
+    """The blasts of `load("gas_blasts")` as a cache for gas dynamics with uniform cells of 0.5 m.
 
     Attributes:
         scenarios: Whose blasts are asked for, by their hashes.
@@ -49,6 +51,7 @@ class PublishedBlasts:
         self.rows = defaultdict(dict)
         table = load()
         table = table[table.scenario_hash.isin(list(self.scenarios))]
+        table = table[~table.engine.str.contains(_GROWING)]
         columns = [table[name].tolist() for name in _COLUMNS]
         for scenario_hash, layout, x_m, y_m, height_m, tnt_kg, structure, *loads in zip(
             *columns, strict=True
@@ -60,7 +63,7 @@ class PublishedBlasts:
         """Return the loads of a blast that was published, or that the cache behind has."""
         charge = (*key.charge.position_m, key.charge.height_m, key.charge.tnt_kg)
         known = None
-        if _CELLS in key.engine:
+        if _CELLS in key.engine and not re.search(_GROWING, key.engine):
             known = self.rows.get((key.scenario_hash, _normal(json.dumps(key.layout)), charge))
         if known is None:
             return None if self.behind is None else self.behind.get(key)

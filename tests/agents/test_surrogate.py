@@ -4,6 +4,7 @@ import json
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,22 +27,31 @@ from blast_agents.surrogate.fitting import (
     folds,
     load_errors,
 )
-from blast_agents.surrogate.horizons import HORIZONS, horizons
 from blast_agents.surrogate.network import (
+    MESSAGE,
+    SHAPES,
     Check,
     Fit,
     Member,
+    Networks,
     Surrogate,
     load_surrogate,
     packaged_surrogate,
-    shapes,
 )
+from blast_agents.surrogate.relations import RELATIONS, relations
 from blast_agents.surrogate.search import (
     Guesses,
     LearntSearch,
     improved,
 )
-from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES, MOST_POINTS, WallPoints, site_of
+from blast_agents.surrogate.walls import (
+    FEATURES,
+    INPUTS,
+    MOST_POINTS,
+    Memory,
+    WallPoints,
+    site_of,
+)
 from blast_agents.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -55,8 +65,8 @@ from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
 from blast_env.geometry import Layout, Piece
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
-from studies.blast_table import COLUMNS, SITE_NAME, scenario_of
-from studies.surrogate import choices, reductions_of, varied_layouts, verdict
+from studies.blast_table import COLUMNS, scenario_of, site_name
+from studies.surrogate import Recipe, choices, reductions_of, verdict
 from tests.agents.test_self_labelling import wide_yard
 from tests.office_park import office_park
 
@@ -66,14 +76,7 @@ NOTHING = np.empty((0, 5))
 FAST = GasEngine(border_m=0.0, until=0.02)
 YARD = wide_yard()
 PEAKS = Scenario.from_document(YARD.model_dump() | {"objective": {"quantity": "peak"}}, "peaks")
-CHECK = Check(
-    layouts_rms=0.1,
-    layouts_rank=0.9,
-    layouts_lost=0.02,
-    sites_rms=0.2,
-    sites_rank=0.8,
-    sites_lost=0.03,
-)
+CHECK = Check(rms=0.2, rank=0.8, lost=0.03)
 ABOUT = Fit(
     command="by hand",
     versions={},
@@ -103,18 +106,18 @@ def shares(*solids: list[float], point_m: np.ndarray = POINT_M) -> np.ndarray:
     return ways.shares(np.array(solids).reshape(-1, 5))[0]
 
 
-def by_hand(seed: int = 0, members: int = 2, given: int = FEATURES) -> Surrogate:
+def by_hand(seed: int = 0, members: int = 2) -> Surrogate:
     """Return networks that nobody has fitted; what hides a wall lowers their guesses."""
     rng = np.random.default_rng(seed)
     networks = []
     for _ in range(2 * members):
-        arrays = [0.05 * rng.standard_normal(shape) for shape in shapes(given)]
-        arrays[0][FEATURES - SHARES : FEATURES] += 0.2
-        arrays[2] += 0.02
-        arrays[4] += 0.02
-        networks.append(Member(*arrays))
-    of_impulse, of_peak = tuple(networks[:members]), tuple(networks[members:])
-    return Surrogate(np.zeros(given), np.ones(given), of_impulse, of_peak, ABOUT)
+        member = Member(*(0.05 * rng.standard_normal(shape) for shape in SHAPES))
+        member.first[FEATURES - SHARES : FEATURES] += 0.2
+        member.second[:] += 0.02
+        member.last[:] += 0.02
+        networks.append(member)
+    of_both = Networks(networks[:members]), Networks(networks[members:])
+    return Surrogate(np.zeros(INPUTS), np.ones(INPUTS), *of_both, ABOUT)
 
 
 def test_all_is_open_where_nothing_stands_and_nothing_behind_an_endless_wall() -> None:
@@ -232,76 +235,108 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
     assert (together.spread > 0.0).all()
     for number, (layout, charge) in enumerate(zip(layouts, charges, strict=True)):
         alone = surrogate.guess(site_of(YARD), [layout], [charge])
-        assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-12)
+        assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-5)
 
 
-@pytest.mark.parametrize("points", [0, 1, 2, 63, 64, 65, 66, 128, 129, 400])
-def test_a_network_says_of_each_of_many_points_what_its_layers_are(points: int) -> None:
-    member = packaged_surrogate().members[0]
-    features = np.random.default_rng(points).normal(size=(points, len(member.first)))
-    said = features
-    for weights, bias in (
-        (member.first, member.first_bias),
-        (member.second, member.second_bias),
-        (member.last, member.last_bias),
-    ):
-        said = np.einsum("pi,io->po", said, weights) + bias
-        if weights is not member.last:
-            said = said / (1.0 + np.exp(-said))
-    np.testing.assert_allclose(member(features), said[:, 0], rtol=1e-12, atol=1e-12)
+@pytest.mark.parametrize("points", [0, 1, 2, 47, 48, 49, 50, 96, 97, 400])
+def test_networks_say_of_each_of_many_points_what_their_layers_are(points: int) -> None:
+    networks = packaged_surrogate().impulse
+    rng = np.random.default_rng(points)
+    features = rng.normal(size=(points, FEATURES))
+    related = rng.normal(size=(3, points, RELATIONS))
+    messages = networks.messages(related.reshape(-1, RELATIONS)).reshape(5, 3, points, MESSAGE)
+    said = networks(features, messages.sum(axis=1))
+    assert said.shape == (len(networks.members), points)
+    for number, member in enumerate(networks.members):
+        sent = silu(np.einsum("spr,rk->spk", related, member.send) + member.send_bias)
+        told = silu(np.einsum("spk,km->spm", sent, member.message) + member.message_bias)
+        hidden = np.hstack((features, told.sum(axis=0)))
+        for weights, bias in (
+            (member.first, member.first_bias),
+            (member.second, member.second_bias),
+        ):
+            hidden = silu(np.einsum("pi,io->po", hidden, weights) + bias)
+        alone = hidden @ member.last[:, 0] + member.last_bias
+        np.testing.assert_allclose(said[number], alone, rtol=1e-4, atol=1e-4)
 
 
-def test_horizons_are_the_angles_of_the_highest_edges() -> None:
-    """Ahead of the charge, behind it, and before the point; a quarter of a turn changes nothing."""
-    assert (horizons(CHARGE_M, POINT_M, NOTHING) == 0.0).all()
-    ahead, behind = wall(5.0, -9.0, 9.0, 3.3), wall(-4.5, -0.5, 0.5, 2.3)
-    found = horizons(CHARGE_M, POINT_M, np.array([ahead, behind]))[0]
-    assert found.shape == (HORIZONS,)
-    assert found[0] == pytest.approx(np.arctan(3.0 / 5.0))  # straight on
-    assert found[1] == found[6] == pytest.approx(np.arctan(3.0 * np.cos(np.pi / 6.0) / 5.0))
-    assert found[3] == 0.0  # square to the way, beside the charge
-    assert found[11] == pytest.approx(np.arctan(2.0 / 4.0))  # the other way; 0.5 m thick
-    assert found[12] == pytest.approx(np.arctan(1.8 / 14.5))  # from the point to the charge
-    turned = [[-top, left, -bottom, right, h] for left, bottom, right, top, h in (ahead, behind)]
-    point_m = np.array([[0.0, 20.0, 1.5]])
-    assert horizons(CHARGE_M, point_m, np.array(turned))[0] == pytest.approx(found)
+def silu(values: np.ndarray) -> np.ndarray:
+    return np.asarray(values / (1.0 + np.exp(-values)))
+
+
+OUTWARD = np.array([[-0.6, 0.8]])
+
+
+def related(*solids: list[float], **changes: np.ndarray) -> np.ndarray:
+    """Where solids stand for a point (solids, RELATIONS), with lengths in m."""
+    where = {"start_m": CHARGE_M, "points_m": POINT_M, "outward": OUTWARD} | changes
+    return relations(**where, scale_m=1.0, solids=np.array(solids).reshape(-1, 5))[:, 0]
+
+
+def test_relations_tell_where_a_solid_stands() -> None:
+    """Worked out by hand; 20 m ahead is the point, whose wall looks to the left."""
+    (found,) = related([4.0, 1.0, 6.0, 4.0, 2.0])
+    straight_m = 0.3 + 0.25 * 1.2
+    assert found[0] == pytest.approx(5.0 / 20.0, abs=1e-6)
+    assert found[1:7] == pytest.approx([5.0, 6.0, 2.5, 1.0, 1.5, 2.0])  # 15 m back are cut to 6
+    assert found[7] == pytest.approx(2.0 - straight_m, abs=1e-6)
+    to_charge_m, to_point_m = np.hypot(4.0, 1.0), np.hypot(14.0, 1.0)
+    assert found[8:10] == pytest.approx(np.log([to_charge_m + 0.05, to_point_m + 0.05]))
+    detours_m = [np.hypot(5.0, each) + np.hypot(15.0, each) - 20.0 for each in (4.0, 1.0, 1.4)]
+    assert found[10:13] == pytest.approx(detours_m, abs=1e-5)
+    assert found[13:] == pytest.approx([1.0, 0.0], abs=1e-6)  # a gap, and not in the way
+    assert related([4.0, -1.0, 6.0, 4.0, 2.0])[0, 13:].tolist() == [0.0, 1.0]
+    assert related([-3.0, -1.0, -2.0, 1.0, 2.0])[0, 14] == 0.0  # behind the charge
+    assert related([21.0, -1.0, 22.0, 1.0, 2.0])[0, 14] == 0.0  # behind the point
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(boxes=BOXES)
-def test_more_barrier_lowers_no_horizon_and_mirrors_change_none(
+def test_mirrors_and_quarter_turns_change_no_relation(
     boxes: list[tuple[float, float, float]],
 ) -> None:
     solids = np.array([wall(x, y - 1.0, y + 1.0, height) for x, y, height in boxes])
-    found = horizons(CHARGE_M, POINT_M, solids)
-    assert (horizons(CHARGE_M, POINT_M, solids[1:]) <= found).all()
-    mirrored = solids * (1.0, -1.0, 1.0, -1.0, 1.0)
-    assert horizons(CHARGE_M, POINT_M, mirrored[:, [0, 3, 2, 1, 4]]) == pytest.approx(found)
+    found = related(*solids.tolist())
+    mirrored = (solids * (1.0, -1.0, 1.0, -1.0, 1.0))[:, [0, 3, 2, 1, 4]]
+    assert related(*mirrored.tolist(), outward=OUTWARD * (1.0, -1.0)) == pytest.approx(found)
+    turned = (solids * (1.0, -1.0, 1.0, -1.0, 1.0))[:, [3, 0, 1, 2, 4]]
+    turned_to = {"points_m": np.array([[0.0, 20.0, 1.5]]), "outward": OUTWARD[:, ::-1] * (-1, 1)}
+    assert related(*turned.tolist(), **turned_to) == pytest.approx(found, abs=1e-9)
 
 
-@pytest.mark.parametrize("given", [FEATURES, ALL_FEATURES])
-def test_points_to_which_a_barrier_makes_no_difference_keep_what_was_said(given: int) -> None:
-    """Only the others are asked about again; the load is the same as of all features at once."""
-    site, surrogate, charge = site_of(PEAKS), by_hand(given=given), Charge((1.5, 4.0), 5.0)
+def test_a_guess_is_made_of_messages_from_all_that_stands_there() -> None:
+    """What is remembered of pieces changes nothing, whether it has room or not."""
+    surrogate, charge = by_hand(), Charge((1.5, 4.0), 5.0)
+    site, forgetful = site_of(PEAKS), site_of(PEAKS, most_bytes=0)
     (approach,) = site.approaches(charge)
-    hidden = []
-    for layout in [(), *(random_layout(YARD, np.random.default_rng(n)) for n in range(3))]:
+    for number in range(4):
+        layout = random_layout(YARD, np.random.default_rng(number)) if number else ()
         barrier = site.barrier(layout)
-        numbers, features = approach.behind(barrier, given)
-        whole = approach.features(barrier)[:, :given]
-        assert (whole[numbers] == features).all()
-        unchanged = np.setdiff1d(np.arange(len(whole)), numbers)
-        assert (whole[unchanged] == approach.on_empty[unchanged, :given]).all()
-        hidden.append(len(numbers))
-        guess = surrogate.guess(site, [layout], [charge])
-        logs = np.log(
-            np.exp(approach.log_impulse + np.array([each(whole) for each in surrogate.members]))
-            @ approach.area_m2
-            / approach.area_m2.sum()
-        )
-        assert guess.impulse_pa_s.item() == pytest.approx(np.exp(logs.mean()), rel=1e-12)
-        assert guess.peak_pa is not None
-    assert hidden[0] == 0 < max(hidden)
+        where = np.concatenate((approach.structures, approach.relations(barrier)))
+        solids, points, _ = where.shape
+        assert solids == len(YARD.structures) + len(layout)
+        told = surrogate.impulse.messages(surrogate.related(where.reshape(-1, RELATIONS)))
+        heard = told.reshape(-1, solids, points, MESSAGE).sum(axis=1)
+        over = surrogate.impulse(surrogate.scaled(approach.features(barrier)), heard)
+        loads = np.exp(approach.log_impulse + over) @ approach.area_m2 / approach.area_m2.sum()
+        alone = np.exp(np.log(loads).mean())
+        for each in (site, site, forgetful):
+            guess = surrogate.guess(each, [layout], [charge])
+            assert guess.impulse_pa_s.item() == pytest.approx(alone, rel=1e-5)
+            assert guess.peak_pa is not None
+
+
+def test_a_full_memory_forgets_and_makes_anew() -> None:
+    made = []
+
+    def make(number: int) -> np.ndarray:
+        made.append(number)
+        return np.full(20, number, dtype=np.float32)
+
+    memory = Memory(200)
+    for number in (1, 2, 1, 2, 3, 3, 1):
+        assert memory.of(number, partial(make, number))[0] == number
+    assert made == [1, 2, 3, 1]  # two of 80 bytes have room, a third does not
 
 
 def test_large_walls_have_few_points_that_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -331,10 +366,10 @@ def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     [
         (lambda content: content["mean"].pop(), "mean"),
         (lambda content: content["scale"].__setitem__(3, 0.0), r"scale\[3\]"),
-        (lambda content: content["members"][1][2].pop(), "members: network 1 has .*2303"),
+        (lambda content: content["members"][1][6].pop(), "members: network 1 has .*4095"),
         (lambda content: content.update(members=[]), "members"),
         (lambda content: content.pop("peak_members"), "peak_members"),
-        (lambda content: content["peak_members"][0][1].pop(), "peak_members: network 0 has .*47"),
+        (lambda content: content["peak_members"][0][5].pop(), "peak_members: network 0 has .*63"),
         (lambda content: content["fit"].update(format=1), "fit.format"),
         (lambda content: content["fit"].update(blasts=0), "fit.blasts"),
         (lambda content: content.update(more=1), "more"),
@@ -372,8 +407,8 @@ def test_peaks_are_guessed_where_they_count() -> None:
 
 def test_the_peak_on_a_structure_is_nearly_the_largest_on_its_walls() -> None:
     """Of Kingery and Bulmash's alone: networks of zeros change nothing of it."""
-    nothing = Member(*(np.zeros(shape) for shape in shapes(FEATURES)))
-    surrogate = Surrogate(np.zeros(FEATURES), np.ones(FEATURES), (nothing,), (nothing,), ABOUT)
+    nothing = Networks([Member(*(np.zeros(shape) for shape in SHAPES))])
+    surrogate = Surrogate(np.zeros(INPUTS), np.ones(INPUTS), nothing, nothing, ABOUT)
     site, charge = site_of(PEAKS), Charge((1.5, 4.0), 5.0)
     (approach,) = site.approaches(charge)
     guess = surrogate.guess(site, [()], [charge])
@@ -390,8 +425,8 @@ def test_what_the_package_brings_was_checked_on_sites_that_it_had_not_met() -> N
     about = packaged_surrogate().fit
     for check in (about.impulse, about.peak):
         assert check is not None
-        assert check.sites_rank > 0.5
-        assert check.sites_lost < 0.1
+        assert check.rank > 0.5
+        assert check.lost < 0.1
 
 
 def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
@@ -471,28 +506,31 @@ def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
     held = folds(samples.case, 4, 0)
     assert sum(each.sum() for each in held) == len(samples)
     learnt = fit(samples, ~held[0], 20, 0, ABOUT)
-    assert len(learnt.members) == len(learnt.peak_members) == MEMBERS
+    assert len(learnt.impulse.members) == len(learnt.peak.members) == MEMBERS
     off = errors(learnt, samples, held[0])
     for found, loads in ((off.impulse, samples.impulse), (off.peak, samples.peak)):
-        assert found.rms < 0.35 * float(np.std(loads.target[held[0]]))
+        assert found.within < 0.3 * float(np.std(loads.target[held[0]]))
         assert found.cases == held[0].sum() / 10
         assert found.rank > 0.9
         assert 0.0 <= found.lost < 0.02
     assert fit(samples, ~held[0], 20, 0, ABOUT).digest == learnt.digest
 
 
-def test_with_horizons_it_learns_what_stands_behind_the_charge(tmp_path: Path) -> None:
-    """Ways do not see it. The file tells how much the networks are given."""
-    truth = by_hand(7, members=1, given=ALL_FEATURES)
-    samples = Samples.of(table_of_guesses(truth, 80), {YARD.content_hash: YARD})
+def test_it_learns_from_messages_what_ways_do_not_see() -> None:
+    """Loads go by how near the charge solids stand; of ways nothing is told."""
+    samples = Samples.of(table_of_guesses(by_hand(), 80), {YARD.content_hash: YARD})
+    samples.features[:, FEATURES - SHARES :] = 0.0
+    rows = samples.counts * samples.solids
+    near = np.add.reduceat(samples.relations[:, 8], np.cumsum([0, *rows[:-1]])) / samples.counts
+    told = replace(samples.impulse, target=7.0 - 0.1 * near)
+    blind = replace(samples, relations=np.zeros_like(samples.relations))
     every = np.ones(len(samples), dtype=bool)
-    rms = [
-        load_errors(found, found.members, samples, samples.impulse, every).rms
-        for given in (FEATURES, ALL_FEATURES)
-        for found in [fit(samples, every, 30, 0, ABOUT, given, members=1, peaks=False)]
+    within = [
+        load_errors(found, found.impulse, given, told, every).within
+        for given in (blind, samples)
+        for found in [fit(replace(given, impulse=told), every, 120, 0, ABOUT, 1, peaks=False)]
     ]
-    assert rms[1] < 0.7 * rms[0]
-    assert len(load_surrogate(truth.save(tmp_path / "own.json")).mean) == ALL_FEATURES
+    assert within[1] < 0.3 * within[0]
 
 
 def test_rows_of_unknown_scenarios_are_left_out() -> None:
@@ -608,13 +646,21 @@ def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -
 
 
 def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
-    layouts = varied_layouts(YARD, 8, 1)
+    (threat,) = case().threats
+    ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD).values()}
+    layouts = Recipe(8).of(YARD, threat, 1)
     assert layouts[0] == ()
     assert len(set(layouts)) == len(layouts) > 8
-    assert {tuple(sorted(each)) for each in layouts_by_rule(YARD).values()} <= set(layouts)
+    assert ruled <= set(layouts)
     for layout in layouts:
         assert Placement.of(YARD, layout).layout == layout
-    assert layouts == varied_layouts(YARD, 8, 1)
+    assert layouts == Recipe(8).of(YARD, threat, 1)
+    few = Recipe(0, 2).of(YARD, threat, 1)
+    assert len(few) == 3
+    assert set(few[1:]) < ruled
+    liked = Recipe(0, 0, by_hand(), 2).of(YARD, threat, 1)[1:]
+    best, tenth = Guesses.of(by_hand(), case()).loads(liked)
+    assert best < tenth < Guesses.of(by_hand(), case()).loads([*ruled]).min()
 
 
 def test_the_street_where_peaks_count_differs_by_nothing_else() -> None:
@@ -665,7 +711,9 @@ def test_surrogates_are_compared_case_by_case_on_the_same_blasts(
 
 def test_scenarios_of_the_table_are_found_by_their_names() -> None:
     assert scenario_of("visitor_entrance") == load_scenario("visitor_entrance")
-    assert scenario_of(f"{SITE_NAME}10000").name == "site_10000"
+    assert scenario_of(site_name(10_000)).name == "site_10000"
+    large = scenario_of(site_name(10_001, 42.5))
+    assert (large.name, large.site.width_m) == ("site_10001", 42.5)
 
 
 def test_what_the_surrogate_picks_from_draws_is_what_it_likes_best_of_just_these() -> None:

@@ -8,8 +8,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from blast_env.data import COLUMNS, TABLES, as_tensors, load, sources
+from blast_env.data import COLUMNS, TABLES, PublishedBlasts, as_tensors, load, sources
+from blast_env.engines import BlastLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import BlastKey
+from blast_env.geometry import Layout, Piece
+from blast_env.physics.scene import Charge
+from studies.blast_table import scenario_of
 
 
 @pytest.fixture(scope="module")
@@ -55,3 +60,29 @@ def test_other_names_and_other_files_are_refused(tmp_path: Path) -> None:
     pq.write_table(pq.read_table(sources()[0]).drop_columns(["tnt_kg"]), other)
     with pytest.raises(BlastEnvError, match="tnt_kg"):
         load(paths=[other])
+
+
+def test_what_was_published_need_not_be_run_again(rows: pd.DataFrame) -> None:
+    """A blast with growing cells is not given for one with uniform cells, nor the other way."""
+    of_sites = rows[rows["table"] == "many_site_blasts"]
+    is_growing = of_sites["engine"].str.contains("cells='coarse'")
+    for has_growing in (False, True):
+        row = of_sites[is_growing == has_growing].iloc[0]
+        site = scenario_of(row["scenario"])
+        published = PublishedBlasts({site.content_hash: site})
+        charge = Charge((row["charge_x_m"], row["charge_y_m"]), row["tnt_kg"])
+        layout = tuple(Piece(*each) for each in json.loads(row["layout"]))
+
+        def found(
+            cells: str,
+            of: PublishedBlasts = published,
+            asked: tuple[str, Layout, Charge] = (site.content_hash, layout, charge),
+        ) -> BlastLoads | None:
+            return of.get(BlastKey(*asked, 0, f"cell_m=0.5, cells='{cells}'", "none", ""))
+
+        assert found("coarse") is None
+        loads = found("uniform")
+        assert (loads is None) == has_growing
+        if loads is not None:
+            (same,) = (each for each in loads.structures if each.name == row["structure"])
+            assert same.impulse_pa_s == row["impulse_pa_s"]

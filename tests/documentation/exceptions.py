@@ -228,19 +228,19 @@ SMALLER: Final[dict[str, str]] = {
         "--cell 0.5 --seeds 1"
     ),
     # docs/researchers/surrogate.md
-    "python -m studies.surrogate blasts --sites 79 --layouts 4": (
-        "--sites 1 --layouts 1 --cache blasts"
+    "python -m studies.surrogate blasts --first 79 --sites 337 --layouts 4 --rules 3"
+    " --cache blasts": "--sites 1 --layouts 1 --rules 1",
+    "python -m studies.blast_table blasts --sites 420 --out blasts.parquet": "--sites 1",
+    "python -m studies.surrogate fit --out surrogate.json": (
+        "--data docs/data/site_blasts.parquet --epochs 1 --no-check"
     ),
-    "python -m studies.surrogate fit --out surrogate.json": "--epochs 1 --no-check",
-    "python -m studies.surrogate_limits": "--seeds 1 --sites 4",
-    "python -m studies.surrogate fit --horizons --epochs 40 --data docs/data/site_blasts.parquet"
-    " --data docs/data/site_agent_blasts.parquet --no-check --out horizons.json": "--epochs 1",
-    "python -m studies.surrogate compare horizons.json agents/blast_agents/surrogate/gas.json": (
+    "python -m studies.surrogate_limits --seeds 1": (
+        "--data docs/data/site_blasts.parquet --sites 4 --epochs 1"
+    ),
+    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet --no-check"
+    " --out few.json": "--epochs 1",
+    "python -m studies.surrogate compare surrogate.json few.json --rules": (
         "--cases 2 --threats 1 --changes 0"
-    ),
-    "blast-env league --engine gas --track item_sites --cases 48 --seeds 2 --methods best_rule"
-    " --budgets 16 --surrogate surrogate.json --out out/league": (
-        "--cases 1 --seeds 1 --budgets 2"
     ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street --charges 3 --surrogate surrogate.json": (
@@ -481,9 +481,6 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m studies.pack_agent RUN NAME --league out/league --track known_NAME": (
         "writes into the package; tests/agents has it"
-    ),
-    "python -m studies.blast_table FOLDER --sites 79 --out blasts.parquet": (
-        "FOLDER is a placeholder; tests/studies/test_blast_table.py"
     ),
     "python -m studies.blast_table out/street/blasts --scenario studies/school_street.toml"
     " --out FILE": "FILE is a placeholder; tests/studies/test_blast_table.py",

@@ -9,6 +9,7 @@ import typer
 from blast_agents.training import train
 from typer.testing import CliRunner
 
+from blast_env.engines.gas import GasEngine
 from blast_env.evaluation import BlastEvaluator, DiskCache, draw_threats
 from blast_env.geometry import Piece
 from blast_env.scenario import save_scenario
@@ -19,6 +20,7 @@ from tests.evaluation.cases import COURTYARD
 from tests.evaluation.test_disk_cache import key, loads, same
 
 PIECES = (Piece(0, 0, "wall"),)
+FAST = GasEngine(border_m=0.0, until=0.005)
 
 
 def run(*arguments: object) -> tuple[int, str]:
@@ -70,6 +72,20 @@ def test_the_sites_that_a_run_learnt_from_are_named(tmp_path: Path) -> None:
     code, words = run(agent / "blasts", "--run", other)
     assert code != 0
     assert "is no run by self-labelling on item_sites" in words
+
+
+def test_generated_sites_of_both_families_are_named(tmp_path: Path) -> None:
+    out, names = tmp_path / "blasts.parquet", [blast_table.site_name(10_000)]
+    names.append(blast_table.site_name(10_000, 40.0))
+    for name in names:
+        site = blast_table.scenario_of(name)
+        BlastEvaluator(site, FAST, cache=tmp_path / "blasts").loads((), *draw_threats(site, [0]))
+    assert run(tmp_path / "blasts", "--sites", 1, "--side", 40, "--out", out)[0] == 0
+    assert (
+        set(pd.read_parquet(out)["scenario"])
+        == {*names}
+        == {"item_sites/10000", "large_sites/40/10000"}
+    )
 
 
 def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from blast_agents.search.problem import LayoutProblem, Report, SearchResult
 from blast_agents.search.registry import layouts_by_rule
 from blast_agents.search.session import Plan, Search, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.geometry import Element, Layout, Piece
+from blast_env.geometry import Element, Layout, Measure, Piece
 from blast_env.scenario import Placement
 
 
@@ -96,17 +96,22 @@ class GreedySearch(Search):
         count: int,
         rng: np.random.Generator,
     ) -> list[Element]:
-        """Return what to try next, at least one and at most `count`."""
+        """Return what to try next: so many pieces or modules, and all measures not tried yet.
+
+        A measure takes no blast of its own.
+        """
         catalogue = placement.catalogue
         free = [catalogue.element(int(action)) for action in np.flatnonzero(placement.legal)]
         known = sorted(
             (each for each in free if each in gains),
             key=lambda each: -self._worth(placement, each, gains),
         )
-        new = [each for each in free if each not in gains]
+        unknown = [each for each in free if each not in gains]
+        measures = [each for each in unknown if isinstance(each, Measure)]
+        new = [each for each in unknown if not isinstance(each, Measure)]
         promising = known[: max(round(count * self.promising_share), count - len(new))]
         fresh = rng.permutation(len(new))[: count - len(promising)]
-        return [*promising, *(new[index] for index in fresh)]
+        return [*promising, *(new[index] for index in fresh), *measures]
 
 
 def _still_to_place(placement: Placement) -> int:

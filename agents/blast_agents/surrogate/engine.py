@@ -22,6 +22,9 @@ SURROGATE: Final = "surrogate"
 _KEPT_SITES: Final = 64
 """What no layout changes is remembered for so many sites: some megabytes each."""
 
+_SITE_BYTES: Final = 2**23
+"""Of what is remembered of the pieces on each."""
+
 
 @dataclass(frozen=True)
 class SurrogateEngine(Engine):
@@ -101,7 +104,7 @@ class SurrogateEngine(Engine):
     def _site(self, scenario: Scenario) -> SurrogateSite:
         key = scenario.content_hash
         if key not in self._sites:
-            self._sites[key] = site_of(scenario)
+            self._sites[key] = site_of(scenario, _SITE_BYTES)
             if len(self._sites) > _KEPT_SITES:
                 self._sites.popitem(last=False)
         self._sites.move_to_end(key)

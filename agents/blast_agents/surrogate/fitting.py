@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil
 from typing import Any, Final, NamedTuple
@@ -15,15 +16,17 @@ from torch import Tensor, nn
 from blast_agents.surrogate.network import (
     HIDDEN,
     IMPULSE_POWER,
+    MESSAGE,
     PEAK_POWER,
     Fit,
     Member,
+    Networks,
     Surrogate,
-    answers,
     log_loads,
 )
-from blast_agents.surrogate.walls import FEATURES, Approach, site_of
-from blast_env.arrays import BoolArray, FloatArray
+from blast_agents.surrogate.relations import RELATIONS
+from blast_agents.surrogate.walls import FEATURES, INPUTS, Approach, site_of
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
 from blast_env.physics.scene import Charge
@@ -36,11 +39,14 @@ _BATCH: Final = 6
 _GROUP: Final = 24
 """Most samples of a group, which are all of one case."""
 
-_COMMON: Final = 0.1
+_COMMON: Final = 0.2
 """How much an error counts that all layouts of a case have in common: it ranks none of them."""
 
-_RATE: Final = 5e-3
+_RATE: Final = 7e-3
 _DECAY: Final = 1e-3
+_MOST_GRADIENT: Final = 1.0
+"""Norm of a step's gradient: a single odd group must not throw a network off."""
+
 _LEAST_SCALE: Final = 1e-3
 _LEAST_CASE: Final = 8
 """Layouts that a case must have for its rank correlation to count."""
@@ -68,9 +74,12 @@ class Samples:
     """Loads of structures, with the features of the points on their walls.
 
     Attributes:
-        features: Of all points (points, ALL_FEATURES).
+        features: Of all points (points, FEATURES).
+        relations: Where solids stand for them: of each sample all solids, and for each of them all
+            points (rows, RELATIONS).
         area_m2: Of each point (points,).
         counts: Points of each sample (samples,).
+        solids: Structures and pieces of each sample (samples,).
         impulse: The impulses.
         peak: The peak overpressures.
         site: Number of its site (samples,).
@@ -79,8 +88,10 @@ class Samples:
     """
 
     features: FloatArray
+    relations: FloatArray
     area_m2: FloatArray
     counts: np.ndarray
+    solids: np.ndarray
     impulse: Loads
     peak: Loads
     site: np.ndarray
@@ -108,7 +119,7 @@ class Samples:
             raise BlastEnvError("no load of a protected structure of a known scenario")
         sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
         approaches: list[Approach] = []
-        features = []
+        features, related = [], []
         wanted = ("scenario_hash", "structure", "layout", *_CHARGE)
         columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
         for scenario_hash, structure, layout, *numbers in zip(*columns, strict=True):
@@ -120,11 +131,15 @@ class Samples:
             barrier = site.barrier(elements(layout))
             approaches.append(approach)
             features.append(approach.features(barrier).astype(np.float32))
+            of_all = np.concatenate((approach.structures, approach.relations(barrier)))
+            related.append(of_all.astype(np.float32))
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         return cls(
             features=np.concatenate(features),
+            relations=np.concatenate([each.reshape(-1, RELATIONS) for each in related]),
             area_m2=np.concatenate([each.area_m2 for each in approaches]),
             counts=np.array([len(each) for each in features]),
+            solids=np.array([len(each) for each in related]),
             impulse=Loads(
                 np.concatenate([each.log_impulse for each in approaches]),
                 np.log(rows["impulse_pa_s"].to_numpy()),
@@ -153,11 +168,10 @@ def fit(
     epochs: int,
     seed: int,
     about: Fit,
-    features: int = FEATURES,
     members: int = MEMBERS,
     peaks: bool = True,
 ) -> Surrogate:
-    """Fit the networks to some of the samples.
+    """Fit the networks to some of the samples, two at a time.
 
     Args:
         samples: All samples.
@@ -165,22 +179,31 @@ def fit(
         epochs: How often each is met.
         seed: Of starts and orders.
         about: What is said of it in its file.
-        features: How many the networks are given: `FEATURES` or `ALL_FEATURES`.
         members: Networks for each load.
         peaks: Whether to fit those for peaks, too.
     """
-    at_points = samples.features[np.repeat(chosen, samples.counts), :features]
-    mean = at_points.mean(axis=0).astype(np.float64)
-    scale = at_points.std(axis=0).astype(np.float64) + _LEAST_SCALE
+    points = samples.features[np.repeat(chosen, samples.counts)]
+    solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
+    mean = np.concatenate([each.mean(axis=0, dtype=np.float64) for each in (points, solids)])
+    scale = np.concatenate([each.std(axis=0, dtype=np.float64) for each in (points, solids)])
+    scale += _LEAST_SCALE
     cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
     own = [each for each in cases if len(each)]
+    tensors = _Tensors.of(samples, mean, scale)
+    of_both = (samples.impulse, samples.peak) if peaks else (samples.impulse,)
+    tasks = []
+    for loads in of_both:
+        for number in range(members):
+            torch.manual_seed(seed + number)
+            tasks.append((_Network(), _Target.of(loads), seed + number))
 
-    def networks(loads: Loads) -> tuple[Member, ...]:
-        data = _Tensors.of(samples, loads, mean, scale)
-        return tuple(_member(data, own, epochs, seed + each) for each in range(members))
+    def fitted(task: tuple["_Network", "_Target", int]) -> Member:
+        return _fitted(tensors, own, epochs, *task)
 
-    of_peaks = networks(samples.peak) if peaks else ()
-    return Surrogate(mean, scale, networks(samples.impulse), of_peaks, about)
+    with ThreadPoolExecutor(2) as pool:
+        found = [*pool.map(fitted, tasks)]
+    impulse, peak = found[:members], found[members:]
+    return Surrogate(mean, scale, Networks(impulse), Networks(peak), about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,23 +238,33 @@ class ErrorsOfBoth(NamedTuple):
 def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> ErrorsOfBoth:
     """Compare guesses with gas dynamics on some samples."""
     return ErrorsOfBoth(
-        load_errors(surrogate, surrogate.members, samples, samples.impulse, chosen),
-        load_errors(surrogate, surrogate.peak_members, samples, samples.peak, chosen),
+        load_errors(surrogate, surrogate.impulse, samples, samples.impulse, chosen),
+        load_errors(surrogate, surrogate.peak, samples, samples.peak, chosen),
     )
 
 
 def load_errors(
     surrogate: Surrogate,
-    members: Sequence[Member],
+    networks: Networks,
     samples: Samples,
     loads: Loads,
     chosen: BoolArray,
 ) -> Errors:
     """Compare guesses of one load, by those of a surrogate's networks that know it."""
-    counts = samples.counts[chosen]
+    counts, solids = samples.counts[chosen], samples.solids[chosen]
     points = np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
-    differs = answers(members, surrogate.scaled(samples.features[points]))
+    told = networks.messages(
+        surrogate.related(samples.relations[np.repeat(chosen, samples.counts * samples.solids)])
+    )
+    heard = np.zeros((len(told), points.sum(), told.shape[2]))
+    first = 0
+    for start, count, number in zip(starts, counts, solids, strict=True):
+        own = told[:, first : first + number * count]
+        own = own.reshape(len(told), number, count, -1)
+        heard[:, start : start + count] = own.sum(axis=1)
+        first += number * count
+    differs = networks(surrogate.scaled(samples.features[points]), heard)
     known, area_m2 = loads.known[points], samples.area_m2[points]
     logs = log_loads(differs, known, area_m2, starts, loads.power)
     return _errors(logs.mean(axis=0), loads.target[chosen], samples.case[chosen])
@@ -272,68 +305,150 @@ def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Tensors:
-    features: Tensor
+class _Target:
+    """Loads to fit to.
+
+    Attributes:
+        known: As in `Loads`.
+        target: As in `Loads`.
+        power: As in `Loads`.
+    """
+
     known: Tensor
-    area_m2: Tensor
-    starts: np.ndarray
-    counts: np.ndarray
     target: Tensor
     power: float
 
     @classmethod
-    def of(cls, samples: Samples, loads: Loads, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+    def of(cls, loads: Loads) -> "_Target":
         # Single precision has no room for high powers of pascals.
         dtype = np.float32 if loads.power == 1.0 else np.float64
+        known, target = (torch.from_numpy(e.astype(dtype)) for e in (loads.known, loads.target))
+        return cls(known, target, loads.power)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tensors:
+    """Samples as networks are given them; see `Samples`.
+
+    Attributes:
+        features: Scaled (points, FEATURES).
+        relations: Scaled (rows, RELATIONS).
+        area_m2: Of each point (points,).
+        starts: First point of each sample (samples,).
+        counts: Points of each sample (samples,).
+        first_rows: First row of relations of each sample (samples,).
+        rows: How many it has (samples,).
+        solids: Structures and pieces of each sample (samples,).
+    """
+
+    features: Tensor
+    relations: Tensor
+    area_m2: Tensor
+    starts: IntArray
+    counts: IntArray
+    first_rows: IntArray
+    rows: IntArray
+    solids: IntArray
+
+    @classmethod
+    def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+        of_points, of_solids = slice(None, FEATURES), slice(FEATURES, INPUTS)
+        features, relations = (
+            torch.from_numpy(((each - mean[own]) / scale[own]).astype(np.float32))
+            for each, own in ((samples.features, of_points), (samples.relations, of_solids))
+        )
+        area_m2 = torch.from_numpy(samples.area_m2)
+        starts = np.cumsum([0, *samples.counts[:-1]])
+        rows = samples.counts * samples.solids
+        firsts = np.cumsum([0, *rows[:-1]])
         return cls(
-            torch.from_numpy(
-                ((samples.features[:, : len(mean)] - mean) / scale).astype(np.float32)
-            ),
-            torch.from_numpy(loads.known.astype(dtype)),
-            torch.from_numpy(samples.area_m2.astype(dtype)),
-            np.cumsum([0, *samples.counts[:-1]]),
-            samples.counts,
-            torch.from_numpy(loads.target.astype(dtype)),
-            loads.power,
+            features, relations, area_m2, starts, samples.counts, firsts, rows, samples.solids
         )
 
-    def loss(self, network: nn.Module, groups: Sequence[np.ndarray]) -> Tensor:
+    def loss(self, network: "_Network", target: _Target, groups: Sequence[IntArray]) -> Tensor:
         """Return the mean square error of the logarithm on groups of samples, each of one case.
 
         What a group's errors have in common counts less than by what they differ.
         """
-        errors = self._errors(network, np.concatenate(groups))
+        errors = self._errors(network, target, np.concatenate(groups))
         parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
         common = torch.cat([each.mean().expand(len(each)) for each in parts])
         return (errors - common).square().mean() + _COMMON * common.square().mean()
 
-    def _errors(self, network: nn.Module, numbers: np.ndarray) -> Tensor:
+    def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
         """Return by how much the logarithm is off on some samples."""
-        points = [
-            np.arange(start, start + count)
-            for start, count in zip(self.starts[numbers], self.counts[numbers], strict=True)
+        counts, solids = self.counts[numbers], self.solids[numbers]
+        points = torch.from_numpy(_runs_of(self.starts[numbers], counts))
+        related = torch.from_numpy(_runs_of(self.first_rows[numbers], self.rows[numbers]))
+        begin = np.cumsum([0, *counts[:-1]])
+        hearing = [
+            np.tile(np.arange(first, first + count), number)
+            for first, count, number in zip(begin, counts, solids, strict=True)
         ]
-        rows = torch.from_numpy(np.concatenate(points))
-        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), self.counts[numbers]))
-        area_m2 = self.area_m2[rows]
-        over = network(self.features[rows])[:, 0]
-        loads = area_m2 * torch.exp(self.power * (self.known[rows] + over))
+        over = network(
+            self.features[points],
+            self.relations[related],
+            torch.from_numpy(np.concatenate(hearing)),
+        )
+        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts))
+        known = target.known[points]
+        area_m2 = self.area_m2[points].to(known.dtype)
+        loads = area_m2 * torch.exp(target.power * (known + over))
         empty = torch.zeros(len(numbers), dtype=loads.dtype)
         mean = empty.index_add(0, owner, loads) / empty.index_add(0, owner, area_m2)
-        return torch.log(mean) / self.power - self.target[torch.from_numpy(numbers)]
+        return torch.log(mean) / target.power - target.target[torch.from_numpy(numbers)]
 
 
-def _member(data: _Tensors, cases: Sequence[np.ndarray], epochs: int, seed: int) -> Member:
+def _runs_of(starts: IntArray, counts: IntArray) -> IntArray:
+    """Return so many numbers from each start on, one run after the other."""
+    runs = [np.arange(e, e + count) for e, count in zip(starts, counts, strict=True)]
+    return np.concatenate(runs)
+
+
+class _Network(nn.Module):
+    """A network while it is fitted; its parameters are in the order of `Member`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.send = nn.Linear(RELATIONS, MESSAGE)
+        self.message = nn.Linear(MESSAGE, MESSAGE)
+        self.first = nn.Linear(FEATURES + MESSAGE, HIDDEN)
+        self.second = nn.Linear(HIDDEN, HIDDEN)
+        self.last = nn.Linear(HIDDEN, 1)
+
+    def forward(self, features: Tensor, relations: Tensor, hearing: Tensor) -> Tensor:
+        """Return what it says of points.
+
+        Args:
+            features: Of the points (points, FEATURES).
+            relations: Where solids stand for points (rows, RELATIONS).
+            hearing: To which point each of these rows belongs (rows,).
+        """
+        silu = nn.functional.silu
+        messages = silu(self.message(silu(self.send(relations))))
+        heard = torch.zeros(len(features), MESSAGE).index_add(0, hearing, messages)
+        hidden = silu(self.first(torch.cat((features, heard), dim=1)))
+        said: Tensor = self.last(silu(self.second(hidden)))[:, 0]
+        return said
+
+    def plain(self) -> Member:
+        """Return its numbers."""
+        arrays: Sequence[FloatArray] = [
+            each.detach().numpy().astype(np.float64) for each in self.parameters()
+        ]
+        return Member(*(array.T if array.ndim == 2 else array for array in arrays))
+
+
+def _fitted(
+    data: _Tensors,
+    cases: Sequence[IntArray],
+    epochs: int,
+    network: _Network,
+    target: _Target,
+    seed: int,
+) -> Member:
     """Fit one network to the samples of some cases."""
-    torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    network = nn.Sequential(
-        nn.Linear(data.features.shape[1], HIDDEN),
-        nn.SiLU(),
-        nn.Linear(HIDDEN, HIDDEN),
-        nn.SiLU(),
-        nn.Linear(HIDDEN, 1),
-    )
     optimizer = torch.optim.AdamW(network.parameters(), _RATE, weight_decay=_DECAY)
     groups = [
         group
@@ -344,16 +459,10 @@ def _member(data: _Tensors, cases: Sequence[np.ndarray], epochs: int, seed: int)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
     for _ in range(epochs):
         for batch in np.array_split(rng.permutation(len(groups)), batches):
-            loss = data.loss(network, [groups[number] for number in batch])
+            loss = data.loss(network, target, [groups[number] for number in batch])
             optimizer.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
+            nn.utils.clip_grad_norm_(network.parameters(), _MOST_GRADIENT)
             optimizer.step()
             schedule.step()
-    return _plain(network)
-
-
-def _plain(network: nn.Sequential) -> Member:
-    arrays: Sequence[FloatArray] = [
-        each.detach().numpy().astype(np.float64) for each in network.parameters()
-    ]
-    return Member(*(array.T if array.ndim == 2 else array for array in arrays))
+    return network.plain()

@@ -1,18 +1,24 @@
-"""The surrogate: small networks that tell what reaches each point of a wall, and how surely."""
+"""The surrogate: small networks that tell what reaches each point of a wall, and how surely.
 
-from collections.abc import Sequence
+Each solid sends a message to each point, made from where it stands for that. What a network says of
+a point goes by the features of the point and the sum of all messages.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from math import prod
 from pathlib import Path
-from typing import Annotated, Final, Literal, NamedTuple, Self
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from blast_agents.surrogate.walls import ALL_FEATURES, FEATURES, Approach, SurrogateSite
+from blast_agents.surrogate.relations import RELATIONS
+from blast_agents.surrogate.walls import FEATURES, INPUTS, Approach, SingleArray, SurrogateSite
 from blast_env.arrays import FloatArray
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
@@ -22,10 +28,14 @@ from blast_env.physics.scene import Charge
 from blast_env.response.damage import BayDamage
 
 IntArray = NDArray[np.int64]
+AnyFloats = NDArray[np.floating[Any]]
 _PACKAGED: Final = Path(__file__).with_name("gas.json")
 
-HIDDEN: Final = 48
+HIDDEN: Final = 64
 """Width of the two hidden layers."""
+
+MESSAGE: Final = 32
+"""Length of a message, and width of the layer that it is made by."""
 
 IMPULSE_POWER: Final = 1.0
 """The impulse on a structure is the mean over its walls."""
@@ -33,41 +43,39 @@ IMPULSE_POWER: Final = 1.0
 PEAK_POWER: Final = 16.0
 """The peak on a structure is nearly the largest: a mean of so high a power."""
 
-_AT_ONCE: Final = 64
+_AT_ONCE: Final = 48
 """Points of which a network is asked at a time.
 
 So few stay in a processor's cache, and are multiplied by one thread: with more of them OpenBLAS
 wakes others, which wait in a loop for most of the time, or for ever where processors are taken.
 """
 
-
-def shapes(features: int) -> tuple[tuple[int, ...], ...]:
-    """Return the shapes of the arrays of a network with so many inputs, as `Member` has them."""
-    return (features, HIDDEN), (HIDDEN,), (HIDDEN, HIDDEN), (HIDDEN,), (HIDDEN, 1), (1,)
+SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,)) + (
+    (FEATURES + MESSAGE, HIDDEN),
+    (HIDDEN,),
+    (HIDDEN, HIDDEN),
+    (HIDDEN,),
+    (HIDDEN, 1),
+    (1,),
+)
+"""Of the arrays of a network, in the order of `Member`."""
 
 
 class Check(BaseModel):
-    """How far guesses of one load are off where the surrogate was not fitted.
+    """How far guesses of one load are off on sites that were held out of the fit.
 
     Attributes:
-        layouts_rms: Root of the mean square error of the logarithm of a load, on layouts that were
-            held out, of sites that were not.
-        layouts_rank: Rank correlation with the engine among the held-out layouts of a case.
-        layouts_lost: What choosing among these by it costs: by how much the load behind the layout
-            that it likes best is above the least one of the case, as a share of the largest.
-        sites_rms: The error on sites that were held out.
-        sites_rank: The correlation on them.
-        sites_lost: What choosing by it costs on them.
+        rms: Root of the mean square error of the logarithm of a load.
+        rank: Rank correlation with the engine among the layouts of a case.
+        lost: What choosing among these by it costs: by how much the load behind the layout that it
+            likes best is above the least one of the case, as a share of the largest.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    layouts_rms: float
-    layouts_rank: float
-    layouts_lost: float
-    sites_rms: float
-    sites_rank: float
-    sites_lost: float
+    rms: float
+    rank: float
+    lost: float
 
 
 class Fit(BaseModel):
@@ -87,7 +95,7 @@ class Fit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    format: Literal[2] = 2
+    format: Literal[3] = 3
     command: str
     versions: dict[str, str]
     engine: str
@@ -162,55 +170,111 @@ class Guess(NamedTuple):
 
 
 class Member(NamedTuple):
-    """A network: weights and biases of its layers, in the order in which they are used."""
+    """A network: weights and biases of its layers, in the order in which they are used.
 
-    first: FloatArray
-    first_bias: FloatArray
-    second: FloatArray
-    second_bias: FloatArray
-    last: FloatArray
-    last_bias: FloatArray
+    The first two layers make messages, the others say what they and the features of a point mean.
+    """
 
-    def __call__(self, features: FloatArray) -> FloatArray:
-        """Return by how much the logarithm of a load differs from Kingery and Bulmash's (points,).
+    send: AnyFloats
+    send_bias: AnyFloats
+    message: AnyFloats
+    message_bias: AnyFloats
+    first: AnyFloats
+    first_bias: AnyFloats
+    second: AnyFloats
+    second_bias: AnyFloats
+    last: AnyFloats
+    last_bias: AnyFloats
+
+
+class Networks:
+    """Networks that were fitted to the same loads, each from another start; asked together.
+
+    They work with single precision: what is lost is far below what they are off.
+
+    Args:
+        members: The networks.
+
+    Attributes:
+        members: The same.
+    """
+
+    def __init__(self, members: Sequence[Member]) -> None:
+        self.members = tuple(members)
+        stacked = [
+            np.stack(arrays) if members else np.empty((0, *shape))
+            for arrays, shape in zip_longest(zip(*members, strict=True), SHAPES)
+        ]
+        single = [each.astype(np.float32) for each in stacked]
+        self._layers = Member(*(each[:, np.newaxis] if each.ndim == 2 else each for each in single))
+
+    def messages(self, scaled: FloatArray) -> SingleArray:
+        """Return what each solid tells each point (members, solids x points, MESSAGE).
 
         Args:
-            features: Of points, less their mean, over their scale (points, features).
+            scaled: Where they stand, less the mean, over the scale (solids x points, RELATIONS).
         """
-        differs = np.empty(len(features))
-        # No point is left alone: a single row is multiplied in another order than several are.
-        starts = range(0, max(len(features) - 1, 1), _AT_ONCE)
-        for start, end in pairwise((*starts, len(features))):
-            few = slice(start, end)
-            hidden = _silu(features[few] @ self.first + self.first_bias)
-            hidden = _silu(hidden @ self.second + self.second_bias)
-            differs[few] = (hidden @ self.last + self.last_bias)[:, 0]
+        layers = self._layers
+        found = np.empty((len(self.members), len(scaled), MESSAGE), dtype=np.float32)
+        given = scaled.astype(np.float32)
+        for few in _runs(len(scaled)):
+            sent = _silu(given[few] @ layers.send + layers.send_bias)
+            found[:, few] = _silu(sent @ layers.message + layers.message_bias)
+        return found
+
+    def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
+        """Return by how much each says that logarithms of loads differ from Kingery and Bulmash's.
+
+        Args:
+            scaled: Features of points, less the mean, over the scale (points, FEATURES).
+            heard: The messages to each, added up (members, points, MESSAGE).
+
+        Returns:
+            (members, points).
+        """
+        layers = self._layers
+        of_point, of_message = layers.first[:, :FEATURES], layers.first[:, FEATURES:]
+        differs = np.empty((len(self.members), len(scaled)))
+        given = scaled.astype(np.float32)
+        for few in _runs(len(scaled)):
+            hidden = given[few] @ of_point + heard[:, few] @ of_message
+            hidden = _silu(hidden + layers.first_bias)
+            hidden = _silu(hidden @ layers.second + layers.second_bias)
+            differs[:, few] = (hidden @ layers.last + layers.last_bias)[..., 0]
         return differs
+
+
+def _runs(count: int) -> list[slice]:
+    """Return which rows are multiplied together.
+
+    None is left alone: a single row is multiplied in another order than several are.
+    """
+    starts = range(0, max(count - 1, 1), _AT_ONCE)
+    return [slice(*ends) for ends in pairwise((*starts, count))]
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """Some networks that were fitted to the same blasts, each from another start.
+    """Networks that were fitted to blasts.
 
     Attributes:
-        mean: Of each feature that the networks are given: (FEATURES,), or (ALL_FEATURES,) with
-            horizons.
-        scale: Its spread, of the same shape.
-        members: The networks that know impulses.
-        peak_members: Those that know peak overpressures.
+        mean: Of each feature and each relation (INPUTS,).
+        scale: Their spread (INPUTS,).
+        impulse: The networks that know impulses.
+        peak: Those that know peak overpressures.
         fit: What they were fitted to.
     """
 
     mean: FloatArray
     scale: FloatArray
-    members: tuple[Member, ...]
-    peak_members: tuple[Member, ...]
+    impulse: Networks
+    peak: Networks
     fit: Fit
 
     @property
     def digest(self) -> str:
         """Tells surrogates apart: of their numbers."""
-        members = (*self.members, *self.peak_members)
+        members = (*self.impulse.members, *self.peak.members)
         arrays = (self.mean, self.scale, *(each for member in members for each in member))
         numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
         return sha256(numbers).hexdigest()[:16]
@@ -231,13 +295,13 @@ class Surrogate:
         barriers = [site.barrier(layout) for layout in layouts]
         approaches = [site.approaches(charge) for charge in charges]
         columns = [
-            self._on_structure([each[number] for each in approaches], barriers, site.counts_peaks)
+            self._on_structure([each[number] for each in approaches], barriers, site)
             for number in range(len(site.protected))
         ]
         return Guess(*(np.stack(each, axis=1) for each in zip(*columns, strict=True)))
 
     def save(self, path: str | Path) -> Path:
-        """Write everything as one JSON file, numbers to six digits.
+        """Write everything as one JSON file, numbers to five digits.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -247,59 +311,73 @@ class Surrogate:
             fit=self.fit,
             mean=_numbers(self.mean),
             scale=_numbers(self.scale),
-            members=_flat(self.members),
-            peak_members=_flat(self.peak_members),
+            members=_flat(self.impulse.members),
+            peak_members=_flat(self.peak.members),
         )
         with write_atomically(path) as temporary:
             temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
         return path
 
     def _on_structure(
-        self, approaches: Sequence[Approach], barriers: Sequence[FloatArray], peaks: bool
+        self, approaches: Sequence[Approach], barriers: Sequence[FloatArray], site: SurrogateSite
     ) -> tuple[FloatArray, ...]:
         """Return mean and spread of the impulse on one structure, then of its peak if asked."""
         starts: IntArray = np.cumsum([0, *(len(each.area_m2) for each in approaches[:-1])])
         area_m2 = np.concatenate([each.area_m2 for each in approaches])
-        given = len(self.mean)
-        behind = [each.behind(b, given) for each, b in zip(approaches, barriers, strict=True)]
-        rows = np.concatenate([start + of for start, (of, _) in zip(starts, behind, strict=True)])
-        scaled = self.scaled(np.concatenate([features for _, features in behind]))
+        pairs = [*zip(approaches, barriers, strict=True)]
+        scaled = self.scaled(np.concatenate([each.features(barrier) for each, barrier in pairs]))
 
-        def of(
-            members: tuple[Member, ...], known: Sequence[FloatArray], power: float
-        ) -> FloatArray:
-            differs = np.hstack([self._on_empty(each, members) for each in approaches])
-            differs[:, rows] = answers(members, scaled)
+        def of(networks: Networks, known: Sequence[FloatArray], power: float) -> FloatArray:
+            heard = [self._heard(networks, *each, site) for each in pairs]
+            differs = networks(scaled, np.concatenate(heard, axis=1))
             return log_loads(differs, np.concatenate(known), area_m2, starts, power)
 
-        impulse = of(self.members, [each.log_impulse for each in approaches], IMPULSE_POWER)
-        if not peaks:
+        impulse = of(self.impulse, [each.log_impulse for each in approaches], IMPULSE_POWER)
+        if not site.counts_peaks:
             return _mean_and_spread(impulse)
-        peak = of(self.peak_members, [each.log_peak for each in approaches], PEAK_POWER)
+        peak = of(self.peak, [each.log_peak for each in approaches], PEAK_POWER)
         return (*_mean_and_spread(impulse), *_mean_and_spread(peak))
 
-    def _on_empty(self, approach: Approach, members: tuple[Member, ...]) -> FloatArray:
-        """Return what networks say of the points where no barrier stands (members, points)."""
-        kept = approach.kept.get((self, members is self.members))
-        if kept is None:
-            kept = answers(members, self.scaled(approach.on_empty))
-            approach.kept[self, members is self.members] = kept
-        return kept
+    def _heard(
+        self, networks: Networks, approach: Approach, barrier: FloatArray, site: SurrogateSite
+    ) -> SingleArray:
+        """Return the messages to points from all that stands there (members, points, MESSAGE).
+
+        Layouts have many pieces in common, so those of each piece are remembered.
+        """
+
+        def sent(related: FloatArray) -> SingleArray:
+            solids, points, _ = related.shape
+            told = networks.messages(self.related(related.reshape(-1, RELATIONS)))
+            summed: SingleArray = told.reshape(-1, solids, points, MESSAGE).sum(axis=1)
+            return summed
+
+        heard = site.memory.of((networks, approach), lambda: sent(approach.structures)).copy()
+        for piece in barrier:
+            key = (networks, approach, piece.tobytes())
+            heard += site.memory.of(key, partial(_of_piece, sent, approach, piece))
+        return heard
 
     def scaled(self, features: FloatArray) -> FloatArray:
-        """Return what the networks are given of points, from all features or from as many."""
-        scaled: FloatArray = (features[:, : len(self.mean)] - self.mean) / self.scale
+        """Return what the networks are given of features of points (points, FEATURES)."""
+        scaled: FloatArray = (features - self.mean[:FEATURES]) / self.scale[:FEATURES]
         return scaled
+
+    def related(self, relations: FloatArray) -> FloatArray:
+        """Return what they are given of relations (solids x points, RELATIONS)."""
+        related: FloatArray = (relations - self.mean[FEATURES:]) / self.scale[FEATURES:]
+        return related
+
+
+def _of_piece(
+    sent: Callable[[FloatArray], SingleArray], approach: Approach, piece: FloatArray
+) -> SingleArray:
+    return sent(approach.relations(piece[np.newaxis]))
 
 
 def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what the networks say on the mean, and by how much they differ (structures,)."""
     return np.exp(logs.mean(axis=0)), logs.std(axis=0)
-
-
-def answers(members: Sequence[Member], scaled: FloatArray) -> FloatArray:
-    """Return what each network says of points (members, points); see `Member`."""
-    return np.array([member(scaled) for member in members])
 
 
 def log_loads(
@@ -310,7 +388,7 @@ def log_loads(
     It is the power mean of the loads at its points, each by the area that it stands for.
 
     Args:
-        differs: What the networks say of all points: `answers` (members, points).
+        differs: What the networks say of all points: `Networks` (members, points).
         known: Logarithm of Kingery and Bulmash's load there (points,).
         area_m2: What each point stands for (points,).
         starts: The first point of each structure (structures,).
@@ -340,8 +418,8 @@ def load_surrogate(path: str | Path) -> Surrogate:
     return Surrogate(
         np.array(content.mean),
         np.array(content.scale),
-        _members(content.members, len(content.mean)),
-        _members(content.peak_members, len(content.mean)),
+        _networks(content.members),
+        _networks(content.peak_members),
         content.fit,
     )
 
@@ -355,7 +433,7 @@ def packaged_surrogate() -> Surrogate:
     return load_surrogate(_PACKAGED)
 
 
-_Networks = Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
+_Members = Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
 
 
 class _File(BaseModel):
@@ -366,17 +444,15 @@ class _File(BaseModel):
     fit: Fit
     mean: list[float]
     scale: list[Annotated[float, Field(gt=0.0)]]
-    members: _Networks
-    peak_members: _Networks
+    members: _Members
+    peak_members: _Members
 
     @model_validator(mode="after")
     def _check_sizes(self) -> Self:
-        given = len(self.mean)
-        if given not in (FEATURES, ALL_FEATURES):
-            raise ValueError(f"mean has {given} numbers, must be {FEATURES} or {ALL_FEATURES}")
-        if len(self.scale) != given:
-            raise ValueError(f"scale has {len(self.scale)} numbers, must be {given}")
-        wanted = [prod(shape) for shape in shapes(given)]
+        for name, numbers in (("mean", self.mean), ("scale", self.scale)):
+            if len(numbers) != INPUTS:
+                raise ValueError(f"{name} has {len(numbers)} numbers, must be {INPUTS}")
+        wanted = [prod(shape) for shape in SHAPES]
         for name, members in (("members", self.members), ("peak_members", self.peak_members)):
             for number, member in enumerate(members):
                 sizes = [len(flat) for flat in member]
@@ -389,16 +465,19 @@ def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
     return [[_numbers(array) for array in member] for member in members]
 
 
-def _members(networks: Sequence[Sequence[Sequence[float]]], features: int) -> tuple[Member, ...]:
-    wanted = shapes(features)
-    return tuple(
-        Member(*(np.array(flat).reshape(shape) for flat, shape in zip(each, wanted, strict=True)))
-        for each in networks
+def _networks(members: Sequence[Sequence[Sequence[float]]]) -> Networks:
+    return Networks(
+        [
+            Member(
+                *(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True))
+            )
+            for each in members
+        ]
     )
 
 
-def _numbers(array: FloatArray) -> list[float]:
-    return [float(f"{value:.6g}") for value in array.ravel()]
+def _numbers(array: AnyFloats) -> list[float]:
+    return [float(f"{value:.5g}") for value in array.ravel()]
 
 
 def _silu(values: FloatArray) -> FloatArray:

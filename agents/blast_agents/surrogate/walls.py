@@ -1,14 +1,15 @@
 """What the surrogate sees of a site: points on the walls that count, and what may stop a blast."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blast_agents.surrogate.horizons import HORIZONS, horizons
+from blast_agents.surrogate.relations import RELATIONS, relations
 from blast_agents.surrogate.ways import SHARES, Ways
-from blast_env.arrays import FloatArray, IntArray
+from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
@@ -35,13 +36,17 @@ _LEAST_HEIGHT_M: Final = 0.3
 _LEAST_Z: Final = 0.2
 """A point that is nearer to the charge, m/kg^(1/3), has the reflected loads from there."""
 
+_MOST_BYTES: Final = 2**26
+
+SingleArray = NDArray[np.float32]
+
 _OUTWARD: Final = {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}
 
 FEATURES: Final = 7 + 2 * SHARES
 """Numbers that a network is given about a point: geometry and ways."""
 
-ALL_FEATURES: Final = FEATURES + 2 * HORIZONS
-"""The same for a network that is given horizons, too."""
+INPUTS: Final = FEATURES + RELATIONS
+"""The same, and those about a solid and the point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +94,8 @@ class WallPoints:
                 edge_m = min(along_m, length_m - along_m)
                 rows += [(x_m, y_m, z, x_out, y_out, area_m2, edge_m, height_m - z) for z in z_m]
         table = np.array(rows)
-        return cls(table[:, :3], table[:, 3:5], table[:, 5], table[:, 6], table[:, 7])
+        places_m, outward = (np.ascontiguousarray(each) for each in (table[:, :3], table[:, 3:5]))
+        return cls(places_m, outward, table[:, 5], table[:, 6], table[:, 7])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,46 +104,71 @@ class Approach:
 
     Attributes:
         ways: From the charge to the points.
-        on_empty: Features of each point where no barrier stands (points, ALL_FEATURES): geometry,
-            open ways without and with the barrier, horizons without and with it.
+        outward: Where their walls look (points, 2).
+        scale_m: Cube root of the charge's mass: of lengths, m.
+        on_empty: Features of each point where no barrier stands (points, FEATURES): geometry, open
+            ways without and with the barrier.
+        structures: Where these stand for each point (structures, points, RELATIONS).
         log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
         log_peak: Logarithm of their reflected overpressure there, Pa (points,).
         area_m2: What each point stands for (points,).
-        kept: What surrogates say of the points where no barrier stands, by what said it.
     """
 
     ways: Ways
+    outward: FloatArray
+    scale_m: float
     on_empty: FloatArray
+    structures: FloatArray
     log_impulse: FloatArray
     log_peak: FloatArray
     area_m2: FloatArray
-    kept: dict[object, FloatArray] = field(default_factory=dict, repr=False)
 
     def features(self, barrier: FloatArray) -> FloatArray:
-        """Return the features of all points behind a barrier (points, ALL_FEATURES)."""
-        features = self.on_empty.copy()
-        changed, shares = self.ways.behind(barrier)
-        features[changed, FEATURES - SHARES : FEATURES] = shares
-        risen = horizons(self.ways.start_m, self.ways.points_m, barrier)
-        features[:, -HORIZONS:] = np.maximum(features[:, -HORIZONS:], risen)
-        return features
-
-    def behind(self, barrier: FloatArray, features: int = FEATURES) -> tuple[IntArray, FloatArray]:
-        """Return which points a barrier makes a difference to, and their features.
+        """Return the features of all points behind a barrier (points, FEATURES).
 
         Args:
             barrier: Left, bottom, right, top and height of each piece, m (pieces, 5).
-            features: How many a network is given: `FEATURES` or `ALL_FEATURES`.
-
-        Returns:
-            Numbers of the points (behind,), and their features (behind, features).
         """
-        if features == ALL_FEATURES:
-            whole = self.features(barrier)
-            changed: IntArray = np.flatnonzero((whole != self.on_empty).any(axis=1))
-            return changed, whole[changed]
-        numbers, shares = self.ways.behind(barrier)
-        return numbers, np.hstack((self.on_empty[numbers, : FEATURES - SHARES], shares))
+        features = self.on_empty.copy()
+        changed, shares = self.ways.behind(barrier)
+        features[changed, FEATURES - SHARES :] = shares
+        return features
+
+    def relations(self, barrier: FloatArray) -> FloatArray:
+        """Return where pieces stand for each point (pieces, points, RELATIONS).
+
+        Args:
+            barrier: As for `features`.
+        """
+        ways = self.ways
+        found: FloatArray = relations(
+            ways.start_m, ways.points_m, self.outward, self.scale_m, barrier
+        )
+        return found
+
+
+class Memory:
+    """Remembers arrays up to so many bytes; then it forgets all of them.
+
+    Args:
+        most_bytes: The bound.
+    """
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most_bytes, self._bytes = most_bytes, 0
+        self._kept: dict[Hashable, SingleArray] = {}
+
+    def of(self, key: Hashable, make: Callable[[], SingleArray]) -> SingleArray:
+        """Return the array of a key, made if it is not there; nobody may change it."""
+        found = self._kept.get(key)
+        if found is None:
+            found = make()
+            if self._bytes + found.nbytes > self._most_bytes:
+                self._kept.clear()
+                self._bytes = 0
+            self._kept[key] = found
+            self._bytes += found.nbytes
+        return found
 
 
 class SurrogateSite:
@@ -148,16 +179,19 @@ class SurrogateSite:
 
     Args:
         scenario: The scenario.
+        most_bytes: Of what is remembered of pieces.
 
     Attributes:
         scenario: The scenario.
+        memory: What surrogates remember of it.
         protected: Its protected structures.
         counts_peaks: Whether its objective counts peak overpressures.
         alternatives: The bays of its facades, where their response counts.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, most_bytes: int = _MOST_BYTES) -> None:
         self.scenario = scenario
+        self.memory = Memory(most_bytes)
         self.protected = tuple(each for each in scenario.structures if each.protected)
         self.counts_peaks = scenario.objective.needs_peaks
         self.alternatives = scenario.alternatives if scenario.objective.is_response else ()
@@ -260,9 +294,17 @@ class SurrogateSite:
         met_m = np.maximum(distance_m, _LEAST_Z * scale)
         impulse = kingery_bulmash("reflected_impulse", met_m, charge.tnt_kg)
         peak = kingery_bulmash("reflected_overpressure", met_m, charge.tnt_kg)
-        shares, risen = ways.shares(), horizons(start_m, points.points_m, self._solids)
-        on_empty = np.hstack((geometry, shares, shares, risen, risen))
-        return Approach(ways, on_empty, np.log(impulse), np.log(peak), points.area_m2)
+        shares = ways.shares()
+        return Approach(
+            ways=ways,
+            outward=points.outward,
+            scale_m=scale,
+            on_empty=np.hstack((geometry, shares, shares)),
+            structures=relations(start_m, ways.points_m, points.outward, scale, self._solids),
+            log_impulse=np.log(impulse),
+            log_peak=np.log(peak),
+            area_m2=points.area_m2,
+        )
 
 
 def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
@@ -277,13 +319,17 @@ def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> fl
     return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
 
 
-def site_of(scenario: Scenario) -> SurrogateSite:
+def site_of(scenario: Scenario, most_bytes: int = _MOST_BYTES) -> SurrogateSite:
     """Return a scenario as the surrogate sees it.
+
+    Args:
+        scenario: The scenario.
+        most_bytes: Of what is remembered of pieces.
 
     Raises:
         BlastEnvError: If nothing on it is protected.
     """
-    site = SurrogateSite(scenario)
+    site = SurrogateSite(scenario, most_bytes)
     if not site.protected:
         raise BlastEnvError(f"{scenario.name}: no structure is protected")
     return site
