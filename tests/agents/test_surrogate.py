@@ -350,6 +350,26 @@ def test_large_walls_have_few_points_that_say_the_same(monkeypatch: pytest.Monke
     assert loads[0] == pytest.approx(loads[1], rel=0.01)
 
 
+def test_far_outside_its_fit_no_guess_is_without_bounds() -> None:
+    """Walls of 60 m far from the charge, and a site where one network alone goes astray."""
+    surrogate = packaged_surrogate()
+    for name in ("car_park", "campus", "street_front", "government_forecourt"):
+        scenario = load_scenario(name)
+        site, rng = site_of(scenario), np.random.default_rng(0)
+        layouts = [(), *(random_layout(scenario, rng) for _ in range(3))]
+        (threat,) = draw_threats(scenario, range(1))
+        charges = [threat.charge_against(scenario, each) for each in layouts]
+        guess = surrogate.guess(site, layouts, charges)
+        assert guess.peak_pa is not None
+        for row, charge in enumerate(charges):
+            for column, approach in enumerate(site.approaches(charge)):
+                for load, known in (
+                    (guess.impulse_pa_s, approach.log_impulse),
+                    (guess.peak_pa, approach.log_peak),
+                ):
+                    assert load[row, column] < 2.0 * np.exp(known.max())
+
+
 def test_it_is_kept_in_a_file(tmp_path: Path) -> None:
     surrogate = by_hand()
     path = surrogate.save(tmp_path / "surrogate.json")

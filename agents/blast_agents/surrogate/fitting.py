@@ -22,6 +22,8 @@ from blast_agents.surrogate.network import (
     Member,
     Networks,
     Surrogate,
+    agreed,
+    bounded,
     log_loads,
 )
 from blast_agents.surrogate.relations import RELATIONS
@@ -267,7 +269,7 @@ def load_errors(
     differs = networks(surrogate.scaled(samples.features[points]), heard)
     known, area_m2 = loads.known[points], samples.area_m2[points]
     logs = log_loads(differs, known, area_m2, starts, loads.power)
-    return _errors(logs.mean(axis=0), loads.target[chosen], samples.case[chosen])
+    return _errors(agreed(logs), loads.target[chosen], samples.case[chosen])
 
 
 def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray) -> Errors:
@@ -354,7 +356,7 @@ class _Tensors:
     def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray) -> "_Tensors":
         of_points, of_solids = slice(None, FEATURES), slice(FEATURES, INPUTS)
         features, relations = (
-            torch.from_numpy(((each - mean[own]) / scale[own]).astype(np.float32))
+            torch.from_numpy(bounded(each, mean[own], scale[own]).astype(np.float32))
             for each, own in ((samples.features, of_points), (samples.relations, of_solids))
         )
         area_m2 = torch.from_numpy(samples.area_m2)

@@ -50,6 +50,12 @@ So few stay in a processor's cache, and are multiplied by one thread: with more 
 wakes others, which wait in a loop for most of the time, or for ever where processors are taken.
 """
 
+_MOST_SPREADS: Final = 4.0
+"""Inputs are cut so far from their mean, in their scale."""
+
+_MOST_EXPONENT: Final = 80.0
+"""The exponential of more has no room in single precision."""
+
 SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,)) + (
     (FEATURES + MESSAGE, HIDDEN),
     (HIDDEN,),
@@ -360,13 +366,11 @@ class Surrogate:
 
     def scaled(self, features: FloatArray) -> FloatArray:
         """Return what the networks are given of features of points (points, FEATURES)."""
-        scaled: FloatArray = (features - self.mean[:FEATURES]) / self.scale[:FEATURES]
-        return scaled
+        return bounded(features, self.mean[:FEATURES], self.scale[:FEATURES])
 
     def related(self, relations: FloatArray) -> FloatArray:
         """Return what they are given of relations (solids x points, RELATIONS)."""
-        related: FloatArray = (relations - self.mean[FEATURES:]) / self.scale[FEATURES:]
-        return related
+        return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
 
 
 def _of_piece(
@@ -375,9 +379,29 @@ def _of_piece(
     return sent(approach.relations(piece[np.newaxis]))
 
 
+def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return numbers less their mean, over their scale, cut where networks have met none (rows, n).
+
+    A wall of 60 m has points much farther from its edges than those of the sites of a fit, and what
+    a network says so far outside has no bounds.
+    """
+    found: FloatArray = np.clip((numbers - mean) / scale, -_MOST_SPREADS, _MOST_SPREADS)
+    return found
+
+
 def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what the networks say on the mean, and by how much they differ (structures,)."""
-    return np.exp(logs.mean(axis=0)), logs.std(axis=0)
+    return np.exp(agreed(logs)), logs.std(axis=0)
+
+
+def agreed(logs: FloatArray) -> FloatArray:
+    """Return the mean over the networks without the highest and the lowest (members, n) -> (n,).
+
+    Where nothing like it was in the fit, one of them may be far off.
+    """
+    middle: FloatArray = np.sort(logs, axis=0)[1:-1] if len(logs) > 2 else logs
+    mean: FloatArray = middle.mean(axis=0)
+    return mean
 
 
 def log_loads(
@@ -481,7 +505,7 @@ def _numbers(array: AnyFloats) -> list[float]:
 
 
 def _silu(values: FloatArray) -> FloatArray:
-    below = np.negative(values)
+    below = np.minimum(np.negative(values), _MOST_EXPONENT)
     np.exp(below, out=below)
     below += 1.0
     silu: FloatArray = np.divide(values, below, out=below)
