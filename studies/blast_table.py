@@ -27,6 +27,7 @@ from blast_env.sites import (
     HELD_OUT_SITES,
     ITEM_SITES,
     LARGE_SITES,
+    close_ranges,
     generate_site,
     large_ranges,
 )
@@ -54,24 +55,34 @@ COLUMNS: Final = (
 SITE_NAME: Final = "item_sites/"
 """What the names of generated sites in the table begin with; their seed follows."""
 
+_SIZED: Final = {"close_sites": close_ranges, LARGE_SITES: large_ranges}
+"""Families with sites of any side within bounds: the side follows, and then the seed."""
+
+_MOST_CLOSE_M: Final = 24.0
+
 
 def site_name(seed: int, side_m: float | None = None) -> str:
     """Return what a generated site is called in the table.
 
     Args:
         seed: Its seed.
-        side_m: Its side, if it is of `large_sites`; otherwise it is of `item_sites`.
+        side_m: Its side, if it is of `close_ranges` or `large_ranges`; otherwise it is of
+            `item_sites`.
     """
-    return f"{SITE_NAME}{seed}" if side_m is None else f"{LARGE_SITES}/{side_m:g}/{seed}"
+    if side_m is None:
+        return f"{SITE_NAME}{seed}"
+    family = "close_sites" if side_m <= _MOST_CLOSE_M else LARGE_SITES
+    return f"{family}/{side_m:g}/{seed}"
 
 
 def scenario_of(name: str) -> Scenario:
     """Return the scenario of a name in the table."""
     if name.startswith(SITE_NAME):
         return generate_site(int(name.removeprefix(SITE_NAME)), FAMILIES[ITEM_SITES])
-    if name.startswith(f"{LARGE_SITES}/"):
-        side_m, seed = name.removeprefix(f"{LARGE_SITES}/").split("/")
-        return generate_site(int(seed), large_ranges(float(side_m)))
+    family, *numbers = name.split("/")
+    if family in _SIZED and len(numbers) == 2:
+        side_m, seed = numbers
+        return generate_site(int(seed), _SIZED[family](float(side_m)))
     return load_scenario(name)
 
 
@@ -82,7 +93,7 @@ def main(
         int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
     ] = 0,
     side: Annotated[
-        list[float] | None, typer.Option(help="As many of large_sites with this side, m.")
+        list[float] | None, typer.Option(help="As many of this side, m: 16 to 24, or 40 to 100.")
     ] = None,
     scenario: Annotated[
         list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")

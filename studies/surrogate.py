@@ -42,7 +42,8 @@ from blast_env.values import whole_number
 from studies.blast_table import COLUMNS, scenario_of, site_name
 
 DATA: Final = tuple(
-    Path(f"docs/data/{name}_blasts.parquet") for name in ("site", "site_agent", "many_site")
+    Path(f"docs/data/{name}_blasts.parquet")
+    for name in ("site", "site_agent", "many_site", "close_site")
 )
 """What the package's surrogate is fitted to: blasts on generated sites."""
 
@@ -60,7 +61,7 @@ def blasts(
     sites: Annotated[int, typer.Option(min=1, help="Generated sites, of training's seeds.")] = 100,
     first: Annotated[int, typer.Option(min=0, help="How many of them are left out.")] = 0,
     side: Annotated[
-        float | None, typer.Option(help="Side of large_sites, m; else they are item_sites.")
+        float | None, typer.Option(help="Their side, m: 16 to 24, or 40 to 100; else 26 m.")
     ] = None,
     layouts: Annotated[int, typer.Option(min=0, help="Random ones, and changes of rules'.")] = 12,
     rules: Annotated[int, typer.Option(min=0, help="Most layouts by rules, drawn.")] = 20,

@@ -239,5 +239,6 @@ def test_surrogate_and_lines_of_sight_take_it_as_absent() -> None:
     ]
     assert loads[0] == loads[1]
     assert Visibility.of(with_it).open_share == Visibility.of(plain).open_share == 1.0
-    points = site_of(hut_with(CANOPY)).approaches(charge_at)[1].ways.points_m
-    assert np.all((points[:, 2] > 2.5) & (points[:, 2] < 3.0))
+    approach = site_of(hut_with(CANOPY)).approach(charge_at)
+    points_m = approach.ways.points_m[approach.points_of(1)]
+    assert np.all((points_m[:, 2] > 2.5) & (points_m[:, 2] < 3.0))

@@ -17,6 +17,7 @@ TABLES: Final = (
     "site_blasts",
     "site_agent_blasts",
     "many_site_blasts",
+    "close_site_blasts",
     "street_blasts",
     "street_agent_blasts",
 )

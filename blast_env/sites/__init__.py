@@ -10,7 +10,7 @@ from blast_env.sites.criterion import (
     visibility_layout,
 )
 from blast_env.sites.generate import draw_site, generate_site
-from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
+from blast_env.sites.item_sites import ItemSiteRanges, close_ranges, large_ranges
 from blast_env.sites.ranges import SiteRanges
 from blast_env.sites.source import (
     FAMILIES,
@@ -34,6 +34,7 @@ __all__ = [
     "SiteSource",
     "Visibility",
     "VisibilityCriterion",
+    "close_ranges",
     "draw_site",
     "generate_site",
     "large_ranges",

@@ -194,7 +194,39 @@ class ItemSiteRanges:
 LARGE_SIDE_M: Final = 60.0
 """Side of the sites of `large_sites`."""
 
+_CLOSE_SIDES_M: Final = (16.0, 24.0)
 _LARGE_SIDES_M: Final = (40.0, 100.0)
+
+
+def close_ranges(side_m: float) -> ItemSiteRanges:
+    """Return what a site may be on which the threat is as close as on the bundled small ones.
+
+    Stand-offs, build zone, roads and buildings grow with the site.
+
+    Args:
+        side_m: Width and height of the site, 16 to 24 m in whole modules.
+
+    Raises:
+        BlastEnvError: If the side is out of bounds.
+    """
+    _check_side(side_m, _CLOSE_SIDES_M)
+    return ItemSiteRanges(
+        side_m=side_m,
+        air_height_m=12.0,
+        zone_side_m=on_grid(0.6 * side_m),
+        tnt_kg=(80.0, 140.0),
+        road_length_m=_shares_m(side_m, (0.3, 0.6)),
+        entry_m=(3.5, 5.0),
+        forecourt_m=_shares_m(side_m, (0.3, 0.5)),
+        kerb_m=(3.0, 5.0),
+        zone_from_border_m=(3.0, 4.0),
+        stand_off_m=_shares_m(side_m, (0.35, 0.5)),
+        facade_m=_shares_m(side_m, (0.28, 0.55)),
+        depth_m=(2.0, 4.0),
+        storeys=(1, 3),
+        shift_m=(-1.5, 1.5),
+        budget=(14.0, 40.0),
+    )
 
 
 def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
@@ -209,32 +241,25 @@ def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
     Raises:
         BlastEnvError: If the side is out of bounds.
     """
-    low_m, high_m = _LARGE_SIDES_M
-    if not low_m <= side_m <= high_m:
-        raise BlastEnvError(f"side_m is {side_m:g}, must be {low_m:g} to {high_m:g}")
-
-    def span_m(low: float, high: float) -> Span:
-        """Return a span in m that grows with the site."""
-        return on_grid(low * side_m), on_grid(high * side_m)
-
+    _check_side(side_m, _LARGE_SIDES_M)
     return ItemSiteRanges(
         side_m=side_m,
         air_height_m=18.0,
         zone_side_m=18.0,
         tnt_kg=(50.0, 500.0),
         vehicle_probability=0.7,
-        road_length_m=span_m(0.25, 0.6),
+        road_length_m=_shares_m(side_m, (0.25, 0.6)),
         entry_m=(6.0, 10.0),
         forecourt_m=(7.0, 16.0),
         kerb_m=(8.0, 14.0),
-        zone_from_border_m=span_m(0.1, 0.14),
-        stand_off_m=span_m(0.4, 0.6),
-        facade_m=span_m(0.22, 0.34),
-        depth_m=span_m(0.13, 0.23),
+        zone_from_border_m=_shares_m(side_m, (0.1, 0.14)),
+        stand_off_m=_shares_m(side_m, (0.4, 0.6)),
+        facade_m=_shares_m(side_m, (0.22, 0.34)),
+        depth_m=_shares_m(side_m, (0.13, 0.23)),
         storeys=(1, 4),
         second_probability=0.5,
         shed_side_m=(3.0, 8.0),
-        shift_m=span_m(-0.1, 0.1),
+        shift_m=_shares_m(side_m, (-0.1, 0.1)),
         path_width_m=(2.0, 3.0),
         trees=(0, 4),
         tree_side_m=(1.0, 3.0),
@@ -242,6 +267,18 @@ def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
         access_way_width_m=(3.5, 4.5),
         budget=(20.0, 60.0),
     )
+
+
+def _check_side(side_m: float, bounds_m: Span) -> None:
+    low_m, high_m = bounds_m
+    if not low_m <= side_m <= high_m:
+        raise BlastEnvError(f"side_m is {side_m:g}, must be {low_m:g} to {high_m:g}")
+
+
+def _shares_m(side_m: float, shares: Span) -> Span:
+    """Return a span in m that grows with the site."""
+    low, high = shares
+    return on_grid(low * side_m), on_grid(high * side_m)
 
 
 _ROAD_M: Final = 2.0

@@ -10,7 +10,8 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Piece
+from blast_env.evaluation import draw_threats
+from blast_env.geometry import Piece, Rectangle
 from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.build_scene import worst_places
 from blast_env.sites import (
@@ -20,6 +21,7 @@ from blast_env.sites import (
     LARGE_SITES,
     ItemSiteRanges,
     SiteSource,
+    close_ranges,
     generate_site,
     large_ranges,
 )
@@ -168,10 +170,34 @@ def test_stand_offs_grow_with_large_sites(side_m: float) -> None:
         assert 0.4 * side_m <= site.vehicle_ground(source).entry_stand_off_m <= 0.7 * side_m
 
 
-@pytest.mark.parametrize("side_m", [39.5, 100.5])
-def test_sides_out_of_bounds_are_refused(side_m: float) -> None:
-    with pytest.raises(BlastEnvError, match=r"side_m is .* must be 40 to 100"):
-        large_ranges(side_m)
+@pytest.mark.parametrize("side_m", [16.0, 18.5, 24.0])
+def test_threats_are_closer_on_close_sites(side_m: float) -> None:
+    for seed in range(4):
+        site = generate_site(seed, close_ranges(side_m))
+        assert site.site.width_m == site.site.height_m == side_m
+        assert ITEM_CRITERION.objection(site) is None
+        assert generate_site(seed, close_ranges(side_m)) == site
+        stand_offs_m = [
+            Rectangle(*each.rectangle_m).distance_to(threat.charge_against(site, ()).position_m)
+            for threat in draw_threats(site, range(3))
+            for each in site.structures
+            if each.protected
+        ]
+        assert min(stand_offs_m) <= 0.55 * side_m < RANGES.stand_off_m[1]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "side_m", "bounds"),
+    [
+        (close_ranges, 15.5, "16 to 24"),
+        (close_ranges, 24.5, "16 to 24"),
+        (large_ranges, 39.5, "40 to 100"),
+        (large_ranges, 100.5, "40 to 100"),
+    ],
+)
+def test_sides_out_of_bounds_are_refused(ranges: Any, side_m: float, bounds: str) -> None:
+    with pytest.raises(BlastEnvError, match=f"side_m is {side_m:g}, must be {bounds}"):
+        ranges(side_m)
 
 
 @pytest.mark.parametrize(

@@ -74,17 +74,17 @@ def test_the_sites_that_a_run_learnt_from_are_named(tmp_path: Path) -> None:
     assert "is no run by self-labelling on item_sites" in words
 
 
-def test_generated_sites_of_both_families_are_named(tmp_path: Path) -> None:
-    out, names = tmp_path / "blasts.parquet", [blast_table.site_name(10_000)]
-    names.append(blast_table.site_name(10_000, 40.0))
+def test_generated_sites_of_all_sides_are_named(tmp_path: Path) -> None:
+    out = tmp_path / "blasts.parquet"
+    names = [blast_table.site_name(10_000, side_m) for side_m in (None, 16.0, 40.0)]
     for name in names:
         site = blast_table.scenario_of(name)
         BlastEvaluator(site, FAST, cache=tmp_path / "blasts").loads((), *draw_threats(site, [0]))
-    assert run(tmp_path / "blasts", "--sites", 1, "--side", 40, "--out", out)[0] == 0
+    assert run(tmp_path / "blasts", "--sites", 1, "--side", 16, "--side", 40, "--out", out)[0] == 0
     assert (
         set(pd.read_parquet(out)["scenario"])
         == {*names}
-        == {"item_sites/10000", "large_sites/40/10000"}
+        == {"item_sites/10000", "close_sites/16/10000", "large_sites/40/10000"}
     )
 
 

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import groupby
 from math import ceil
 from typing import Any, Final, NamedTuple
 
@@ -27,7 +28,7 @@ from blast_agents.surrogate.network import (
     log_loads,
 )
 from blast_agents.surrogate.relations import RELATIONS
-from blast_agents.surrogate.walls import FEATURES, INPUTS, Approach, site_of
+from blast_agents.surrogate.walls import FEATURES, INPUTS, site_of
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
@@ -120,35 +121,39 @@ class Samples:
         if rows.empty:
             raise BlastEnvError("no load of a protected structure of a known scenario")
         sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
-        approaches: list[Approach] = []
-        features, related = [], []
-        wanted = ("scenario_hash", "structure", "layout", *_CHARGE)
+        features, related, area_m2, impulses, peaks = [], [], [], [], []
+        wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
         columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
-        for scenario_hash, structure, layout, *numbers in zip(*columns, strict=True):
+        of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
+        for (scenario_hash, layout, *numbers), loads in of_blast:
             site = sites[scenario_hash]
-            names = [each.name for each in site.protected]
             x_m, y_m, height_m, tnt_kg = map(float, numbers)
-            charge = Charge((x_m, y_m), tnt_kg, height_m)
-            approach = site.approaches(charge)[names.index(structure)]
+            approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
             barrier = site.barrier(elements(layout))
-            approaches.append(approach)
-            features.append(approach.features(barrier).astype(np.float32))
-            of_all = np.concatenate((approach.structures, approach.relations(barrier)))
-            related.append(of_all.astype(np.float32))
+            of_points = approach.features(barrier).astype(np.float32)
+            of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
+            names = [each.name for each in site.protected]
+            for *_, structure in loads:
+                own = approach.points_of(names.index(structure))
+                features.append(of_points[own])
+                related.append(of_solids[:, own].astype(np.float32))
+                area_m2.append(approach.area_m2[own])
+                impulses.append(approach.log_impulse[own])
+                peaks.append(approach.log_peak[own])
         place = rows[["scenario_hash", "structure", *_CHARGE]]
         return cls(
             features=np.concatenate(features),
             relations=np.concatenate([each.reshape(-1, RELATIONS) for each in related]),
-            area_m2=np.concatenate([each.area_m2 for each in approaches]),
+            area_m2=np.concatenate(area_m2),
             counts=np.array([len(each) for each in features]),
             solids=np.array([len(each) for each in related]),
             impulse=Loads(
-                np.concatenate([each.log_impulse for each in approaches]),
+                np.concatenate(impulses),
                 np.log(rows["impulse_pa_s"].to_numpy()),
                 IMPULSE_POWER,
             ),
             peak=Loads(
-                np.concatenate([each.log_peak for each in approaches]),
+                np.concatenate(peaks),
                 np.log(rows["peak_pa"].to_numpy()),
                 PEAK_POWER,
             ),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blast_agents.surrogate.relations import RELATIONS, relations
 from blast_agents.surrogate.ways import SHARES, Ways
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
@@ -24,7 +24,7 @@ _ALONG_M: Final = 1.0
 _UP_M: Final = 1.5
 """Points on a wall are so far apart, or farther where there would be too many of them."""
 
-MOST_POINTS: Final = 500
+MOST_POINTS: Final = 250
 """On all walls of a site, about. More cost time and say the same, for large walls are far away."""
 
 _BEFORE_M: Final = 0.05
@@ -51,9 +51,10 @@ INPUTS: Final = FEATURES + RELATIONS
 
 @dataclass(frozen=True, eq=False)
 class WallPoints:
-    """Points that stand for the walls of a structure that count.
+    """Points that stand for the walls that count.
 
     Attributes:
+        starts: The first point of each structure (structures,).
         points_m: (points, 3).
         outward: Where their wall looks (points, 2).
         area_m2: What each stands for (points,).
@@ -61,6 +62,7 @@ class WallPoints:
         to_roof_m: To the roof (points,).
     """
 
+    starts: IntArray
     points_m: FloatArray
     outward: FloatArray
     area_m2: FloatArray
@@ -68,60 +70,74 @@ class WallPoints:
     to_roof_m: FloatArray
 
     @classmethod
-    def on(cls, structure: AnyStructure, height_m: float, apart: float = 1.0) -> "WallPoints":
-        """Put points on a structure, one a metre along a wall and 1.5 m of its height, or so.
+    def on(cls, structures: Sequence[AnyStructure], air_m: float) -> "WallPoints":
+        """Put points on structures: one a metre along a wall and 1.5 m of its height, or so.
 
         Args:
-            structure: The structure.
-            height_m: Its height.
-            apart: How many times as far from each other points are.
+            structures: The structures.
+            air_m: Height of those that have none.
         """
-        left, bottom, right, top = structure.rectangle_m
-        rise_m = height_m - structure.base_m
-        levels = max(1, round(rise_m / (_UP_M * apart)))
-        z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
-        rows = []
-        for face in structure.faces:
-            x_out, y_out = _OUTWARD[face]
-            length_m = top - bottom if x_out else right - left
-            number = max(1, round(length_m / (_ALONG_M * apart)))
-            area_m2 = length_m * rise_m / (number * levels)
-            for along_m in (np.arange(number) + 0.5) * length_m / number:
-                if x_out:
-                    x_m, y_m = (left if x_out < 0 else right) + _BEFORE_M * x_out, bottom + along_m
-                else:
-                    x_m, y_m = left + along_m, (bottom if y_out < 0 else top) + _BEFORE_M * y_out
-                edge_m = min(along_m, length_m - along_m)
-                rows += [(x_m, y_m, z, x_out, y_out, area_m2, edge_m, height_m - z) for z in z_m]
-        table = np.array(rows)
+        heights_m = [each.height_m or air_m for each in structures]
+        apart = _apart(structures, heights_m)
+        tables = [_points(*each, apart) for each in zip(structures, heights_m, strict=True)]
+        starts: IntArray = np.cumsum([0, *(len(each) for each in tables[:-1])])
+        table = np.concatenate(tables) if tables else np.empty((0, 8))
         places_m, outward = (np.ascontiguousarray(each) for each in (table[:, :3], table[:, 3:5]))
-        return cls(places_m, outward, table[:, 5], table[:, 6], table[:, 7])
+        return cls(starts, places_m, outward, table[:, 5], table[:, 6], table[:, 7])
+
+
+def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArray:
+    """Return place, outward, area, and distance to edge and roof of points (points, 8)."""
+    left, bottom, right, top = structure.rectangle_m
+    rise_m = height_m - structure.base_m
+    levels = max(1, round(rise_m / (_UP_M * apart)))
+    z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
+    rows = []
+    for face in structure.faces:
+        x_out, y_out = _OUTWARD[face]
+        length_m = top - bottom if x_out else right - left
+        number = max(1, round(length_m / (_ALONG_M * apart)))
+        area_m2 = length_m * rise_m / (number * levels)
+        for along_m in (np.arange(number) + 0.5) * length_m / number:
+            if x_out:
+                x_m, y_m = (left if x_out < 0 else right) + _BEFORE_M * x_out, bottom + along_m
+            else:
+                x_m, y_m = left + along_m, (bottom if y_out < 0 else top) + _BEFORE_M * y_out
+            edge_m = min(along_m, length_m - along_m)
+            rows += [(x_m, y_m, z, x_out, y_out, area_m2, edge_m, height_m - z) for z in z_m]
+    return np.array(rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """A charge and the walls of a structure: what of it no layout changes.
+    """A charge and the walls that count: what of it no layout changes.
 
     Attributes:
+        starts: The first point of each structure (structures,).
         ways: From the charge to the points.
         outward: Where their walls look (points, 2).
         scale_m: Cube root of the charge's mass: of lengths, m.
         on_empty: Features of each point where no barrier stands (points, FEATURES): geometry, open
             ways without and with the barrier.
-        structures: Where these stand for each point (structures, points, RELATIONS).
+        solids: Where structures stand for each point (solids, points, RELATIONS).
         log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
         log_peak: Logarithm of their reflected overpressure there, Pa (points,).
         area_m2: What each point stands for (points,).
     """
 
+    starts: IntArray
     ways: Ways
     outward: FloatArray
     scale_m: float
     on_empty: FloatArray
-    structures: FloatArray
+    solids: FloatArray
     log_impulse: FloatArray
     log_peak: FloatArray
     area_m2: FloatArray
+
+    def points_of(self, structure: int) -> slice:
+        """Return the points of a structure, by its number among the protected ones."""
+        return slice(*[*self.starts.tolist(), len(self.area_m2)][structure : structure + 2])
 
     def features(self, barrier: FloatArray) -> FloatArray:
         """Return the features of all points behind a barrier (points, FEATURES).
@@ -203,12 +219,8 @@ class SurrogateSite:
                 if not is_open_below(each, scenario.structures)
             ]
         ).reshape(-1, 5)
-        heights_m = [each.height_m or air_m for each in self.protected]
-        apart = _apart(self.protected, heights_m)
-        self._points = [
-            WallPoints.on(*each, apart) for each in zip(self.protected, heights_m, strict=True)
-        ]
-        self._approaches: dict[Charge, tuple[Approach, ...]] = {}
+        self._points = WallPoints.on(self.protected, air_m)
+        self._approaches: dict[Charge, Approach] = {}
         self._triangular = {
             each.name: TriangularLoads(
                 [bay for bay in self.alternatives if bay.structure == each.name]
@@ -218,11 +230,10 @@ class SurrogateSite:
         self._responses: dict[tuple[str, frozenset[Element], float, float], float] = {}
         self._named: dict[frozenset[Element], tuple[NamedBay, ...]] = {}
 
-    def approaches(self, charge: Charge) -> tuple[Approach, ...]:
-        """Return what comes from a charge to each protected structure on the empty site."""
+    def approach(self, charge: Charge) -> Approach:
+        """Return what comes from a charge to the protected structures on the empty site."""
         if charge not in self._approaches:
-            found = tuple(self._approach(charge, points) for points in self._points)
-            self._approaches[charge] = found
+            self._approaches[charge] = self._approach_of(charge)
         return self._approaches[charge]
 
     def bay_damages(
@@ -272,7 +283,8 @@ class SurrogateSite:
             rows.append([*rectangle_m, top_m])
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
-    def _approach(self, charge: Charge, points: WallPoints) -> Approach:
+    def _approach_of(self, charge: Charge) -> Approach:
+        points = self._points
         start_m = np.array((*charge.position_m, max(charge.height_m, _LEAST_HEIGHT_M)))
         away_m = start_m - points.points_m
         distance_m = np.linalg.norm(away_m, axis=1)
@@ -296,11 +308,12 @@ class SurrogateSite:
         peak = kingery_bulmash("reflected_overpressure", met_m, charge.tnt_kg)
         shares = ways.shares()
         return Approach(
+            starts=points.starts,
             ways=ways,
             outward=points.outward,
             scale_m=scale,
             on_empty=np.hstack((geometry, shares, shares)),
-            structures=relations(start_m, ways.points_m, points.outward, scale, self._solids),
+            solids=relations(start_m, ways.points_m, points.outward, scale, self._solids),
             log_impulse=np.log(impulse),
             log_peak=np.log(peak),
             area_m2=points.area_m2,
