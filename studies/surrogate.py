@@ -1,12 +1,12 @@
 """The surrogate of gas dynamics: blasts to fit it to, the fit, and whether a search exploits it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shlex import join
 from statistics import fmean, median
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Annotated, Final
 
 import numpy as np
@@ -308,6 +308,9 @@ def judge(
 @app.command()
 def compare(
     surrogates: Annotated[list[Path], typer.Argument(help="What `fit` wrote; the first leads.")],
+    run: Annotated[
+        list[Path] | None, typer.Option(help="Run folders of agents: alone, and their draws.")
+    ] = None,
     cases: Annotated[int, typer.Option(min=2, help="Sites of the league's item_sites.")] = 48,
     threats: Annotated[int, typer.Option(min=1, help="Held-out threats of each.")] = 2,
     changes: Annotated[
@@ -319,54 +322,104 @@ def compare(
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
 ) -> None:
-    """Let gas dynamics judge what surrogates propose on unseen sites, paired case by case.
+    """Let gas dynamics judge what surrogates and agents propose on unseen sites, case by case.
 
-    The best rule of a case is the best by the blasts that judge it: it is chosen afterwards.
+    No proposal takes a blast. The best rule of a case is the best by the blasts that judge it: it
+    is chosen afterwards.
     """
     with user_errors():
-        loaded = [(path.stem, load_surrogate(path)) for path in surrogates]
-        pairs = [(*each, most) for each in loaded for most in changes or (300,)]
-        names = [f"{stem}, {most:,} changes" for stem, _, most in pairs]
-        searches = [LearntSearch(each, changes=most) for _, each, most in pairs]
+        searches = dict(_searches(surrogates, run or (), changes or (300,)))
         (track,) = find_tracks("item_sites", cases, threats, noisy=False)
-        found, promised, ruled = [], [], []
+        check_runs([TrainedRun.load(each) for each in run or ()], [track])
+        found: list[Compared] = []
         with progress_bar(track.title) as progress:
             for case in track.cases:
                 evaluator = BlastEvaluator(case.scenario, "gas", cache=cache)
-                layouts = [search.at_once(case.scenario) for search in searches]
-                ways = list(layouts_by_rule(case.scenario).values()) if rules else []
-                gains = reductions_of(evaluator, case, [*layouts, *ways], processes)
-                found.append(gains[: len(layouts)])
-                ruled.append(max(gains[len(layouts) :], default=0.0))
-                promised.append(
-                    [promise(*each, case) for each in zip(searches, layouts, strict=True)]
-                )
+                found.append(compared([*searches.values()], evaluator, case, rules, processes))
                 progress(len(found) / len(track.cases))
-    percent = [*(100.0 * np.transpose(found))]
-    promises = 100.0 * np.mean(promised, axis=0)
-    rows = [
-        (
-            name,
-            _interval(mean_estimate(own)),
-            f"{share:.1f} %",
-            f"{own.min():.1f} %",
-            _interval(mean_estimate(percent[0] - own)) if own is not percent[0] else "",
+    first, *_ = searches
+    leader = 100.0 * np.array([each.reductions[0] for each in found])
+    rows = []
+    for number, (name, search) in enumerate(searches.items()):
+        own = 100.0 * np.array([each.reductions[number] for each in found])
+        promised = 100.0 * fmean(each.promised[number] for each in found)
+        rows.append(
+            (
+                name,
+                _interval(mean_estimate(own)),
+                "" if search.surrogate is None else f"{promised:.1f} %",
+                f"{own.min():.1f} %",
+                f"{median(each.ms[number] for each in found):.0f}",
+                _interval(mean_estimate(leader - own)) if number else "",
+            )
         )
-        for name, own, share in zip(names, percent, promises, strict=True)
-    ]
     if rules:
-        best = 100.0 * np.array(ruled)
-        lead = _interval(mean_estimate(percent[0] - best))
-        own = _interval(mean_estimate(best))
-        rows.append(("best rule of each case", own, "", f"{best.min():.1f} %", lead))
-    first = f"{names[0]}, less this"
-    headers = ("surrogate", "reduction", "it promised", "worst case", first)
+        best = 100.0 * np.array([each.rule for each in found])
+        lead = _interval(mean_estimate(leader - best))
+        own_best = _interval(mean_estimate(best))
+        rows.append(("best rule of each case", own_best, "", f"{best.min():.1f} %", "", lead))
+    headers = ("proposed by", "reduction", "it promised", "worst case", "ms", f"{first}, less this")
     print_line(markdown_table(headers, rows))
+
+
+def _searches(
+    surrogates: Sequence[Path], runs: Sequence[Path], changes: Sequence[int]
+) -> Iterator[tuple[str, LearntSearch]]:
+    """Yield what proposes, by name."""
+    loaded = [(path.stem, load_surrogate(path)) for path in surrogates]
+    for stem, surrogate in loaded:
+        for most in changes:
+            yield f"{stem}, {most:,} changes", LearntSearch(surrogate, changes=most)
+    for run in runs:
+        agent, (_, leader) = load_agent(run), loaded[0]
+        yield f"agent {run.name}", LearntSearch(agent=agent)
+        yield f"agent {run.name}, ranked draws", LearntSearch(leader, agent)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What gas dynamics says on one case; shares of the load without a barrier.
+
+    Attributes:
+        reductions: Of each proposal.
+        promised: What the surrogate said of it; of an agent's, 0.
+        ms: Processor time that each took.
+        rule: Of the best rule; 0 if none was asked for.
+    """
+
+    reductions: Sequence[float]
+    promised: Sequence[float]
+    ms: Sequence[float]
+    rule: float
+
+
+def compared(
+    searches: Sequence[LearntSearch],
+    evaluator: BlastEvaluator,
+    case: Case,
+    rules: bool,
+    processes: int,
+) -> Compared:
+    """Judge what is proposed for a case, and every rule if asked for."""
+    layouts, ms = [], []
+    for search in searches:
+        began_s = process_time()
+        layouts.append(search.at_once(case.scenario))
+        ms.append(MS_PER_S * (process_time() - began_s))
+    ways = [*layouts_by_rule(case.scenario).values()] if rules else []
+    gains = reductions_of(evaluator, case, [*layouts, *ways], processes)
+    return Compared(
+        reductions=gains[: len(layouts)],
+        promised=[promise(*each, case) for each in zip(searches, layouts, strict=True)],
+        ms=ms,
+        rule=max(gains[len(layouts) :], default=0.0),
+    )
 
 
 def promise(search: LearntSearch, layout: Layout, case: Case) -> float:
     """Return by which share a surrogate says that a layout lowers the load that counts."""
-    assert search.surrogate is not None
+    if search.surrogate is None:
+        return 0.0
     bare, guessed = Guesses.of(search.surrogate, case).loads([(), layout])
     return float(1.0 - guessed / bare)
 

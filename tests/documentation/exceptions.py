@@ -234,12 +234,12 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.surrogate fit --out surrogate.json": (
         "--data docs/data/site_blasts.parquet --epochs 1 --no-check"
     ),
-    "python -m studies.surrogate_limits --seeds 1": (
+    "python -m studies.surrogate_limits --seeds 1 --sites 546": (
         "--data docs/data/site_blasts.parquet --sites 4 --epochs 1"
     ),
     "python -m studies.surrogate fit --data docs/data/site_blasts.parquet --no-check"
     " --out few.json": "--epochs 1",
-    "python -m studies.surrogate compare surrogate.json few.json --rules": (
+    "python -m studies.surrogate compare surrogate.json few.json --run out/sites --rules": (
         "--cases 2 --threats 1 --changes 0"
     ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
@@ -287,12 +287,6 @@ SMALLER: Final[dict[str, str]] = {
     " --set cases_per_round=100 --set samples=4 --set neighbours=1 --set borrowed=0"
     " --set hidden_threats=1 --set first_updates=1 --set updates=1 --set evaluation_interval=100"
     " --set evaluation_cases=2 --run out/sites_on": _LABEL,
-    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet"
-    " --data docs/data/site_agent_blasts.parquet --no-check --out sites_on.json": "--epochs 1",
-    "blast-env train --algo maskable_ppo --engine sites_on.json --scenario item_sites --threat"
-    " hidden --start-from out/sites_ppo --envs 1 --steps 30720 --seed 1 --set hidden_threats=4"
-    " --set learning_rate=5.0e-4 --set n_steps=480 --set evaluation_interval=16"
-    " --set evaluation_cases=12 --run out/sites_on_ppo": _TRAIN_SITES,
     "blast-env league --engine gas --first-engine event --track known --scenario courtyard"
     " --cases 3 --seeds 1 --methods annealing --budgets 50 --out out/first_engine": (
         "--cases 1 --budgets 3"
