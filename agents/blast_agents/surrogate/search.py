@@ -18,6 +18,7 @@ from blast_agents.search.problem import (
 )
 from blast_agents.search.registry import layouts_by_rule
 from blast_agents.search.session import Plan, Search, SearchSession
+from blast_agents.surrogate.correction import Correction
 from blast_agents.surrogate.network import Surrogate, packaged_surrogate
 from blast_agents.surrogate.walls import SurrogateSite, site_of
 from blast_env.arrays import FloatArray
@@ -132,10 +133,11 @@ class LearntSearch(Search):
 
     With blasts a surrogate says what gets one: first what the agent proposes, then the rules'
     layouts and the best that a search by guesses alone has found, in turn; then changes of the best
-    by blasts, of which it picks one out of many. Against a hidden charge layouts meet a few places
-    alone. The guesses under all places, times the ratio of blast and guess under those few, tell
-    more of a layout than its loads there: they decide what is changed, and what meets the other
-    places in the end.
+    by blasts, of which it picks one out of many. What it picks is by guesses that are corrected by
+    how far it was off on layouts that are alike (`Correction`). Against a hidden charge layouts
+    meet a few places alone. The guesses under all places, times the ratio of blast and guess under
+    those few, tell more of a layout than its loads there: they decide what is changed, and what
+    meets the other places in the end.
 
     An agent without a surrogate gets its blasts for what it proposes and draws and for the rules;
     then for changes of the best of these, the better ones more often, by one or two moves.
@@ -273,18 +275,21 @@ class LearntSearch(Search):
         share = max(1, round(self.guessed_share * layouts))
         ruled = sorted(rules, key=lambda layout: guesses.loads([layout]).item())
         ruled = ruled[: ceil(layouts / _LAYOUTS_A_RULE)]
-        for first, second in zip(found[:share], [*ruled, *found[share:]], strict=False):
-            session.assess([first])
-            session.assess([second])
-        moves = Moves(scenario)
-        tried: set[Layout] = set(estimates.ranked())
-        while True:
-            best = estimates.ranked()[:_KEPT]
-            changed = [moves.near_best(best, session.rng) for _ in range(self.drawn)]
-            new = [each for each in dict.fromkeys(changed) if each not in tried] or changed
-            chosen = new[int(guesses.loads(new).argmin())]
+        tried = {*proposed[:1]}
+
+        def try_best(candidates: Sequence[Layout]) -> None:
+            new = [each for each in dict.fromkeys(candidates) if each not in tried]
+            chosen = estimates.likeliest(new or candidates)
             tried.add(chosen)
             session.assess([chosen])
+
+        for number in range(share):
+            try_best(found[:_POOL])
+            try_best(ruled[number : number + 1] or found[:_POOL])
+        moves = Moves(scenario)
+        while True:
+            best = estimates.ranked()[:_KEPT]
+            try_best([moves.near_best(best, session.rng) for _ in range(self.drawn)])
 
 
 def packaged_search() -> LearntSearch:
@@ -315,6 +320,12 @@ _LAYOUTS_A_RULE: Final = 8
 
 _LEAST_PLACES: Final = 4
 """Of a hidden charge, that a layout meets before it is said how wrong the surrogate is of it."""
+
+_POOL: Final = 64
+"""Of what is liked best by guesses alone, so many may get a blast."""
+
+_HOPE: Final = 0.5
+"""How many standard deviations less than expected is hoped for of a layout that gets a blast."""
 
 _CHOOSING_SHARE: Final = 0.4
 """Of the blasts, for the places of a hidden charge that the best layouts have not met."""
@@ -351,6 +362,22 @@ class _Estimates:
         layouts = self.session.ranked(self.session.plan.threats)
         if not layouts:
             return []
-        wrong_by = self.session.assess(layouts) / self.met.loads(layouts)
+        wrong_by = np.exp(self._errors(layouts))
         order = np.argsort(wrong_by * self.everywhere.loads(layouts), kind="stable")
         return [layouts[index] for index in order.tolist()]
+
+    def likeliest(self, layouts: Sequence[Layout]) -> Layout:
+        """Return the layout that most likely lets the least through, by guesses and all blasts."""
+        scores = np.log(self.everywhere.loads(layouts))
+        met = self.session.ranked(self.session.plan.threats)
+        if met:
+            barrier = self.everywhere.site.barrier
+            correction = Correction.of([barrier(each) for each in met], self._errors(met))
+            mean, spread = correction.expected([barrier(each) for each in layouts])
+            scores += mean - _HOPE * spread
+        return layouts[int(scores.argmin())]
+
+    def _errors(self, layouts: Sequence[Layout]) -> FloatArray:
+        """Return logarithms of loads under the first threats over those guessed (layouts,)."""
+        errors: FloatArray = np.log(self.session.assess(layouts) / self.met.loads(layouts))
+        return errors

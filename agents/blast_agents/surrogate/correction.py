@@ -1,0 +1,89 @@
+"""How far guesses are off, as told by the blasts of a search on layouts that are alike."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+
+_OWN_SHARE: Final = 0.05
+"""Of the variance of errors, what a layout does not have in common with any other."""
+
+_LEAST_SPREAD: Final = 0.01
+"""Errors of guesses are taken to differ by so much at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """Errors of guesses as a Gaussian process: layouts have the more in common the more they share.
+
+    The covariance of two layouts falls exponentially with the volume that only one of them fills
+    (`apart_m3`), in units of the mean volume of a layout.
+
+    Attributes:
+        barriers: What each layout with a blast sets down: `SurrogateSite.barrier`.
+        mean: Of the errors.
+        spread: Their standard deviation.
+        length_m3: Volume over which the covariance falls by a factor of e.
+        weights: Inverse of the covariance, times the errors less their mean (layouts,).
+        inverse: Inverse of the covariance (layouts, layouts).
+    """
+
+    barriers: Sequence[FloatArray]
+    mean: float
+    spread: float
+    length_m3: float
+    weights: FloatArray
+    inverse: FloatArray
+
+    @classmethod
+    def of(cls, barriers: Sequence[FloatArray], errors: FloatArray) -> "Correction":
+        """Learn from blasts.
+
+        Args:
+            barriers: What each layout sets down.
+            errors: Logarithm of load by gas dynamics over the load that was guessed (layouts,).
+        """
+        volumes_m3 = [_volume_m3(each) for each in barriers]
+        length_m3 = max(float(np.mean(volumes_m3)), 1.0)
+        covariance = np.exp(-_all_apart_m3(barriers, barriers) / length_m3)
+        covariance += _OWN_SHARE * np.eye(len(barriers))
+        inverse = np.linalg.inv(covariance)
+        mean = float(errors.mean())
+        spread = max(float(errors.std()), _LEAST_SPREAD)
+        return cls(barriers, mean, spread, length_m3, inverse @ (errors - mean), inverse)
+
+    def expected(self, barriers: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return mean and standard deviation of the errors of guesses for layouts (layouts,)."""
+        alike = np.exp(-_all_apart_m3(barriers, self.barriers) / self.length_m3)
+        known = np.einsum("ln,nm,lm->l", alike, self.inverse, alike)
+        left = np.sqrt(np.maximum(1.0 - known, 0.0))
+        return self.mean + alike @ self.weights, self.spread * left
+
+
+def apart_m3(one: FloatArray, other: FloatArray) -> float:
+    """Return the volume that only one of two barriers fills.
+
+    Args:
+        one: Left, bottom, right, top and height of each piece, m (pieces, 5).
+        other: The same of the other.
+    """
+    low = np.maximum(one[:, np.newaxis, :2], other[:, :2])
+    high = np.minimum(one[:, np.newaxis, 2:4], other[:, 2:4])
+    sides_m = np.maximum(high - low, 0.0)
+    heights_m = np.minimum(one[:, np.newaxis, 4], other[:, 4])
+    both_m3 = (sides_m[..., 0] * sides_m[..., 1] * heights_m).sum()
+    return float(_volume_m3(one) + _volume_m3(other) - 2.0 * both_m3)
+
+
+def _volume_m3(barrier: FloatArray) -> float:
+    sides_m = barrier[:, 2:4] - barrier[:, :2]
+    return float((sides_m[:, 0] * sides_m[:, 1] * barrier[:, 4]).sum())
+
+
+def _all_apart_m3(some: Sequence[FloatArray], others: Sequence[FloatArray]) -> FloatArray:
+    """Return `apart_m3` of each with each (some, others)."""
+    found = [[apart_m3(one, other) for other in others] for one in some]
+    return np.array(found).reshape(len(some), len(others))
