@@ -549,7 +549,7 @@ def test_lines_of_sight_go_over_it_or_stop_at_it() -> None:
 
 
 def test_the_surrogate_meets_boxes_from_the_ground_up() -> None:
-    site, charge = site_of(terraced()), Charge((2.0, 6.0), 5.0)
+    site, charge = site_of(terraced()), Charge((2.0, 6.0), 50.0)
     assert site.barrier(WALL)[:, 4].tolist() == [2.0, 2.0]
     open_pa_s, behind_pa_s = packaged_surrogate().guess(site, [(), WALL], [charge] * 2).loads(site)
     assert 0.0 < behind_pa_s < open_pa_s

@@ -324,6 +324,9 @@ _LEAST_PLACES: Final = 4
 _POOL: Final = 64
 """Of what is liked best by guesses alone, so many may get a blast."""
 
+_LEAST_SHARE: Final = 1e-3
+"""Of a guess; particles may all miss, and then there is no load at all."""
+
 _HOPE: Final = 0.5
 """How many standard deviations less than expected is hoped for of a layout that gets a blast."""
 
@@ -379,5 +382,6 @@ class _Estimates:
 
     def _errors(self, layouts: Sequence[Layout]) -> FloatArray:
         """Return logarithms of loads under the first threats over those guessed (layouts,)."""
-        errors: FloatArray = np.log(self.session.assess(layouts) / self.met.loads(layouts))
+        shares = self.session.assess(layouts) / self.met.loads(layouts)
+        errors: FloatArray = np.log(np.maximum(shares, _LEAST_SHARE))
         return errors
