@@ -324,6 +324,9 @@ _LEAST_PLACES: Final = 4
 _POOL: Final = 64
 """Of what is liked best by guesses alone, so many may get a blast."""
 
+_LEARNT_FROM: Final = 64
+"""The correction is learnt from so many of the best layouts: its cost grows with the cube."""
+
 _LEAST_SHARE: Final = 1e-3
 """Of a guess; particles may all miss, and then there is no load at all."""
 
@@ -372,7 +375,7 @@ class _Estimates:
     def likeliest(self, layouts: Sequence[Layout]) -> Layout:
         """Return the layout that most likely lets the least through, by guesses and all blasts."""
         scores = np.log(self.everywhere.loads(layouts))
-        met = self.session.ranked(self.session.plan.threats)
+        met = self.session.ranked(self.session.plan.threats)[:_LEARNT_FROM]
         if met:
             barrier = self.everywhere.site.barrier
             correction = Correction.of([barrier(each) for each in met], self._errors(met))
