@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 from blast_agents.search import proposers
 
 from blast_env.cli.command import FOLDER, option
-from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions, ProcessOptions, running_on
+from blast_env.cli.options import (
+    CELL_HELP,
+    CELLS_HELP,
+    ENGINE_HELP,
+    ClusterOptions,
+    ProcessOptions,
+    running_on,
+)
 from blast_env.cli.output import (
     print_line,
     print_table,
@@ -78,6 +85,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         "guided by it, too.",
     )
     cell_m: float | None = option(None, CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
 
     def how_to_resume(self) -> str:
         """Return how to go on after Ctrl-C."""
@@ -91,7 +99,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         from blast_agents.surrogate import load_surrogate
 
         with running_on(self.cluster):
-            engine = find_engine(self.engine, self.cell_m)
+            engine = find_engine(self.engine, self.cell_m, cells=self.cells)
             tracks = find_tracks(
                 self.track, self.cases, self.seeds, self.seed, self.scenario, noisy=engine.has_noise
             )

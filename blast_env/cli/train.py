@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from blast_env.cli.command import FOLDER, option, options_of
-from blast_env.cli.options import CELL_HELP, ENGINE_HELP, ClusterOptions, running_on
+from blast_env.cli.options import CELL_HELP, CELLS_HELP, ENGINE_HELP, ClusterOptions, running_on
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
     print_line,
@@ -63,6 +63,7 @@ class TrainCommand(ClusterOptions):
         None, f"{ENGINE_HELP} surrogate guesses them.", show_default="event"
     )
     cell_m: float | None = option(None, CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     observation: str | None = option(
         None,
         "What the agent sees: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
@@ -128,7 +129,7 @@ class TrainCommand(ClusterOptions):
         changes = parse_options(self.changes, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
         if self.observation in _POLICIES:
             changes.setdefault("policy", _POLICIES[self.observation])
-        names = ("steps", "seed", "threat", "engine", "observation", "cell_m")
+        names = ("steps", "seed", "threat", "engine", "observation", "cell_m", "cells")
         given = {name: getattr(self, name) for name in names}
         values = {name: value for name, value in given.items() if value is not None}
         values["start_from"] = None if self.start_from is None else str(self.start_from)

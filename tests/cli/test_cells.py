@@ -81,13 +81,20 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
         return start_on(self, *arguments)
 
     monkeypatch.setattr(GasEngine, "start_on", watched)
+    small = ("n_steps=4", "batch_size=4", "n_epochs=1", "evaluation_cases=2")
+    settings = [text for each in small for text in ("--set", each)]
+    trained: tuple[str | Path, ...] = ("--scenario", site, "--engine", "gas", *settings)
+    played = ("--scenario", site, "--engine", "gas", "--methods", "random", "--budgets", 1)
     searched = ("--scenario", site, "--engine", "gas", "--method", "random", "--budget", 1)
-    for arguments in (
+    commands: tuple[tuple[str | Path | float, ...], ...] = (
         ("simulate", site, "--engine", "gas"),
         ("search", *searched, "--held-out", 1, "--out", tmp_path / "found"),
         ("assess", site),
         ("propose", site, "--verify", "--budget", 2),
-    ):
+        ("train", *trained, "--run", tmp_path / "run", "--envs", 1, "--steps", 4),
+        ("league", *played, "--out", tmp_path / "league", "--cases", 2, "--seeds", 1),
+    )
+    for arguments in commands:
         used.clear()
         result = run(*arguments, "--cells", "coarse")
         assert result.exit_code == 0, result.output

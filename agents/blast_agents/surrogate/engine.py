@@ -116,17 +116,18 @@ def is_surrogate(name: str) -> bool:
     return name == SURROGATE or Path(name).suffix == ".json"
 
 
-def engine_to_train_on(name: str, cell_m: float | None = None) -> Engine:
+def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None = None) -> Engine:
     """Return an engine by its name; beside the usual ones there is `"surrogate"`.
 
     Args:
         name: The name, or a surrogate's file (.json).
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
+        cells: How they grow; as the engine's unless given.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
         BlastEnvError: If it has no such cells, or the file is no surrogate.
     """
     if Path(name).suffix == ".json":
-        return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m)
-    return find_engine(name, cell_m)
+        return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m, cells=cells)
+    return find_engine(name, cell_m, cells=cells)

@@ -62,6 +62,7 @@ class TrainingSettings(BaseModel):
         engine: Engine that runs the blasts; or `"surrogate"`, guesses instead of blasts (that
             of the package; or a surrogate's file).
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
+        cells: How they grow: `"uniform"`, `"coarse"` or `"fine"`; as the engine's unless given.
         observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
         hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
             same for any number; with few, more layouts are tried for the same number of blasts.
@@ -84,6 +85,7 @@ class TrainingSettings(BaseModel):
     threat: Literal["visible", "hidden"] = "visible"
     engine: str = "event"
     cell_m: Annotated[float, Field(gt=0.0)] | None = None
+    cells: str | None = None
     observation: Literal["grid", "grid_with_load", "image", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
@@ -115,7 +117,7 @@ class TrainingSettings(BaseModel):
             UnknownNameError: If there is no engine of that name.
             BlastEnvError: If it has no such cells.
         """
-        return engine_to_train_on(self.engine, self.cell_m)
+        return engine_to_train_on(self.engine, self.cell_m, self.cells)
 
     @property
     def guesses(self) -> bool:
