@@ -23,6 +23,7 @@ from blast_env.provenance import versions
 from blast_env.recording.parquet import write_table
 from blast_env.scenario import Scenario, bundled_scenarios
 from blast_env.sites import (
+    CLOSE_SIDES_M,
     FAMILIES,
     HELD_OUT_SITES,
     ITEM_SITES,
@@ -58,8 +59,6 @@ SITE_NAME: Final = "item_sites/"
 _SIZED: Final = {"close_sites": close_ranges, LARGE_SITES: large_ranges}
 """Families with sites of any side within bounds: the side follows, and then the seed."""
 
-_MOST_CLOSE_M: Final = 24.0
-
 
 def site_name(seed: int, side_m: float | None = None) -> str:
     """Return what a generated site is called in the table.
@@ -71,7 +70,7 @@ def site_name(seed: int, side_m: float | None = None) -> str:
     """
     if side_m is None:
         return f"{SITE_NAME}{seed}"
-    family = "close_sites" if side_m <= _MOST_CLOSE_M else LARGE_SITES
+    family = "close_sites" if side_m <= CLOSE_SIDES_M[1] else LARGE_SITES
     return f"{family}/{side_m:g}/{seed}"
 
 

@@ -1,6 +1,6 @@
 """The surrogate of gas dynamics: blasts to fit it to, the fit, and whether a search exploits it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -49,7 +49,6 @@ DATA: Final = tuple(
 
 _FOLDS: Final = 5
 _MOST_DRAWN: Final = 10_000
-_CHANGES: Final = 300
 _EVERY: Final = 10
 
 Processes = Annotated[int, typer.Option(min=1)]
@@ -67,6 +66,7 @@ def blasts(
     rules: Annotated[int, typer.Option(min=0, help="Most layouts by rules, drawn.")] = 20,
     surrogate: Annotated[Path | None, typer.Option(help="Whose favourites are tried.")] = None,
     favourites: Annotated[int, typer.Option(min=1, help="How many of those.")] = 3,
+    changes: Annotated[int, typer.Option(min=1, help="Layouts that it looks at for them.")] = 300,
     threats: Annotated[int, typer.Option(min=1, help="Charges on each.")] = 1,
     cells: Annotated[str | None, typer.Option(help="uniform, coarse or fine.")] = None,
     cache: Annotated[Path, typer.Option(help="Folder in which they are kept.")] = Path(
@@ -82,7 +82,7 @@ def blasts(
     with user_errors(), running_on(cluster):
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
-        recipe = Recipe(layouts, rules, liked, favourites)
+        recipe = Recipe(layouts, rules, liked, favourites, changes)
         names = [site_name(HELD_OUT_SITES + first + number, side) for number in range(sites)]
         engine = find_engine("gas", cells=cells)
         run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, cache=cache)
@@ -100,12 +100,14 @@ class Recipe:
         surrogate: Whose favourites are tried.
         favourites: How many of them: the best that a search by its guesses has met, the tenth, the
             twentieth and so on, for those next to each other are much alike.
+        changes: Layouts that this search looks at, beside the rules'.
     """
 
     layouts: int = 12
     rules: int = 20
     surrogate: Surrogate | None = None
     favourites: int = 3
+    changes: int = 300
 
     def of(self, site: Scenario, threat: Threat, seed: int) -> list[Layout]:
         """Return them, the empty one first."""
@@ -126,7 +128,7 @@ class Recipe:
                 found.append(layout)
         if self.surrogate is not None:
             guesses = Guesses.of(self.surrogate, Case(site, (threat,), charge=threat.charge))
-            liked = improved(guesses, [(), *ruled], _CHANGES, rng)
+            liked = improved(guesses, [(), *ruled], self.changes, rng)
             found += liked[: _EVERY * self.favourites : _EVERY]
         return list(dict.fromkeys(tuple(sorted(each)) for each in found))
 
@@ -240,10 +242,14 @@ class LayoutsJudged:
 
 
 def verdict(
-    search: LearntSearch, evaluator: BlastEvaluator, threat: Threat, processes: int = 1
+    surrogate: Surrogate,
+    changes: int,
+    evaluator: BlastEvaluator,
+    threat: Threat,
+    processes: int = 1,
 ) -> LayoutsJudged:
-    """Judge what the surrogate proposes against a charge, and the rules' layouts."""
-    scenario = evaluator.scenario
+    """Judge what the surrogate proposes after some changes, and the rules' layouts."""
+    scenario, search = evaluator.scenario, LearntSearch(surrogate, changes=changes)
     began_s = perf_counter()
     proposed = search.at_once(scenario, threat.charge)
     ms = MS_PER_S * (perf_counter() - began_s)
@@ -252,7 +258,7 @@ def verdict(
     reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
     return LayoutsJudged(
         reduction=reduction,
-        promised=promise(search, proposed, case),
+        promised=promise(surrogate, proposed, case),
         rules=dict(zip(rules, ruled, strict=True)),
         ms=ms,
     )
@@ -289,8 +295,7 @@ def judge(
     A surrogate that is exploited promises more than gas dynamics gives.
     """
     with user_errors(), running_on(cluster):
-        search = LearntSearch(load_surrogate(surrogate), changes=changes)
-        rows = []
+        loaded, rows = load_surrogate(surrogate), []
         for name in scenarios:
             scenario = load_scenario(name)
             evaluator = BlastEvaluator(scenario, "gas", cache=cache)
@@ -298,7 +303,7 @@ def judge(
             found = []
             with progress_bar(scenario.name) as progress:
                 for done, threat in enumerate(threats, start=1):
-                    found.append(verdict(search, evaluator, threat, processes))
+                    found.append(verdict(loaded, changes, evaluator, threat, processes))
                     progress(done / len(threats))
             rows.append(_verdict_row(scenario.name, found))
     headers = ("scenario", "surrogate", "it promised", "best rule each", "best single rule", "ms")
@@ -340,14 +345,13 @@ def compare(
     first, *_ = searches
     leader = 100.0 * np.array([each.reductions[0] for each in found])
     rows = []
-    for number, (name, search) in enumerate(searches.items()):
+    for number, name in enumerate(searches):
         own = 100.0 * np.array([each.reductions[number] for each in found])
-        promised = 100.0 * fmean(each.promised[number] for each in found)
         rows.append(
             (
                 name,
                 _interval(mean_estimate(own)),
-                "" if search.surrogate is None else f"{promised:.1f} %",
+                _mean_promise(each.promised[number] for each in found),
                 f"{own.min():.1f} %",
                 f"{median(each.ms[number] for each in found):.0f}",
                 _interval(mean_estimate(leader - own)) if number else "",
@@ -382,13 +386,13 @@ class Compared:
 
     Attributes:
         reductions: Of each proposal.
-        promised: What the surrogate said of it; of an agent's, 0.
+        promised: What the surrogate said of it; `None` of an agent's own.
         ms: Processor time that each took.
         rule: Of the best rule; 0 if none was asked for.
     """
 
     reductions: Sequence[float]
-    promised: Sequence[float]
+    promised: Sequence[float | None]
     ms: Sequence[float]
     rule: float
 
@@ -410,18 +414,24 @@ def compared(
     gains = reductions_of(evaluator, case, [*layouts, *ways], processes)
     return Compared(
         reductions=gains[: len(layouts)],
-        promised=[promise(*each, case) for each in zip(searches, layouts, strict=True)],
+        promised=[
+            None if search.surrogate is None else promise(search.surrogate, layout, case)
+            for search, layout in zip(searches, layouts, strict=True)
+        ],
         ms=ms,
         rule=max(gains[len(layouts) :], default=0.0),
     )
 
 
-def promise(search: LearntSearch, layout: Layout, case: Case) -> float:
+def promise(surrogate: Surrogate, layout: Layout, case: Case) -> float:
     """Return by which share a surrogate says that a layout lowers the load that counts."""
-    if search.surrogate is None:
-        return 0.0
-    bare, guessed = Guesses.of(search.surrogate, case).loads([(), layout])
+    bare, guessed = Guesses.of(surrogate, case).loads([(), layout])
     return float(1.0 - guessed / bare)
+
+
+def _mean_promise(shares: Iterable[float | None]) -> str:
+    known = [each for each in shares if each is not None]
+    return f"{100.0 * fmean(known):.1f} %" if known else ""
 
 
 def _interval(estimate: Estimate) -> str:

@@ -10,7 +10,12 @@ from blast_env.sites.criterion import (
     visibility_layout,
 )
 from blast_env.sites.generate import draw_site, generate_site
-from blast_env.sites.item_sites import ItemSiteRanges, close_ranges, large_ranges
+from blast_env.sites.item_sites import (
+    CLOSE_SIDES_M,
+    ItemSiteRanges,
+    close_ranges,
+    large_ranges,
+)
 from blast_env.sites.ranges import SiteRanges
 from blast_env.sites.source import (
     FAMILIES,
@@ -21,6 +26,7 @@ from blast_env.sites.source import (
 from blast_env.sites.turning import turned
 
 __all__ = [
+    "CLOSE_SIDES_M",
     "FAMILIES",
     "HELD_OUT_SITES",
     "ITEM_SITES",

@@ -194,7 +194,9 @@ class ItemSiteRanges:
 LARGE_SIDE_M: Final = 60.0
 """Side of the sites of `large_sites`."""
 
-_CLOSE_SIDES_M: Final = (16.0, 24.0)
+CLOSE_SIDES_M: Final = (16.0, 24.0)
+"""Least and largest side of a site of `close_ranges`."""
+
 _LARGE_SIDES_M: Final = (40.0, 100.0)
 
 
@@ -209,7 +211,7 @@ def close_ranges(side_m: float) -> ItemSiteRanges:
     Raises:
         BlastEnvError: If the side is out of bounds.
     """
-    _check_side(side_m, _CLOSE_SIDES_M)
+    _check_side(side_m, CLOSE_SIDES_M)
     return ItemSiteRanges(
         side_m=side_m,
         air_height_m=12.0,

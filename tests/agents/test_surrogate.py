@@ -776,7 +776,7 @@ def test_what_the_surrogate_picks_from_draws_is_what_it_likes_best_of_just_these
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:
     evaluator = BlastEvaluator(YARD, FAST)
     agent, threat = LearntSearch(by_hand(), changes=2), draw_threats(YARD, [3])[0]
-    found = verdict(agent, evaluator, threat)
+    found = verdict(by_hand(), 2, evaluator, threat)
     bare = evaluator.loads((), threat).protected_impulse_pa_s
     proposed = evaluator.loads(agent.at_once(YARD, threat.charge), threat)
     assert found.reduction == pytest.approx(1.0 - proposed.protected_impulse_pa_s / bare)
