@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from blast_agents.surrogate.correction import Correction, apart_m3
+from blast_agents.surrogate.correction import Correction, stacked
+from blast_agents.surrogate.correction import apart_m3 as apart_from_all_m3
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +15,12 @@ NOTHING = np.empty((0, 5))
 def walls(*lefts_m: float, height_m: float = 2.0) -> FloatArray:
     """Return walls of 3 m by 0.5 m that begin so far from the left border."""
     return np.array([[left, 0.0, left + 3.0, 0.5, height_m] for left in lefts_m]).reshape(-1, 5)
+
+
+def apart_m3(one: FloatArray, other: FloatArray) -> float:
+    """Return the volume that only one of two barriers fills; the other is met among more."""
+    _, own, _ = apart_from_all_m3(one, stacked([NOTHING, other, walls(1.0, 5.0, 9.0)]))
+    return float(own)
 
 
 def test_the_volume_that_only_one_of_two_barriers_fills() -> None:

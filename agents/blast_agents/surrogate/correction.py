@@ -23,7 +23,7 @@ class Correction:
     (`apart_m3`), in units of the mean volume of a layout.
 
     Attributes:
-        barriers: What each layout with a blast sets down: `SurrogateSite.barrier`.
+        barriers: What each layout with a blast sets down (layouts, pieces, 5).
         mean: Of the errors.
         spread: Their standard deviation.
         length_m3: Volume over which the covariance falls by a factor of e.
@@ -31,7 +31,7 @@ class Correction:
         inverse: Inverse of the covariance (layouts, layouts).
     """
 
-    barriers: Sequence[FloatArray]
+    barriers: FloatArray
     mean: float
     spread: float
     length_m3: float
@@ -43,47 +43,56 @@ class Correction:
         """Learn from blasts.
 
         Args:
-            barriers: What each layout sets down.
+            barriers: What each layout sets down: `SurrogateSite.barrier`.
             errors: Logarithm of load by gas dynamics over the load that was guessed (layouts,).
         """
-        volumes_m3 = [_volume_m3(each) for each in barriers]
-        length_m3 = max(float(np.mean(volumes_m3)), 1.0)
-        covariance = np.exp(-_all_apart_m3(barriers, barriers) / length_m3)
+        met = stacked(barriers)
+        length_m3 = max(float(np.mean(_volume_m3(met))), 1.0)
+        covariance = np.exp(-_all_apart_m3(met, met) / length_m3)
         covariance += _OWN_SHARE * np.eye(len(barriers))
         inverse = np.linalg.inv(covariance)
         mean = float(errors.mean())
         spread = max(float(errors.std()), _LEAST_SPREAD)
-        return cls(barriers, mean, spread, length_m3, inverse @ (errors - mean), inverse)
+        return cls(met, mean, spread, length_m3, inverse @ (errors - mean), inverse)
 
     def expected(self, barriers: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Return mean and standard deviation of the errors of guesses for layouts (layouts,)."""
-        alike = np.exp(-_all_apart_m3(barriers, self.barriers) / self.length_m3)
+        alike = np.exp(-_all_apart_m3(stacked(barriers), self.barriers) / self.length_m3)
         known = np.einsum("ln,nm,lm->l", alike, self.inverse, alike)
         left = np.sqrt(np.maximum(1.0 - known, 0.0))
         return self.mean + alike @ self.weights, self.spread * left
 
 
-def apart_m3(one: FloatArray, other: FloatArray) -> float:
-    """Return the volume that only one of two barriers fills.
+def apart_m3(one: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the volume that only one of two barriers fills (others,).
 
     Args:
         one: Left, bottom, right, top and height of each piece, m (pieces, 5).
-        other: The same of the other.
+        others: The same of each other barrier (others, pieces, 5).
     """
-    low = np.maximum(one[:, np.newaxis, :2], other[:, :2])
-    high = np.minimum(one[:, np.newaxis, 2:4], other[:, 2:4])
+    low = np.maximum(one[:, np.newaxis, :2], others[:, np.newaxis, :, :2])
+    high = np.minimum(one[:, np.newaxis, 2:4], others[:, np.newaxis, :, 2:4])
     sides_m = np.maximum(high - low, 0.0)
-    heights_m = np.minimum(one[:, np.newaxis, 4], other[:, 4])
-    both_m3 = (sides_m[..., 0] * sides_m[..., 1] * heights_m).sum()
-    return float(_volume_m3(one) + _volume_m3(other) - 2.0 * both_m3)
+    heights_m = np.minimum(one[:, np.newaxis, 4], others[:, np.newaxis, :, 4])
+    both_m3 = (sides_m[..., 0] * sides_m[..., 1] * heights_m).sum(axis=(1, 2))
+    return np.asarray(_volume_m3(one) + _volume_m3(others) - 2.0 * both_m3)
 
 
-def _volume_m3(barrier: FloatArray) -> float:
-    sides_m = barrier[:, 2:4] - barrier[:, :2]
-    return float((sides_m[:, 0] * sides_m[:, 1] * barrier[:, 4]).sum())
+def stacked(barriers: Sequence[FloatArray]) -> FloatArray:
+    """Return barriers as one array (barriers, pieces, 5); pieces without a volume fill it up."""
+    most = max((len(each) for each in barriers), default=0)
+    found = np.zeros((len(barriers), most, 5))
+    for own, each in zip(found, barriers, strict=True):
+        own[: len(each)] = each
+    return found
 
 
-def _all_apart_m3(some: Sequence[FloatArray], others: Sequence[FloatArray]) -> FloatArray:
+def _volume_m3(barriers: FloatArray) -> FloatArray:
+    sides_m = barriers[..., 2:4] - barriers[..., :2]
+    volumes_m3 = sides_m[..., 0] * sides_m[..., 1] * barriers[..., 4]
+    return np.asarray(volumes_m3.sum(axis=-1))
+
+
+def _all_apart_m3(some: FloatArray, others: FloatArray) -> FloatArray:
     """Return `apart_m3` of each with each (some, others)."""
-    found = [[apart_m3(one, other) for other in others] for one in some]
-    return np.array(found).reshape(len(some), len(others))
+    return np.array([apart_m3(each, others) for each in some]).reshape(len(some), len(others))
