@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Final
 
+import numpy as np
 import typer
 from blast_agents.training.cases import training_cases
 from blast_agents.training.run_folder import RunFolder
@@ -17,7 +18,7 @@ from blast_env import load_scenario
 from blast_env.cli.output import print_line, user_errors
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastKey, DiskCache, StructureLoad
+from blast_env.evaluation import BlastKey, DiskCache, StructureLoad, draw_threats
 from blast_env.files import make_folder
 from blast_env.provenance import versions
 from blast_env.recording.parquet import write_table
@@ -56,20 +57,40 @@ COLUMNS: Final = (
 SITE_NAME: Final = "item_sites/"
 """What the names of generated sites in the table begin with; their seed follows."""
 
-_SIZED: Final = {"close_sites": close_ranges, LARGE_SITES: large_ranges}
+FRONT_SITES: Final = "front_sites"
+"""Close sites of which only the walls that the blast comes from count, as on bundled ones."""
+
+_SIZED: Final = {
+    "close_sites": close_ranges,
+    FRONT_SITES: close_ranges,
+    LARGE_SITES: large_ranges,
+}
 """Families with sites of any side within bounds: the side follows, and then the seed."""
 
+_LEAST_SEEN_M: Final = 1.0
+"""A wall sees a charge that is farther out than this."""
 
-def site_name(seed: int, side_m: float | None = None) -> str:
+_OUTWARD: Final = {
+    "west": (-1.0, 0.0),
+    "east": (1.0, 0.0),
+    "south": (0.0, -1.0),
+    "north": (0.0, 1.0),
+}
+
+
+def site_name(seed: int, side_m: float | None = None, *, front: bool = False) -> str:
     """Return what a generated site is called in the table.
 
     Args:
         seed: Its seed.
         side_m: Its side, if it is of `close_ranges` or `large_ranges`; otherwise it is of
             `item_sites`.
+        front: Whether it is one of `front_only`, with a side.
     """
     if side_m is None:
         return f"{SITE_NAME}{seed}"
+    if front:
+        return f"{FRONT_SITES}/{side_m:g}/{seed}"
     family = "close_sites" if side_m <= CLOSE_SIDES_M[1] else LARGE_SITES
     return f"{family}/{side_m:g}/{seed}"
 
@@ -81,8 +102,30 @@ def scenario_of(name: str) -> Scenario:
     family, *numbers = name.split("/")
     if family in _SIZED and len(numbers) == 2:
         side_m, seed = numbers
-        return generate_site(int(seed), _SIZED[family](float(side_m)))
+        site = generate_site(int(seed), _SIZED[family](float(side_m)))
+        return front_only(site, one_wall=int(seed) % 2 == 1) if family == FRONT_SITES else site
     return load_scenario(name)
+
+
+def front_only(site: Scenario, one_wall: bool) -> Scenario:
+    """Return a site of whose structures only walls count that see its first threat.
+
+    Args:
+        site: The site; the first threat is that of seed 0.
+        one_wall: Whether it is the one that looks towards it most, of each structure.
+    """
+    (threat,) = draw_threats(site, [0])
+    place_m = np.array(threat.charge_against(site, ()).position_m)
+    structures = []
+    for each in site.structures:
+        left, bottom, right, top = each.rectangle_m
+        way_m = place_m - np.clip(place_m, (left, bottom), (right, top))
+        seen_m = {face: float(way_m @ _OUTWARD[face]) for face in each.faces}
+        most_m = max(seen_m.values())
+        least_m = most_m if one_wall else min(most_m, _LEAST_SEEN_M)
+        faces = tuple(face for face, far_m in seen_m.items() if far_m >= least_m)
+        structures.append(each.model_copy(update={"faces": faces}))
+    return site.model_copy(update={"structures": tuple(structures)})
 
 
 def main(
@@ -91,9 +134,13 @@ def main(
     sites: Annotated[
         int, typer.Option(min=0, help="Generated sites of the training's seeds, to name them.")
     ] = 0,
+    first: Annotated[int, typer.Option(min=0, help="How many of them are left out.")] = 0,
     side: Annotated[
         list[float] | None, typer.Option(help="As many of this side, m: 16 to 24, or 40 to 100.")
     ] = None,
+    front: Annotated[
+        bool, typer.Option("--front", help="Those of this side are `surrogate blasts --front`.")
+    ] = False,
     scenario: Annotated[
         list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")
     ] = None,
@@ -107,8 +154,8 @@ def main(
         known = (*bundled_scenarios(), *(scenario or ()))
         names = {load_scenario(name).content_hash: name for name in known}
         for side_m in (None, *(side or ())):
-            for number in range(sites):
-                name = site_name(HELD_OUT_SITES + number, side_m)
+            for seed in range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + sites):
+                name = site_name(seed, side_m, front=front)
                 names[scenario_of(name).content_hash] = name
         for folder in run or ():
             names |= _sites_of(folder)

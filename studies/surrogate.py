@@ -18,7 +18,7 @@ from blast_agents.league.trained import TrainedRun, check_runs
 from blast_agents.rules import random_layout
 from blast_agents.search import SamplingAgent, layouts_by_rule
 from blast_agents.search.moves import Moves, random_walls
-from blast_agents.surrogate.fitting import Samples, errors, fit, folds
+from blast_agents.surrogate.fitting import ErrorsOfBoth, Samples, errors, fit, folds
 from blast_agents.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_agents.surrogate.search import Guesses, LearntSearch, improved
 from blast_agents.training import load_agent
@@ -62,6 +62,9 @@ def blasts(
     side: Annotated[
         float | None, typer.Option(help="Their side, m: 16 to 24, or 40 to 100; else 26 m.")
     ] = None,
+    front: Annotated[
+        bool, typer.Option("--front", help="Only walls count that the blast comes from.")
+    ] = False,
     layouts: Annotated[int, typer.Option(min=0, help="Random ones, and changes of rules'.")] = 12,
     rules: Annotated[int, typer.Option(min=0, help="Most layouts by rules, drawn.")] = 20,
     surrogate: Annotated[Path | None, typer.Option(help="Whose favourites are tried.")] = None,
@@ -83,7 +86,10 @@ def blasts(
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
         recipe = Recipe(layouts, rules, liked, favourites, changes)
-        names = [site_name(HELD_OUT_SITES + first + number, side) for number in range(sites)]
+        if front and side is None:
+            raise BlastEnvError("--front needs --side, from 16 to 24 m")
+        seeds = range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + sites)
+        names = [site_name(seed, side, front=front) for seed in seeds]
         engine = find_engine("gas", cells=cells)
         run = partial(site_blasts, recipe=recipe, threats=threats, engine=engine, cache=cache)
         with progress_bar("sites") as progress:
@@ -198,9 +204,29 @@ def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
     out_of, *_ = folds(samples.site, _FOLDS, seed)
     found = errors(fit(samples, ~out_of, epochs, seed, about), samples, out_of)
     sites = len(np.unique(samples.site[out_of]))
+    print_line(_errors_table(found, f"{sites} held-out sites"))
+    impulse, peak = (
+        Check(rms=each.rms, rank=each.rank, lost=each.lost) for each in (found.impulse, found.peak)
+    )
+    return about.model_copy(update={"impulse": impulse, "peak": peak})
+
+
+@app.command()
+def check(
+    data: Annotated[list[Path], typer.Argument(help="Tables of blasts on other sites.")],
+    surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
+) -> None:
+    """Print how far a surrogate is off on sites of other tables than those it was fitted to."""
+    with user_errors():
+        samples = samples_of(named_rows(data))
+        found = errors(load_surrogate(surrogate), samples, np.ones(len(samples), dtype=bool))
+        print_line(_errors_table(found, f"{len(np.unique(samples.site))} other sites"))
+
+
+def _errors_table(found: ErrorsOfBoth, sites: str) -> str:
     rows = [
         (
-            f"{load} on {sites} held-out sites",
+            f"{load} on {sites}",
             f"{each.rms:.3f}",
             f"{each.within:.3f}",
             str(each.cases),
@@ -217,11 +243,7 @@ def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
         "rank correlation in a case",
         "lost by choosing",
     )
-    print_line(markdown_table(headers, rows))
-    impulse, peak = (
-        Check(rms=each.rms, rank=each.rank, lost=each.lost) for each in (found.impulse, found.peak)
-    )
-    return about.model_copy(update={"impulse": impulse, "peak": peak})
+    return markdown_table(headers, rows)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ TABLES: Final = (
     "site_agent_blasts",
     "many_site_blasts",
     "close_site_blasts",
+    "liked_site_blasts",
     "street_blasts",
     "street_agent_blasts",
 )

@@ -11,6 +11,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 from blast_agents.league.trained import TrainedRun
 from blast_agents.rules import random_layout
@@ -707,6 +709,22 @@ def test_a_wrong_number_of_draws_is_told(
     done = CliRunner().invoke(studies.surrogate.app, options)
     assert done.exit_code == 2
     assert "--counts" in done.output
+
+
+def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
+    table = pq.read_table("docs/data/liked_site_blasts.parquet")
+    names = table["scenario"].unique()[:2]
+    pq.write_table(table.filter(pc.is_in(table["scenario"], names)), tmp_path / "few.parquet")
+    surrogate = packaged_surrogate().save(tmp_path / "surrogate.json")
+    options = ["check", str(tmp_path / "few.parquet"), "--surrogate", str(surrogate)]
+    done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
+    rows_of = [line.split("|")[1:-1] for line in done.output.splitlines()[2:4]]
+    assert [each[0].strip() for each in rows_of] == [
+        f"{load} on 2 other sites" for load in ("impulse", "peak")
+    ]
+    for each in rows_of:
+        assert 0.0 < float(each[2]) < 0.2  # near what it was fitted to, and never quite right
+        assert float(each[4]) > 0.5
 
 
 def test_surrogates_and_agents_are_compared_case_by_case_on_the_same_blasts(

@@ -88,6 +88,27 @@ def test_generated_sites_of_all_sides_are_named(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("seed", [10_004, 10_005, 10_077, 10_078])
+def test_walls_of_front_sites_see_the_charge(tmp_path: Path, seed: int) -> None:
+    name, out = blast_table.site_name(seed, 18.0, front=True), tmp_path / "blasts.parquet"
+    site, whole = blast_table.scenario_of(name), blast_table.scenario_of(f"close_sites/18/{seed}")
+    (threat,) = draw_threats(site, [0])
+    x_m, y_m = threat.charge_against(site, ()).position_m
+    for structure in site.structures:
+        left, bottom, right, top = structure.rectangle_m
+        farther_m = {"west": left - x_m, "east": x_m - right, "south": bottom - y_m}
+        seen_m = farther_m | {"north": y_m - top}
+        assert 1 <= len(structure.faces) <= 2 - seed % 2
+        assert max(seen_m, key=lambda face: seen_m[face]) in structure.faces
+        assert all(seen_m[face] > 0.0 for face in structure.faces)
+    (case,) = draw_threats(whole, [0])
+    assert case == threat  # nothing but what counts is another
+    BlastEvaluator(site, FAST, cache=tmp_path / "blasts").loads((), threat)
+    options = ("--first", seed - 10_000, "--sites", 1, "--side", 18, "--front", "--out", out)
+    assert run(tmp_path / "blasts", *options)[0] == 0
+    assert set(pd.read_parquet(out)["scenario"]) == {f"front_sites/18/{seed}"}
+
+
 def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:
     code, words = run(tmp_path)
     assert code != 0
