@@ -204,7 +204,7 @@ def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
     out_of, *_ = folds(samples.site, _FOLDS, seed)
     found = errors(fit(samples, ~out_of, epochs, seed, about), samples, out_of)
     sites = len(np.unique(samples.site[out_of]))
-    print_line(_errors_table(found, f"{sites} held-out sites"))
+    print_line(_errors_table({f"{sites} held-out sites": found}))
     impulse, peak = (
         Check(rms=each.rms, rank=each.rank, lost=each.lost) for each in (found.impulse, found.peak)
     )
@@ -218,12 +218,15 @@ def check(
 ) -> None:
     """Print how far a surrogate is off on sites of other tables than those it was fitted to."""
     with user_errors():
-        samples = samples_of(named_rows(data))
-        found = errors(load_surrogate(surrogate), samples, np.ones(len(samples), dtype=bool))
-        print_line(_errors_table(found, f"{len(np.unique(samples.site))} other sites"))
+        loaded, found = load_surrogate(surrogate), {}
+        for path in data:
+            samples = samples_of(named_rows([path]))
+            sites = f"{len(np.unique(samples.site))} sites of {path.stem}"
+            found[sites] = errors(loaded, samples, np.ones(len(samples), dtype=bool))
+        print_line(_errors_table(found))
 
 
-def _errors_table(found: ErrorsOfBoth, sites: str) -> str:
+def _errors_table(found: Mapping[str, ErrorsOfBoth]) -> str:
     rows = [
         (
             f"{load} on {sites}",
@@ -233,7 +236,8 @@ def _errors_table(found: ErrorsOfBoth, sites: str) -> str:
             f"{each.rank:.2f}",
             f"{100.0 * each.lost:.1f} points",
         )
-        for load, each in (("impulse", found.impulse), ("peak", found.peak))
+        for sites, both in found.items()
+        for load, each in (("impulse", both.impulse), ("peak", both.peak))
     ]
     headers = (
         "",

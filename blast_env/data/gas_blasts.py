@@ -19,6 +19,7 @@ TABLES: Final = (
     "many_site_blasts",
     "close_site_blasts",
     "liked_site_blasts",
+    "front_site_blasts",
     "street_blasts",
     "street_agent_blasts",
 )

@@ -720,7 +720,7 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
     rows_of = [line.split("|")[1:-1] for line in done.output.splitlines()[2:4]]
     assert [each[0].strip() for each in rows_of] == [
-        f"{load} on 2 other sites" for load in ("impulse", "peak")
+        f"{load} on 2 sites of few" for load in ("impulse", "peak")
     ]
     for each in rows_of:
         assert 0.0 < float(each[2]) < 0.2  # near what it was fitted to, and never quite right
