@@ -20,6 +20,7 @@ from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, DiskCache, StructureLoad, draw_threats
 from blast_env.files import make_folder
+from blast_env.physics.scene import OUTWARDS
 from blast_env.provenance import versions
 from blast_env.recording.parquet import write_table
 from blast_env.scenario import Scenario, bundled_scenarios
@@ -70,13 +71,6 @@ _SIZED: Final = {
 _LEAST_SEEN_M: Final = 1.0
 """A wall sees a charge that is farther out than this."""
 
-_OUTWARD: Final = {
-    "west": (-1.0, 0.0),
-    "east": (1.0, 0.0),
-    "south": (0.0, -1.0),
-    "north": (0.0, 1.0),
-}
-
 
 def site_name(seed: int, side_m: float | None = None, *, front: bool = False) -> str:
     """Return what a generated site is called in the table.
@@ -120,7 +114,7 @@ def front_only(site: Scenario, one_wall: bool) -> Scenario:
     for each in site.structures:
         left, bottom, right, top = each.rectangle_m
         way_m = place_m - np.clip(place_m, (left, bottom), (right, top))
-        seen_m = {face: float(way_m @ _OUTWARD[face]) for face in each.faces}
+        seen_m = {face: float(way_m @ OUTWARDS[face]) for face in each.faces}
         most_m = max(seen_m.values())
         least_m = most_m if one_wall else min(most_m, _LEAST_SEEN_M)
         faces = tuple(face for face, far_m in seen_m.items() if far_m >= least_m)

@@ -7,17 +7,17 @@ of the overpressures on the steps, each by how far it looks along that normal.
 Impulses are such means of the impulses on faces of cells; peaks are those of the mean.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.physics.gas.settings import FACE_NAMES
-from blast_env.physics.scene import WALLS
+from blast_env.physics.scene import OUTWARDS, WALLS
 from blast_env.response.facade import BAY_M, STOREY_M, storeys_in
 from blast_env.scenario.sections import AnyStructure
 from blast_env.scenario.staircase import Edge, ObliqueWall, oblique_walls
@@ -28,13 +28,6 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 
     from blast_env.physics.gas.engine import FaceTable, GasRun
     from blast_env.physics.gas.probes import PatchHistories
-
-_OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
-    "west": (-1.0, 0.0),
-    "east": (1.0, 0.0),
-    "south": (0.0, -1.0),
-    "north": (0.0, 1.0),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,14 +132,14 @@ def _add_bays(
     own = of_building[[each in wall.edges for each in _edges(table, of_building, wall)]]
     if not len(own):
         return
-    outwards = np.array([_OUTWARDS[FACE_NAMES[each]] for each in table.face[own].tolist()])
+    outwards = np.array([OUTWARDS[FACE_NAMES[each]] for each in table.face[own].tolist()])
     normal = np.array(wall.normal)
     share[own] = outwards @ normal
     facade = next((each.facade for each in parts.values() if each.facade is not None), None)
     bay_m = BAY_M if facade is None else facade.bay_m
     storey_m = STOREY_M if facade is None else facade.storey_m
     along_m = table.centre_m[own, :2] @ np.array([-normal[1], normal[0]])
-    length_m = MODULE_SIDE_M * sum(np.dot(_OUTWARDS[each.wall], normal) for each in wall.edges)
+    length_m = MODULE_SIDE_M * sum(np.dot(OUTWARDS[each.wall], normal) for each in wall.edges)
     columns = max(1, round(length_m / bay_m))
     start_m = 0.5 * (along_m.min() + along_m.max() - length_m)
     column = np.clip((along_m - start_m) // (length_m / columns), 0, columns - 1)
@@ -168,7 +161,7 @@ def _is_part(structure: AnyStructure, wall: ObliqueWall) -> bool:
 def _edges(table: "FaceTable", faces: NDArray[np.int64], wall: ObliqueWall) -> list[Edge]:
     """Return the sides of modules that faces of cells are on, in the plan of a building."""
     names = [WALLS[each] for each in table.face[faces].tolist()]
-    outwards = np.array([_OUTWARDS[each] for each in names]).reshape(-1, 2)
+    outwards = np.array([OUTWARDS[each] for each in names]).reshape(-1, 2)
     inside_m = table.centre_m[faces, :2] - 0.5 * MODULE_SIDE_M * outwards - wall.corner_m
     columns, rows = np.floor(inside_m / MODULE_SIDE_M).astype(np.int64).T.tolist()
     return [Edge(*each) for each in zip(rows, columns, names, strict=True)]

@@ -1,6 +1,6 @@
 """A scene: everything that an engine needs to run one blast, as plain arrays."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal, NamedTuple
@@ -17,6 +17,14 @@ WallName = Literal["west", "east", "south", "north"]
 """A wall of a structure, by the side that it looks to: west is towards smaller x."""
 
 WALLS: Final[tuple[WallName, ...]] = ("west", "east", "south", "north")
+
+OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
+    "west": (-1.0, 0.0),
+    "east": (1.0, 0.0),
+    "south": (0.0, -1.0),
+    "north": (0.0, 1.0),
+}
+"""Where each wall looks."""
 
 
 class Charge(NamedTuple):

@@ -14,7 +14,7 @@ from blast_env.calibration import kingery_bulmash
 from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Measure, standing
-from blast_env.physics.scene import Charge
+from blast_env.physics.scene import OUTWARDS, Charge
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.scenario import AnyStructure, Scenario
 from blast_env.scenario.facade import NamedBay
@@ -40,7 +40,6 @@ _MOST_BYTES: Final = 2**26
 
 SingleArray = NDArray[np.float32]
 
-_OUTWARD: Final = {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}
 
 FEATURES: Final = 7 + 2 * SHARES
 """Numbers that a network is given about a point: geometry and ways."""
@@ -94,7 +93,7 @@ def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArra
     z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
     rows = []
     for face in structure.faces:
-        x_out, y_out = _OUTWARD[face]
+        x_out, y_out = OUTWARDS[face]
         length_m = top - bottom if x_out else right - left
         number = max(1, round(length_m / (_ALONG_M * apart)))
         area_m2 = length_m * rise_m / (number * levels)
@@ -326,7 +325,7 @@ def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> fl
     for structure, height_m in zip(structures, heights_m, strict=True):
         left, bottom, right, top = structure.rectangle_m
         lengths_m = [
-            top - bottom if _OUTWARD[face][0] else right - left for face in structure.faces
+            top - bottom if OUTWARDS[face][0] else right - left for face in structure.faces
         ]
         area_m2 += height_m * sum(lengths_m)
     return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
