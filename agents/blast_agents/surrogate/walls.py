@@ -40,7 +40,6 @@ _MOST_BYTES: Final = 2**26
 
 SingleArray = NDArray[np.float32]
 
-
 FEATURES: Final = 7 + 2 * SHARES
 """Numbers that a network is given about a point: geometry and ways."""
 
