@@ -556,6 +556,29 @@ def test_it_learns_from_messages_what_ways_do_not_see() -> None:
     assert within[1] < 0.3 * within[0]
 
 
+def test_the_unit_of_loads_changes_nothing_that_is_learnt() -> None:
+    """Not even where high powers of them are beyond any number."""
+    samples = Samples.of(table_of_guesses(by_hand(), 40), {YARD.content_hash: YARD})
+    every = np.ones(len(samples), dtype=bool)
+    off = []
+    for logarithm in (0.0, 60.0):
+        peak = samples.peak
+        known, target = peak.known + logarithm, peak.target + logarithm
+        told = replace(samples, impulse=replace(peak, known=known, target=target))
+        found = fit(told, every, 3, 0, ABOUT, 1, peaks=False)
+        off.append(load_errors(found, found.impulse, samples, peak, every).rms)
+    assert off[1] == pytest.approx(off[0], rel=0.02)
+
+
+def test_loads_that_are_no_numbers_stop_a_fit() -> None:
+    samples = Samples.of(table_of_guesses(by_hand(), 10), {YARD.content_hash: YARD})
+    target = np.full_like(samples.impulse.target, np.inf)
+    odd = replace(samples, impulse=replace(samples.impulse, target=target))
+    every = np.ones(len(samples), dtype=bool)
+    with pytest.raises(BlastEnvError, match="network of seed 0 in epoch 0: no finite error"):
+        fit(odd, every, 1, 0, ABOUT, 1, peaks=False)
+
+
 def test_rows_of_unknown_scenarios_are_left_out() -> None:
     table = table_of_guesses(by_hand(), 3)
     with pytest.raises(BlastEnvError, match="no load of a protected structure"):

@@ -327,9 +327,9 @@ class _Target:
 
     @classmethod
     def of(cls, loads: Loads) -> "_Target":
-        # Single precision has no room for high powers of pascals.
-        dtype = np.float32 if loads.power == 1.0 else np.float64
-        known, target = (torch.from_numpy(e.astype(dtype)) for e in (loads.known, loads.target))
+        known, target = (
+            torch.from_numpy(each.astype(np.float32)) for each in (loads.known, loads.target)
+        )
         return cls(known, target, loads.power)
 
 
@@ -364,7 +364,7 @@ class _Tensors:
             torch.from_numpy(bounded(each, mean[own], scale[own]).astype(np.float32))
             for each, own in ((samples.features, of_points), (samples.relations, of_solids))
         )
-        area_m2 = torch.from_numpy(samples.area_m2)
+        area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32))
         starts = np.cumsum([0, *samples.counts[:-1]])
         rows = samples.counts * samples.solids
         firsts = np.cumsum([0, *rows[:-1]])
@@ -398,12 +398,15 @@ class _Tensors:
             torch.from_numpy(np.concatenate(hearing)),
         )
         owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts))
-        known = target.known[points]
-        area_m2 = self.area_m2[points].to(known.dtype)
-        loads = area_m2 * torch.exp(target.power * (known + over))
-        empty = torch.zeros(len(numbers), dtype=loads.dtype)
-        mean = empty.index_add(0, owner, loads) / empty.index_add(0, owner, area_m2)
-        return torch.log(mean) / target.power - target.target[torch.from_numpy(numbers)]
+        logs = target.power * (target.known[points] + over)
+        empty = torch.zeros(len(numbers))
+        # As shares of the largest: high powers of pascals are beyond any number.
+        largest = torch.from_numpy(np.maximum.reduceat(logs.detach().numpy(), begin))
+        area_m2 = self.area_m2[points]
+        shares = area_m2 * torch.exp(logs - largest[owner])
+        mean = empty.index_add(0, owner, shares) / empty.index_add(0, owner, area_m2)
+        log_loads = (torch.log(mean) + largest) / target.power
+        return log_loads - target.target[torch.from_numpy(numbers)]
 
 
 def _runs_of(starts: IntArray, counts: IntArray) -> IntArray:
@@ -464,9 +467,11 @@ def _fitted(
     ]
     batches = max(1, round(len(groups) / _BATCH))
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
-    for _ in range(epochs):
+    for epoch in range(epochs):
         for batch in np.array_split(rng.permutation(len(groups)), batches):
             loss = data.loss(network, target, [groups[number] for number in batch])
+            if not torch.isfinite(loss):
+                raise BlastEnvError(f"network of seed {seed} in epoch {epoch}: no finite error")
             optimizer.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             nn.utils.clip_grad_norm_(network.parameters(), _MOST_GRADIENT)
