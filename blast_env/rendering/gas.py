@@ -7,6 +7,7 @@ scale.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import dist
+from re import sub
 from textwrap import wrap
 from typing import Any, Final, Literal
 
@@ -230,7 +231,8 @@ def facades(
 
 def _row_words(blast: GasBlast) -> str:
     """Return what barrier a blast has, in words as long as a wall is high."""
-    return "\n".join(wrap(barrier_text(blast.layout), _ROW_LETTERS))
+    kept_together = sub(r"([(,] ?\d+) ", "\\1\N{NO-BREAK SPACE}", barrier_text(blast.layout))
+    return "\n".join(wrap(kept_together, _ROW_LETTERS))
 
 
 def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:

@@ -253,6 +253,19 @@ def test_walls_with_and_without_a_barrier_have_one_scale(
     assert_all_is_on_the_page(figure)
 
 
+def test_words_of_a_barrier_keep_each_number_with_its_item() -> None:
+    empty, built = (
+        GasBlast(yard(), layout, engine=GasEngine(margin_m=1.0, until=0.005)).run()
+        for layout in ((), PIECES)
+    )
+    words = facades(built, beside=empty).axes[4].get_ylabel().splitlines()
+    assert [each.replace("\N{NO-BREAK SPACE}", " ") for each in words] == [
+        "barrier of 3 pieces",
+        "(2 wall, 1 post)",
+        "z (m)",
+    ]
+
+
 def test_a_wall_that_does_not_count_says_so(bare: GasResult) -> None:
     section = {**hut().model_dump()["structures"][0], "faces": ["west"]}
     scenario = hut(structures=[section])
