@@ -34,6 +34,9 @@ Quantity = Literal[
 Burst = Literal["hemispherical", "spherical"]
 """Hemispherical: the charge lies on rigid ground. Spherical: far from any surface."""
 
+SURFACE_BURST_SCALED_M: Final = 0.4
+"""Scaled height of a charge, m/kg^(1/3), below which `burst_of` counts it as on the ground."""
+
 PAPER_UFC_LABEL: Final = "the paper's UFC column"
 """What its i_ufc must be called: it matches no curve of UFC 3-340-02 at all distances."""
 
@@ -191,6 +194,22 @@ def kingery_bulmash(
     if curve.scales_with_charge:
         value = value * np.cbrt(charge)
     return float(value) if value.ndim == 0 else value
+
+
+def burst_of(height_m: float, charge_kg: float) -> Burst:
+    """Return the curves that hold for a charge over rigid ground.
+
+    UFC 3-340-02 (before it TM 5-1300), chapter 2, divides unconfined explosions into free-air, air
+    and surface bursts: on or very near the ground the reflected wave merges with the incident one
+    at once, and the burst is a surface burst. Its charts of air bursts, those of the triple point,
+    begin at a scaled height of 1 ft/lb^(1/3), 0.4 m/kg^(1/3): lower charges are surface bursts.
+
+    Args:
+        height_m: Height of the middle of the charge above the ground.
+        charge_kg: TNT-equivalent mass, above 0.
+    """
+    low = height_m < SURFACE_BURST_SCALED_M * np.cbrt(charge_kg)
+    return "hemispherical" if low else "spherical"
 
 
 def scaled_distance(distance_m: float | Numbers, charge_kg: float | Numbers) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.calibration.references import Burst, Friedlander, kingery_bulmash
+from blast_env.calibration.references import Friedlander, burst_of, kingery_bulmash
 from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
@@ -473,9 +473,10 @@ def _draw_wave(
 def _free_field(result: GasResult, place: tuple[float, float, float]) -> tuple[Friedlander, str]:
     """Return Kingery and Bulmash's incident wave at a place, and its name."""
     charge = result.run.charge
-    burst: Burst = "hemispherical" if charge.on_ground else "spherical"
     x_m, y_m, z_m = charge.position_m
-    distance_m = dist((x_m, y_m, 0.0 if charge.on_ground else z_m), place)
+    burst = burst_of(z_m, charge.mass_kg)
+    on_ground = burst == "hemispherical"
+    distance_m = dist((x_m, y_m, 0.0 if on_ground else z_m), place)
     peak_pa, duration_s, impulse_pa_s, arrival_s = (
         kingery_bulmash(quantity, distance_m, charge.mass_kg, burst)
         for quantity in (
@@ -486,5 +487,5 @@ def _free_field(result: GasResult, place: tuple[float, float, float]) -> tuple[F
         )
     )
     wave = Friedlander.from_impulse(peak_pa, duration_s, impulse_pa_s, arrival_s)
-    kind = "free field" if charge.on_ground else "free air, no ground"
+    kind = "free field" if on_ground else "free air, no ground"
     return wave, f"Kingery-Bulmash, {kind}, incident at {distance_m:.1f} m"

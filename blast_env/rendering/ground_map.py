@@ -1,14 +1,15 @@
 """Maps of the ground: peak overpressure and impulse of a blast of the gas engine."""
 
 from collections.abc import Mapping, Sequence
-from math import cbrt, inf, isfinite
+from math import cbrt, inf, isfinite, sqrt
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.calibration.references import Burst, kingery_bulmash
+from blast_env.calibration.references import Burst, burst_of, kingery_bulmash
+from blast_env.calibration.references import Quantity as CurveQuantity
 from blast_env.engines.gas import GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
@@ -241,17 +242,28 @@ def _write(
 
 
 def open_distance_m(peak_pa: float, charge: Charge) -> float:
-    """Return how far a side-on peak reaches in the open, by Kingery and Bulmash's curves, m.
+    """Return how far a peak reaches over open ground, by Kingery and Bulmash's curves, m.
 
-    Infinite beyond where they end, at some 40 m/kg^(1/3).
+    The side-on peak of a surface burst. A charge too high for that (`burst_of`) has its reflection
+    on the ground besides: the wave of a burst in free air, as if it met the ground at right angles,
+    an upper bound. The farther of both counts.
+
+    Infinite beyond where the curves end, at some 40 m/kg^(1/3).
     """
-    burst: Burst = "hemispherical" if charge.height_m == 0.0 else "spherical"
+    distance_m = _reach_m(peak_pa, "incident_overpressure", charge.tnt_kg, "hemispherical")
+    if burst_of(charge.height_m, charge.tnt_kg) == "hemispherical":
+        return distance_m
+    slant_m = _reach_m(peak_pa, "reflected_overpressure", charge.tnt_kg, "spherical")
+    return max(distance_m, sqrt(max(slant_m**2 - charge.height_m**2, 0.0)))
+
+
+def _reach_m(peak_pa: float, quantity: CurveQuantity, tnt_kg: float, burst: Burst) -> float:
     scaled = np.geomspace(0.21, 39.5, 400)
-    peaks = kingery_bulmash("incident_overpressure", scaled, 1.0, burst)
+    peaks = kingery_bulmash(quantity, scaled, 1.0, burst)
     if peak_pa < peaks[-1]:
         return inf
     found = np.interp(-np.log(peak_pa), -np.log(np.asarray(peaks)), np.log(scaled))
-    return float(np.exp(found) * cbrt(charge.tnt_kg))
+    return float(np.exp(found) * cbrt(tnt_kg))
 
 
 def _risk_words(threshold: GroundThreshold, charge: Charge) -> str:

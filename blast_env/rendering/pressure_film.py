@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.calibration.references import Burst, kingery_bulmash
+from blast_env.calibration.references import burst_of, kingery_bulmash
 from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -188,10 +188,10 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
     x_y_m = site.charge.position_m
     distances_m = (each.rectangle_m.distance_to(x_y_m) for each in chosen)
     nearest_m = min(distances_m, default=_LONGEST_WAY_M)
-    mass_kg, on_ground = site.charge.tnt_kg, site.charge.height_m == 0.0
+    mass_kg = site.charge.tnt_kg
     low, high = (z * cbrt(mass_kg) for z in _CURVES)
     distance_m = min(max(nearest_m, low), high)
-    burst: Burst = "hemispherical" if on_ground else "spherical"
+    burst = burst_of(site.charge.height_m, mass_kg)
     peak_pa = kingery_bulmash("incident_overpressure", distance_m, mass_kg, burst)
     return nice_ceiling(float(peak_pa) / PA_PER_KPA)
 

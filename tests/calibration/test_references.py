@@ -18,7 +18,7 @@ from blast_env.calibration import (
     paper_ufc_column,
     scaled_distance,
 )
-from blast_env.calibration.references import Burst, Quantity
+from blast_env.calibration.references import SURFACE_BURST_SCALED_M, Burst, Quantity, burst_of
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.units import PA_PER_PSI
 
@@ -195,3 +195,10 @@ def test_the_paper_s_ufc_column_goes_by_that_name_and_is_not_the_standard() -> N
     ratio = column.to_numpy() / curve
     assert ratio[0] == pytest.approx(1.93, abs=0.01)
     assert ratio[1:] == pytest.approx(np.ones(7), abs=0.081)
+
+
+@pytest.mark.parametrize("charge_kg", [1.0, 27.0, 200.0])
+def test_low_charges_are_surface_bursts_by_their_scaled_height(charge_kg: float) -> None:
+    least_m = SURFACE_BURST_SCALED_M * charge_kg ** (1 / 3)
+    assert burst_of(0.0, charge_kg) == burst_of(0.99 * least_m, charge_kg) == "hemispherical"
+    assert burst_of(1.01 * least_m, charge_kg) == "spherical"

@@ -128,6 +128,24 @@ def test_thresholds_reach_as_far_in_the_open_as_the_curves_say() -> None:
     assert np.isinf(open_distance_m(500.0, CHARGE))
 
 
+def test_a_charge_just_above_the_ground_is_no_safer_than_one_on_it() -> None:
+    lying, raised = (Charge((24.3, 22.0), 200.0, height_m) for height_m in (0.0, 0.5))
+    for threshold in ground_thresholds():
+        reach_m = open_distance_m(threshold.peak_pa, raised)
+        assert reach_m == open_distance_m(threshold.peak_pa, lying)
+    assert open_distance_m(43.2e3, raised) == pytest.approx(29.0, abs=0.5)
+
+
+def test_a_burst_in_the_air_reaches_as_far_as_its_reflection_on_the_ground() -> None:
+    lying, high = (Charge((0.0, 0.0), 8.0, height_m) for height_m in (0.0, 2.0))
+    for peak_pa in (10e3, 43.2e3):
+        reach_m = open_distance_m(peak_pa, high)
+        assert reach_m >= open_distance_m(peak_pa, lying)
+        slant_m = np.hypot(reach_m, 2.0)
+        reflected = kingery_bulmash("reflected_overpressure", slant_m, 8.0, "spherical")
+        assert reflected == pytest.approx(peak_pa, rel=0.01)
+
+
 def test_a_map_of_risks_has_a_region_and_a_circle_a_threshold(site: Scenario) -> None:
     blasts = (GasBlast(site, layout, charge=CHARGE) for layout in ((), WALL))
     bare, walled = (blast.run(recorders=ground_recorders) for blast in blasts)
