@@ -4,9 +4,10 @@ import csv
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from io import StringIO
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -29,6 +30,9 @@ MAX_DIGITS: Final = 1000
 
 MOST_CLAUSES: Final = 10
 """Problems that one message names; the others are counted."""
+
+_GROUPED: Final = re.compile(r"[+-]?[0-9]+(_[0-9]+)+(\.[0-9_]*)?")
+"""A number that Python reads and nobody else does."""
 
 _SHOWN: Final = 60
 """Characters of a text from a file in a message."""
@@ -208,7 +212,9 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def checked_as(kind: type[T], content: Any) -> T:
-    """Return plain data as what it must be.
+    """Return the content of a JSON or TOML file as what it must be.
+
+    Nothing is converted: neither texts nor truth values are numbers, nor is 1.0 an integer.
 
     Args:
         kind: The type: a model, a dataclass, or anything else that pydantic knows.
@@ -217,9 +223,19 @@ def checked_as(kind: type[T], content: Any) -> T:
     Raises:
         DocumentError: If it is anything else; the message has key, value and bound.
     """
+    # In JSON, lists may be tuples and texts may be members of an enumeration, however strict.
+    text = json.dumps(content, default=_no_json)
+    return _checked(kind, methodcaller("validate_json", text, strict=True))
+
+
+def _no_json(value: Any) -> Any:
+    raise DocumentError("", f"{value_text(value)} is neither text nor number")
+
+
+def _checked(kind: type[T], check: Callable[[TypeAdapter[Any]], Any]) -> T:
     hashable: Any = kind
     try:
-        found: T = _adapter(hashable).validate_python(content)
+        found: T = check(_adapter(hashable))
     except ValidationError as error:
         raise DocumentError("", described(error)) from error
     return found
@@ -265,7 +281,8 @@ def parse_csv(text: str, kind: type[T]) -> Iterator[T]:
 
     Args:
         text: The text; its last line has an end.
-        kind: What a row must be, by the names of the columns; see `checked_as`.
+        kind: What a row must be, by the names of the columns; cells are texts, read as numbers
+            where a number must be.
 
     Raises:
         DocumentError: If it is no table, was cut within a line, or a row is anything else; the
@@ -279,7 +296,8 @@ def parse_csv(text: str, kind: type[T]) -> Iterator[T]:
     try:
         names = next(reader, [])
         for cells in _full_rows(reader, len(names)):
-            yield checked_as(kind, dict(zip(names, cells, strict=True)))
+            row = dict(zip(names, cells, strict=True))
+            yield _checked(kind, methodcaller("validate_python", row))
     except csv.Error as error:
         raise DocumentError(f"line {reader.line_num}", f"is no row of a table: {error}") from error
     except DocumentError as error:
@@ -290,4 +308,6 @@ def _full_rows(rows: Iterable[list[str]], columns: int) -> Iterator[list[str]]:
     for row in rows:
         if len(row) != columns:
             raise DocumentError("", f"has {len(row)} cells, must have {columns}")
+        for text in filter(_GROUPED.fullmatch, row):
+            raise DocumentError("", f"{value_text(text)} is no number such as 1000 or 0.5")
         yield row

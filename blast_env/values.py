@@ -19,6 +19,10 @@ STEERING: Final = re.compile(
 )
 """Characters that steer a terminal or a page, turn the direction of a line, or are none."""
 
+_PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_DECIMAL_COMMA: Final = re.compile(r"([+-]?[0-9]+),([0-9]+)")
+_THOUSANDS: Final = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+
 _MOST_PATH: Final = 4096
 """Characters; no system takes longer ones."""
 
@@ -106,6 +110,54 @@ def real_number(name: str, value: Any, least: float, most: float) -> float:
     if not least <= number <= most:
         raise BlastEnvError(f"{name} is {number:g}, must be a number from {least:g} to {most:g}")
     return number
+
+
+def is_plain_number(text: str) -> bool:
+    """Whether a text is a number as files and options have it.
+
+    Python reads more: `1_000`, `nan`, `inf`, digits of other scripts, spaces around.
+    """
+    return _PLAIN.fullmatch(text) is not None
+
+
+def plain_number(name: str, text: str) -> float:
+    """Return the number of a text: digits, one point, an exponent.
+
+    Raises:
+        BlastEnvError: If it is anything else, or too large.
+    """
+    if not is_plain_number(text):
+        raise BlastEnvError(f"{name} is {value_text(text)}, must be a number such as 1000 or 0.5")
+    return finite_number(name, float(text))
+
+
+def typed_number(name: str, text: str, unit: str = "") -> float:
+    """Return the number that somebody typed, with a point or a comma before its decimals.
+
+    Args:
+        name: The quantity, for the error.
+        text: The text; the unit may stand behind the number.
+        unit: Its unit, such as `kg TNT`, of which the first word is enough.
+
+    Raises:
+        BlastEnvError: If it is no number, has another unit, or a comma that may stand between
+            thousands.
+    """
+    number = text.strip()
+    for known in filter(None, (unit, unit.partition(" ")[0])):
+        number = number.removesuffix(known).rstrip()
+    if _THOUSANDS.fullmatch(number):
+        plain, decimals = number.replace(",", ""), number.replace(",", ".")
+        raise BlastEnvError(
+            f"{name} is {value_text(text)}, which may be {plain} or {decimals}: write one of these"
+        )
+    number = _DECIMAL_COMMA.sub(r"\1.\2", number)
+    if not is_plain_number(number):
+        in_unit = f" in {unit}" if unit else ""
+        raise BlastEnvError(
+            f"{name} is {value_text(text)}, must be a number{in_unit} such as 1000 or 0.5"
+        )
+    return finite_number(name, float(number))
 
 
 def path_of(value: Any) -> Path:

@@ -128,3 +128,30 @@ def test_a_file_may_have_a_bound_of_its_own(tmp_path: Path) -> None:
     assert read_text(path, 5) == "12345"
     with pytest.raises(DocumentError, match="has 5 bytes, must have at most 4"):
         read_text(path, 4)
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    count: int
+    share: float
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"count": 1.0}, {"count": True}, {"count": "1"}, {"share": "0.5"}, {"share": True}],
+)
+def test_no_value_of_a_file_is_converted_into_a_number(wrong: dict[str, object]) -> None:
+    with pytest.raises(DocumentError):
+        checked_as(_Numbers, {"count": 1, "share": 0.5} | wrong)
+    assert checked_as(_Numbers, {"count": 1, "share": 1}) == _Numbers(1, 1.0)
+
+
+def test_a_cell_of_a_table_is_no_number_with_marks_between_its_digits() -> None:
+    assert [*parse_csv("count,share\n1000,0.5\n", _Numbers)] == [_Numbers(1000, 0.5)]
+    with pytest.raises(DocumentError, match=r"line 2: '1_000' is no number"):
+        [*parse_csv("count,share\n1_000,0.5\n", _Numbers)]
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False)))
+def test_numbers_keep_their_last_bit(numbers: list[float]) -> None:
+    assert list(checked_as(tuple[float, ...], numbers)) == numbers

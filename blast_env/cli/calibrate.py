@@ -26,6 +26,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
 from blast_env.scenario import Scenario, load_scenario
 from blast_env.tables import write_csv
+from blast_env.values import plain_number
 
 if TYPE_CHECKING:  # takes a third of a second to import
     from blast_env.fitting.free_field import CalibrationReport, FreeFieldStudy, Reference
@@ -123,8 +124,8 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
 
 def _parse_numbers(option: str, text: str) -> tuple[float, ...]:
     try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
+        return tuple(plain_number(option, part) for part in text.split(","))
+    except BlastEnvError:
         raise BlastEnvError(
             f"{option} is {text!r}, must be numbers separated by commas, e.g. 8,10,15"
         ) from None

@@ -6,7 +6,7 @@ value. Typer gets a function that is made of the fields; its parser, help and co
 
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
@@ -23,6 +23,7 @@ from blast_env.option_fields import FOLDER as FOLDER
 from blast_env.option_fields import TEXT, OptionText
 from blast_env.option_fields import argument as argument
 from blast_env.option_fields import option as option
+from blast_env.values import is_plain_number, plain_number
 
 MARKUP: Final = "markdown"
 """How help is written: Rich's own markup takes [row, column] for a style."""
@@ -97,6 +98,11 @@ class OptionField:
         return len(get_args(item)) if get_origin(item) is tuple else 0
 
     @property
+    def is_number(self) -> bool:
+        """Whether the command line has plain numbers for it; texts of several have commas."""
+        return not self.numbers and bool({int, float} & {*_leaves([self.hint])})
+
+    @property
     def parameter(self) -> inspect.Parameter:
         """The same for Typer, which has lists where our commands have tuples."""
         text, hint, default = self.text, self.hint, self.default
@@ -125,12 +131,17 @@ class OptionField:
 
     def _numbers_of(self, text: str) -> tuple[float, ...]:
         with suppress(ValueError):
-            found = tuple(float(part) for part in text.split(","))
+            found = tuple(plain_number(self.flag, part) for part in text.split(","))
             if len(found) == self.numbers:
                 return found
         count = _COUNTS.get(self.numbers, str(self.numbers))
         form = self.text.settings.get("metavar", "numbers with commas")
         raise BlastEnvError(f"{self.flag} is {text!r}, must be {count} numbers as {form}")
+
+
+def _leaves(kinds: Iterable[Any]) -> Iterator[Any]:
+    for each in kinds:
+        yield from _leaves(inner) if (inner := get_args(each)) else (each,)
 
 
 def options_of(kind: type[Command]) -> Iterator[OptionField]:
@@ -173,6 +184,29 @@ def _run(kind: type[Command], values: Mapping[OptionField, Any]) -> None:
         command()
 
 
+def _check_numbers(parameter: Any) -> None:
+    """Let a parameter refuse what Python reads as a number and nobody means: `1_000`, `nan`."""
+    process = parameter.process_value
+
+    def checked(context: Any, given: Any) -> Any:
+        for text in _texts(given):
+            if not is_plain_number(text):
+                message = f"{text!r} is no number such as 1000 or 0.5."
+                raise typer.BadParameter(message, context, parameter)
+        return process(context, given)
+
+    parameter.process_value = checked
+
+
+def _texts(given: Any) -> Iterator[str]:
+    """Yield the texts of what the command line has for one option; a default may be no text."""
+    if isinstance(given, str):
+        yield given
+    elif isinstance(given, list | tuple):
+        for each in given:
+            yield from _texts(each)
+
+
 class LazyCommand(TyperCommand):
     """A command that is imported when it is called: until then, name and summary are enough.
 
@@ -196,6 +230,11 @@ class LazyCommand(TyperCommand):
         application.command(self.name)(call)
         command = typer.main.get_command(application)
         assert isinstance(command, TyperCommand)
+        known = () if inspect.isfunction(found) else options_of(found)
+        numbers = {each.name for each in known if each.is_number}
+        for parameter in command.params:
+            if parameter.name in numbers:
+                _check_numbers(parameter)
         return command
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:

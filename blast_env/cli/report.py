@@ -14,6 +14,7 @@ from blast_env.physics.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import check_layout, load_layout, load_scenario
+from blast_env.values import plain_number
 
 if TYPE_CHECKING:
     from blast_env.reporting import StudyOptions
@@ -109,8 +110,8 @@ def _cells(text: str) -> Cells:
     Raises:
         BlastEnvError: If they are no length, nor a way of growing.
     """
-    with suppress(ValueError):
-        return float(text)
+    with suppress(BlastEnvError):
+        return plain_number("--cells", text)
     growing = [each for each in CELLS if each != UNIFORM]
     if text not in growing:
         known = ", ".join(growing)

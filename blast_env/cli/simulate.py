@@ -2,9 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from math import isfinite, isnan, nan
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
@@ -41,6 +42,7 @@ from blast_env.scenario.build_scene import draw_threat
 from blast_env.scenario.sections import buildings_of
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
+from blast_env.values import plain_number
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
@@ -494,12 +496,10 @@ def _section(text: str | None) -> "VerticalSection | None":
         from blast_env.rendering.pressure_frames import VerticalSection
 
     axis, _, number = text.partition("=")
-    try:
-        at_m = float(number)
-    except ValueError:
-        at_m = nan
-    if axis in ("x", "y") and isfinite(at_m):
-        return VerticalSection("x" if axis == "x" else "y", at_m)
+    with suppress(BlastEnvError):
+        at_m = plain_number("--film-section", number)
+        if axis in ("x", "y"):
+            return VerticalSection("x" if axis == "x" else "y", at_m)
     raise BlastEnvError(f"--film-section is {text!r}, must be x=M or y=M, e.g. x=12.5")
 
 

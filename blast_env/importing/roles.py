@@ -13,6 +13,7 @@ import numpy as np
 
 from blast_env.errors import MAX_TEXT, BlastEnvError, import_extra, value_text
 from blast_env.importing.site_map import DrawingCoordinates, MapFeature, SiteMap, Tags
+from blast_env.values import typed_number
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -134,7 +135,7 @@ _ROUND: Final = frozenset({"chimney", "gasometer", "silo", "storage_tank", "wate
 
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
 _YES: Final = (True, "yes", "true")
-_LENGTH: Final = re.compile(r"([0-9]+(?:\.[0-9]*)?)\s*(m|ft|')?")
+_LENGTH: Final = re.compile(r"([0-9]+(?:[.,][0-9]*)?)\s*(m|ft|')?")
 _FOOT_M: Final = 0.3048
 
 
@@ -251,10 +252,12 @@ def _diameter_m(feature: MapFeature) -> float | None:
 def _length_m(value: str | float | bool) -> float | None:
     """Return a length above 0 in metres, or `None` if the value is none."""
     if isinstance(value, str):
-        match = _LENGTH.fullmatch(value[:MAX_TEXT].strip().replace(",", "."))
-        if match is None:
+        match = _LENGTH.fullmatch(value[:MAX_TEXT].strip())
+        try:
+            number = typed_number("a length", match[1] if match else "")
+        except BlastEnvError:
             return None
-        value = float(match[1]) * (1.0 if match[2] in (None, "m") else _FOOT_M)
+        value = number * (1.0 if match is None or match[2] in (None, "m") else _FOOT_M)
     return float(value) if isfinite(value) and value > 0.0 else None
 
 

@@ -11,12 +11,20 @@ from math import sqrt
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    ValidationError,
+)
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, Field(gt=0.0, le=1e9, allow_inf_nan=False)]
+Fraction = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
+Positive = Annotated[StrictFloat, Field(gt=0.0, le=1e9, allow_inf_nan=False)]
 ChargeScaling = Literal["mass", "hopkinson_cranz"]
 
 
@@ -38,11 +46,11 @@ class BallParameters(Parameters):
         inertia_factor: Moment of inertia as a multiple of m r^2; 0.5 is a solid disc.
     """
 
-    mass: Annotated[float, Field(ge=1e-6, le=1e6)]
-    radius_units: Annotated[float, Field(ge=0.01, le=100.0)]
+    mass: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)]
+    radius_units: Annotated[StrictFloat, Field(ge=0.01, le=100.0)]
     elasticity: Fraction
-    friction: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
-    inertia_factor: Annotated[float, Field(ge=0.01, le=1.0)] = 0.5
+    friction: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.0
+    inertia_factor: Annotated[StrictFloat, Field(ge=0.01, le=1.0)] = 0.5
 
 
 class ExplosiveParameters(BallParameters):
@@ -66,14 +74,14 @@ class ExplosiveParameters(BallParameters):
             mass in the plane, number of balls, losses in collisions and the time limit follow.
     """
 
-    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
-    radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
+    mass: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
+    radius_units: Annotated[StrictFloat, Field(ge=0.01, le=100.0)] = 1.0
     elasticity: Fraction = 0.74
-    ball_count: Annotated[int, Field(ge=1, le=100_000)] = 720
-    speed_units_per_s: Annotated[float, Field(gt=0.0, le=1e6)] = 2000.0
-    offset_units: Annotated[float, Field(ge=0.0, le=1000.0)] = 1.0
+    ball_count: Annotated[StrictInt, Field(ge=1, le=100_000)] = 720
+    speed_units_per_s: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 2000.0
+    offset_units: Annotated[StrictFloat, Field(ge=0.0, le=1000.0)] = 1.0
     fan_phase: Literal["fixed", "random"] = "random"
-    collide_within_charge: bool = False
+    collide_within_charge: StrictBool = False
     thermal_share: Fraction = 0.0
     reference_tnt_kg: Positive = 100.0
     charge_scaling: ChargeScaling = "mass"
@@ -91,10 +99,10 @@ class AirParameters(BallParameters):
             every blast leaves free lanes, always to the same modules.
     """
 
-    mass: Annotated[float, Field(ge=1e-6, le=1e6)] = 0.79
-    radius_units: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
+    mass: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 0.79
+    radius_units: Annotated[StrictFloat, Field(ge=0.01, le=100.0)] = 1.0
     elasticity: Fraction = 0.74
-    spacing_units: Annotated[float, Field(ge=0.0, le=1e6)] = 11.5
+    spacing_units: Annotated[StrictFloat, Field(ge=0.0, le=1e6)] = 11.5
     jitter: Fraction = 1.0
     lattice_offset: Literal["centred", "random"] = "random"
 
@@ -114,11 +122,11 @@ class ContactParameters(Parameters):
     """
 
     module_restitution: Fraction = 0.5
-    module_friction: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
-    module_shrink: Annotated[float, Field(gt=0.0, le=1.0)] = 0.7
-    air_shrink: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
-    minimum_radius_units: Annotated[float, Field(ge=1e-3, le=100.0)] = 0.1
-    base_impulse: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+    module_friction: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.0
+    module_shrink: Annotated[StrictFloat, Field(gt=0.0, le=1.0)] = 0.7
+    air_shrink: Annotated[StrictFloat, Field(gt=0.0, le=1.0)] = 0.9
+    minimum_radius_units: Annotated[StrictFloat, Field(ge=1e-3, le=100.0)] = 0.1
+    base_impulse: Annotated[StrictFloat, Field(ge=0.0, le=1e9)] = 0.0
 
 
 class SteppingParameters(Parameters):
@@ -137,12 +145,12 @@ class SteppingParameters(Parameters):
         most_collisions: Event engine: collisions after which the run ends in any case.
     """
 
-    step_radii: Annotated[float, Field(ge=0.01, le=0.5)] = 0.5
-    longest_step_s: Annotated[float, Field(ge=1e-7, le=1.0)] = 0.002
-    solver_iterations: Annotated[int, Field(ge=1, le=100)] = 10
-    time_limit_s: Annotated[float, Field(gt=0.0, le=60.0)] = 2.0
-    contact_time_s: Annotated[float, Field(ge=1e-9, le=0.01)] = 1e-6
-    most_collisions: Annotated[int, Field(ge=1, le=10**12)] = 100_000_000
+    step_radii: Annotated[StrictFloat, Field(ge=0.01, le=0.5)] = 0.5
+    longest_step_s: Annotated[StrictFloat, Field(ge=1e-7, le=1.0)] = 0.002
+    solver_iterations: Annotated[StrictInt, Field(ge=1, le=100)] = 10
+    time_limit_s: Annotated[StrictFloat, Field(gt=0.0, le=60.0)] = 2.0
+    contact_time_s: Annotated[StrictFloat, Field(ge=1e-9, le=0.01)] = 1e-6
+    most_collisions: Annotated[StrictInt, Field(ge=1, le=10**12)] = 100_000_000
 
 
 class SimulationParameters(Parameters):

@@ -13,6 +13,7 @@ from blast_env.physics.gas.settings import Cells
 from blast_env.reporting.loads import ReportedBuilding, TargetLoad, UnitSystem
 from blast_env.reporting.threats import NamedCharge
 from blast_env.statistics import reductions
+from blast_env.values import plain_number
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,11 @@ class Limit:
         name, sign, values = text.partition("=")
         parts = values.split(",")
         try:
-            impulse, peak = (float(part) if part.strip() else inf for part in (*parts, "")[:2])
-        except ValueError:
+            impulse, peak = (
+                plain_number("--limit", part.strip()) if part.strip() else inf
+                for part in (*parts, "")[:2]
+            )
+        except BlastEnvError:
             impulse = peak = -1.0
         if not (name and sign) or len(parts) > 2 or not (impulse > 0.0 and peak > 0.0):
             raise BlastEnvError(

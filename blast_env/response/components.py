@@ -10,14 +10,14 @@ from functools import cache
 from importlib.resources import files
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat, TypeAdapter, ValidationError
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.response.glass import GlassKind, Interlayer, Pane
 from blast_env.response.walls import Masonry, Panel, ReinforcedConcrete, Sheeting, Supports
 
 _MM: Final = 1e-3
-_Positive = Annotated[float, Field(gt=0.0, le=100.0)]
+_Positive = Annotated[StrictFloat, Field(gt=0.0, le=100.0)]
 _Text = Annotated[str, Field(min_length=1, max_length=300)]
 
 
@@ -35,7 +35,7 @@ class _Component(BaseModel):
 
     title: _Text
     source: _Text
-    cost_m2: Annotated[float, Field(ge=0.0)] | None = None
+    cost_m2: Annotated[StrictFloat, Field(ge=0.0)] | None = None
 
 
 class Glazing(_Component):
@@ -58,8 +58,8 @@ class Glazing(_Component):
     thickness_mm: _Positive
     glass: GlassKind = GlassKind.ANNEALED
     interlayer: Interlayer | None = None
-    outer_thickness_mm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    sill_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.9
+    outer_thickness_mm: Annotated[StrictFloat, Field(ge=0.0, le=100.0)] = 0.0
+    sill_m: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.9
 
     @property
     def pane(self) -> Pane:

@@ -28,7 +28,7 @@ from math import ceil
 from typing import Annotated, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
@@ -108,8 +108,8 @@ class Interlayer(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    tension_n_m: Annotated[float, Field(gt=0.0)] = 16_000.0
-    tear_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.15
+    tension_n_m: Annotated[StrictFloat, Field(gt=0.0)] = 16_000.0
+    tear_share: Annotated[StrictFloat, Field(gt=0.0, le=1.0)] = 0.15
 
 
 @dataclass(frozen=True)

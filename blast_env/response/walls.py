@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Annotated, Final, Literal, Protocol
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from blast_env.arrays import FloatArray
 from blast_env.response.sdof import Resistance, Responses, System, responses
@@ -159,12 +159,12 @@ class ReinforcedConcrete(_Section):
     """
 
     kind: Literal["reinforced_concrete"] = "reinforced_concrete"
-    thickness_m: Annotated[float, Field(gt=0.0, le=3.0)]
-    steel_share: Annotated[float, Field(gt=0.0, le=0.04)] = 0.003
-    cover_m: Annotated[float, Field(gt=0.0)] = 0.035
-    concrete_pa: Annotated[float, Field(gt=0.0)] = 30e6
-    steel_pa: Annotated[float, Field(gt=0.0)] = 500e6
-    dynamic_increase: Annotated[float, Field(ge=1.0, le=2.0)] = 1.17
+    thickness_m: Annotated[StrictFloat, Field(gt=0.0, le=3.0)]
+    steel_share: Annotated[StrictFloat, Field(gt=0.0, le=0.04)] = 0.003
+    cover_m: Annotated[StrictFloat, Field(gt=0.0)] = 0.035
+    concrete_pa: Annotated[StrictFloat, Field(gt=0.0)] = 30e6
+    steel_pa: Annotated[StrictFloat, Field(gt=0.0)] = 500e6
+    dynamic_increase: Annotated[StrictFloat, Field(ge=1.0, le=2.0)] = 1.17
 
     @property
     def mass_kg_m2(self) -> float:
@@ -210,10 +210,10 @@ class Masonry(_Section):
     """
 
     kind: Literal["masonry"] = "masonry"
-    thickness_m: Annotated[float, Field(gt=0.0, le=2.0)]
-    density_kg_m3: Annotated[float, Field(gt=0.0)] = 1900.0
-    flexural_pa: Annotated[float, Field(gt=0.0)] = 0.7e6
-    young_pa: Annotated[float, Field(gt=0.0)] = 6e9
+    thickness_m: Annotated[StrictFloat, Field(gt=0.0, le=2.0)]
+    density_kg_m3: Annotated[StrictFloat, Field(gt=0.0)] = 1900.0
+    flexural_pa: Annotated[StrictFloat, Field(gt=0.0)] = 0.7e6
+    young_pa: Annotated[StrictFloat, Field(gt=0.0)] = 6e9
 
     @property
     def mass_kg_m2(self) -> float:
@@ -247,9 +247,9 @@ class Sheeting(_Section):
     """
 
     kind: Literal["sheeting"] = "sheeting"
-    moment_n: Annotated[float, Field(gt=0.0)]
-    bending_stiffness_n_m: Annotated[float, Field(gt=0.0)]
-    mass_kg_m2: Annotated[float, Field(gt=0.0)]
+    moment_n: Annotated[StrictFloat, Field(gt=0.0)]
+    bending_stiffness_n_m: Annotated[StrictFloat, Field(gt=0.0)]
+    mass_kg_m2: Annotated[StrictFloat, Field(gt=0.0)]
     material: Literal["steel", "timber", "reinforced_masonry"]
 
     @property

@@ -23,6 +23,7 @@ from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
 from blast_env.app.page import uploads
 from blast_env.app.page.fields import fields_of
+from blast_env.app.page.numbers import NumberField
 from blast_env.app.records import EngineRecord
 from blast_env.app.server import MOST_PAGES, add_pages
 from blast_env.app.session import Sessions
@@ -207,6 +208,53 @@ def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
     play(tmp_path, story)
 
 
+def choose_thing(user: User, thing: str) -> None:
+    selects = user.find(kind=ui.select).elements
+    next(each for each in selects if each.props["label"] == "selected").value = thing
+
+
+def field_of(user: User, label: str) -> NumberField:
+    fields = user.find(kind=NumberField).elements
+    return next(each for each in fields if each.props["label"] == label)
+
+
+@pytest.mark.parametrize(
+    ("typed", "tnt_kg"),
+    [("50,5", 50.5), ("50.5 kg", 50.5), (" 1000 kg TNT ", 1000.0), ("1e3", 1000.0)],
+)
+def test_a_number_is_read_as_it_is_meant_and_shown_with_its_unit(
+    tmp_path: Path, typed: str, tnt_kg: float
+) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        choose_thing(user, "charge 0")
+        mass = field_of(user, "mass (kg TNT)")
+        mass.value = typed
+        user.find("mass (kg TNT)").trigger("blur")
+        assert session.scenario.charge[0].tnt_kg == tnt_kg
+        assert (mass.value, mass.props["suffix"]) == (f"{tnt_kg:g}", "kg TNT")
+
+    play(tmp_path, story)
+
+
+@pytest.mark.parametrize("typed", ["1.000,5", "1,000", "110 lb", "36,2 m", "1_000", "nan", "5 0"])
+def test_a_text_that_is_no_clear_number_changes_nothing_and_is_refused(
+    tmp_path: Path, typed: str
+) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, hut())
+        before = session.scenario
+        choose_thing(user, "charge 0")
+        mass = field_of(user, "mass (kg TNT)")
+        mass.value = typed
+        user.find("mass (kg TNT)").trigger("blur")
+        assert session.scenario == before
+        assert mass.value == f"{before.charge[0].tnt_kg:g}"
+        await user.should_see(f"mass is {typed!r}")
+
+    play(tmp_path, story)
+
+
 def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
@@ -214,15 +262,11 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
             each for each in user.find(kind=ui.select).elements if each.props["label"] == "selected"
         )
         chooser.value = "structure 0"
-        height = next(
-            each
-            for each in user.find(kind=ui.number).elements
-            if each.props["label"] == "height (m)"
-        )
-        height.value = 3.5
+        height = field_of(user, "height (m)")
+        height.value = "3.5"
         user.find("height (m)").trigger("blur")
         assert session.scenario.structures[0].height_m == 3.5
-        height.value = 0.1
+        height.value = "0.1"
         user.find("height (m)").trigger("blur")
         assert session.scenario.structures[0].height_m == 3.5
         await user.should_see("must be at least 0.5")
@@ -278,9 +322,9 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
         assert shown(ui.switch, "terrace").value is False
         shown(ui.switch, "terrace").value = True
         await user.should_see("must be 0: what carries barriers is solid")
-        begins = shown(ui.number, "begins at (m)")
-        assert begins.value == 2.5
-        begins.value = 2.0
+        begins = field_of(user, "begins at (m)")
+        assert begins.value == "2.5"
+        begins.value = "2"
         user.find("begins at (m)").trigger("blur")
         choose(user, "site: scenario file (.toml)")
         saved = (await user.download.next()).content.decode()
@@ -331,6 +375,11 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
                 [SmallFileUpload(name=BLOCK.name, content_type="", _data=content)]
             )
         await user.should_see("protected buildings (names, by commas)")
+        mass = field_of(user, "mass of a charge (kg TNT)")
+        mass.value = "110 lb"
+        user.find(marker="import").click()
+        await user.should_see("mass of a charge is '110 lb', must be a number in kg TNT")
+        mass.value = "50,5"
         user.find(marker="import").click()
         await user.should_see("no building is protected", retries=200)
         user.find("protected buildings (names, by commas)").type("Library")
@@ -339,6 +388,7 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
         await user.should_see("of its outline")
         user.find(marker="take-site").click()
         assert session.scenario.georeference is not None
+        assert {each.tnt_kg for each in session.scenario.charge} == {50.5}
         assert any(each.protected for each in session.scenario.structures)
 
     play(tmp_path, story)

@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
+from blast_env.cli import app
 from blast_env.cli.command import Command, function_of, options_of
 from blast_env.cli.targets import Target
 from blast_env.option_fields import FOLDER, argument, option
@@ -104,3 +105,16 @@ def test_a_picture_that_cannot_be_written_is_refused_before_the_work() -> None:
     assert result.exit_code == 2
     assert "--picture a.bmp: suffix is '.bmp', must be one of .png, .svg" in result.stderr
     assert made == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(("--tnt-kg", "1_000"), ("--tnt-kg", "nan"), ("--tnt-kg", "1,5"), ("--seed", "1_0")),
+        *(("--charge", "5", "1_2"), ("--cell", "inf"), ("--tnt-kg", "\uff11")),
+    ],
+)
+def test_a_number_that_python_reads_and_nobody_means_is_refused(words: tuple[str, ...]) -> None:
+    result = CliRunner().invoke(app, ["simulate", "courtyard", *words])
+    assert result.exit_code == 2
+    assert "is no number such as 1000 or 0.5" in result.output

@@ -309,7 +309,7 @@ def test_what_the_scenario_refuses_is_named(tmp_path: Path) -> None:
 
 
 def test_heights_that_are_none_are_noted_and_left_out(tmp_path: Path) -> None:
-    for height in ("tall", -3.0, "0"):
+    for height in ("tall", -3.0, "0", "1,250"):
         house = outline(rectangle(0, 0, 6, 4), height=height, protected=True)
         site = import_site(written(tmp_path, house, PLACE))
         assert site.buildings[0].height_m is None

@@ -8,7 +8,16 @@ from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictFloat,
+    StrictInt,
+    ValidationError,
+    model_validator,
+)
 
 from blast_env.documents import DocumentError, described, parse_json
 from blast_env.envs.arguments import check_names
@@ -124,7 +133,7 @@ WrapperName = Literal[
 ]
 """Wrappers of the environment by the names that RL Zoo imports them by."""
 
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Share = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
 
 
 class PolicyArguments(BaseModel):
@@ -143,13 +152,13 @@ class PolicyArguments(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    rows: Annotated[int, Field(ge=1, le=1000)] = 1
-    columns: Annotated[int, Field(ge=1, le=1000)] = 1
+    rows: Annotated[StrictInt, Field(ge=1, le=1000)] = 1
+    columns: Annotated[StrictInt, Field(ge=1, le=1000)] = 1
     item_channels: Annotated[tuple[str, ...], Field(max_length=1000)] = ()
-    places: Annotated[int, Field(ge=1, le=64)] | None = None
-    width: Annotated[int, Field(ge=1, le=512)] = 24
-    critic_width: Annotated[int, Field(ge=1, le=4096)] = 64
-    finish_bias: Annotated[float, Field(ge=-50.0, le=50.0)] = -3.0
+    places: Annotated[StrictInt, Field(ge=1, le=64)] | None = None
+    width: Annotated[StrictInt, Field(ge=1, le=512)] = 24
+    critic_width: Annotated[StrictInt, Field(ge=1, le=4096)] = 64
+    finish_bias: Annotated[StrictFloat, Field(ge=-50.0, le=50.0)] = -3.0
 
 
 class CommonHyperparameters(BaseModel):
@@ -168,14 +177,14 @@ class CommonHyperparameters(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    n_timesteps: Annotated[int, Field(ge=1, le=10**10)]
-    n_envs: Annotated[int, Field(ge=1, le=256)]
+    n_timesteps: Annotated[StrictInt, Field(ge=1, le=10**10)]
+    n_envs: Annotated[StrictInt, Field(ge=1, le=256)]
     policy: PolicyName
     policy_kwargs: PolicyArguments = PolicyArguments()
     learning_rate: Amount
-    batch_size: Annotated[int, Field(ge=2, le=10**8)]
-    vf_coef: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
-    max_grad_norm: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.5
+    batch_size: Annotated[StrictInt, Field(ge=2, le=10**8)]
+    vf_coef: Annotated[StrictFloat, Field(ge=0.0, le=100.0)] = 0.5
+    max_grad_norm: Annotated[StrictFloat, Field(gt=0.0, le=1000.0)] = 0.5
 
 
 class Hyperparameters(CommonHyperparameters):
@@ -197,14 +206,14 @@ class Hyperparameters(CommonHyperparameters):
     """
 
     env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
-    n_steps: Annotated[int, Field(ge=2, le=100_000)]
-    n_epochs: Annotated[int, Field(ge=1, le=100)]
+    n_steps: Annotated[StrictInt, Field(ge=2, le=100_000)]
+    n_epochs: Annotated[StrictInt, Field(ge=1, le=100)]
     gamma: Share = 1.0
     gae_lambda: Share = 0.95
     clip_range: Amount = 0.2
-    ent_coef: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
+    ent_coef: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.0
     normalize_advantage: bool = True
-    target_kl: Annotated[float, Field(gt=0.0)] | None = None
+    target_kl: Annotated[StrictFloat, Field(gt=0.0)] | None = None
 
     @model_validator(mode="after")
     def _check_batches(self) -> "Hyperparameters":
@@ -232,7 +241,7 @@ class Hyperparameters(CommonHyperparameters):
         return tuple(wrappers)
 
 
-Count = Annotated[int, Field(ge=0, le=10_000)]
+Count = Annotated[StrictInt, Field(ge=0, le=10_000)]
 
 
 class SelfLabellingHyperparameters(CommonHyperparameters):
@@ -251,8 +260,8 @@ class SelfLabellingHyperparameters(CommonHyperparameters):
         updates: The same after each further round.
     """
 
-    cases: Annotated[int, Field(ge=1, le=100_000)]
-    cases_per_round: Annotated[int, Field(ge=1, le=100_000)]
+    cases: Annotated[StrictInt, Field(ge=1, le=100_000)]
+    cases_per_round: Annotated[StrictInt, Field(ge=1, le=100_000)]
     samples: Count
     neighbours: Count
     borrowed: Count = 0

@@ -16,7 +16,7 @@ class FormField(NamedTuple):
     Attributes:
         label: What it is, with its unit.
         key: Its key in the scenario file.
-        form: What is typed into it.
+        form: Kind of the value that it takes.
         part: Number of the coordinate, where the key holds several.
         optional: Whether it may be empty: then the rule of the file format holds.
         inside: Key of the table in which the key is, if it is a further one.
@@ -182,8 +182,4 @@ def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]
 def _of_form(field: FormField, typed: Any) -> Any:
     if typed is None or typed == "":
         return None
-    if field.form == "number":
-        return float(typed)
-    if field.form == "integer":
-        return int(typed) if float(typed).is_integer() else float(typed)
-    return typed
+    return int(typed) if field.form == "integer" else typed

@@ -6,6 +6,7 @@ from typing import Any, Final
 from nicegui import events, ui
 
 from blast_env.app.editor import Editor, Tool
+from blast_env.app.page.numbers import NumberField
 from blast_env.app.plan import PixelView, overlay_svg, plan_legend, plan_svg, words_of_place
 from blast_env.app.solids import SEE_THROUGH, boxes
 
@@ -62,14 +63,14 @@ class PlanPanel:
                 button = ui.button(words, icon=icon, on_click=lambda _, t=tool: self.choose(t))
                 button.props("dense flat no-caps size=sm").tooltip(f"{words} (key {key.upper()})")
                 self._buttons[tool] = button
-            self._height = ui.number(
+            self._height = NumberField(
                 "its height (m)",
-                value=self._editor.new_height_m,
-                min=0.5,
-                step=0.5,
-                on_change=lambda event: self._take_height(event.value),
+                self._editor.new_height_m,
+                self._take_height,
+                optional=True,
+                least=0.5,
             )
-            self._height.props("dense outlined").classes("w-32")
+            self._height.classes("w-32")
             self._height.tooltip("of a structure that is drawn; empty: as high as the air")
         ui.label("To draw, take a larger screen: here one looks, blasts and compares.").classes(
             "be-quiet be-narrow"

@@ -10,6 +10,7 @@ from blast_env.app import edits
 from blast_env.app.editor import Editor
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.page.fields import FormField, change_of, fields_of, value_of
+from blast_env.app.page.numbers import NumberField
 from blast_env.physics.scene import WALLS
 from blast_env.response.components import catalogue
 from blast_env.scenario import Scenario
@@ -73,7 +74,11 @@ class SitePanel:
                 self._inputs = [self._input(each) for each in fields]
         section = edits.section_of(scenario, thing)
         for field, element in zip(self._fields, self._inputs, strict=True):
-            element.value = value_of(section, field)
+            value = value_of(section, field)
+            if isinstance(element, NumberField):
+                element.show(value)
+            else:
+                element.value = value
         self._delete.set_enabled(thing != _SITE)
         self._facts.text = " ".join(
             (
@@ -99,12 +104,16 @@ class SitePanel:
         elif field.form == "text":
             element = ui.input(field.label)
         else:
-            element = ui.number(field.label, step=1 if field.form == "integer" else 0.5)
-        if field.form in ("text", "number", "integer"):
+            element = NumberField(
+                field.label,
+                taken=lambda number: self._put(field, number),
+                optional=field.optional,
+                whole=field.form == "integer",
+            )
+        if field.form == "text":
             element.on("blur", lambda: self._put(field, element.value))
             element.on("keydown.enter", lambda: self._put(field, element.value))
-            element.on("change", lambda: self._put(field, element.value))
-        else:
+        elif not isinstance(element, NumberField):
             element.on_value_change(lambda e: self._put(field, e.value))
         if field.optional:
             empty = "none" if field.form in ("glazing", "wall") else "by rule"
@@ -124,13 +133,9 @@ class SitePanel:
         section = edits.section_of(scenario, thing)
         if value_of(section, field) == typed:
             return
-        try:
-            values = change_of(section, field, typed)
-        except ValueError:
-            self._editor.message = f"{field.label}: {typed!r} is no number"
-        else:
-            label = f"{thing.kind}: {field.label}"
-            self._editor.attempt(label, lambda site: edits.with_values(site, thing, values))
+        values = change_of(section, field, typed)
+        label = f"{thing.kind}: {field.label}"
+        self._editor.attempt(label, lambda site: edits.with_values(site, thing, values))
         self._after()
 
     def _rename(self) -> None:

@@ -4,6 +4,7 @@ from datetime import datetime
 
 from nicegui import ui
 
+from blast_env.app.page.numbers import NumberField
 from blast_env.app.page.uploads import complain, site_upload
 from blast_env.app.session import Sessions
 from blast_env.errors import BlastEnvError
@@ -45,8 +46,8 @@ class StartPage:
                 ui.label(load_scenario(name).description).classes("be-quiet be-what")
         ui.separator()
         with ui.row().classes("items-center gap-2"):
-            self._seed = ui.number("seed", value=0, min=0, step=1, format="%d")
-            self._seed.props("dense outlined").classes("w-28")
+            self._seed = NumberField("seed", 0, whole=True, least=0)
+            self._seed.classes("w-28")
             ui.button("generated site", icon="casino", on_click=self._generated).props(
                 "no-caps dense outline"
             )
@@ -72,7 +73,7 @@ class StartPage:
 
     def _generated(self) -> None:
         try:
-            self._create(generate_site(int(self._seed.value or 0)), "generated")
+            self._create(generate_site(int(self._seed.filled)), "generated")
         except BlastEnvError as error:
             complain(error)
 

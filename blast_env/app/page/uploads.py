@@ -10,6 +10,7 @@ from nicegui.elements.upload_files import FileUpload
 
 from blast_env.app.guard import MOST_BYTES
 from blast_env.app.jobs import Workers
+from blast_env.app.page.numbers import NumberField
 from blast_env.app.sources import MAPS, SITES, imported_site, is_map, site_of_file
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
@@ -17,6 +18,7 @@ from blast_env.importing.convert import ImportedSite
 from blast_env.importing.options import ImportOptions
 from blast_env.reading import Reading
 from blast_env.scenario import Scenario
+from blast_env.values import plain_number
 
 Read = TypeVar("Read")
 _MOST_LETTERS: Final = 100
@@ -147,9 +149,9 @@ class ImportDialog:
                 self._charges = _text("charges at x, y; x, y of the file (or its streets)")
                 self._tnt = _number("mass of a charge (kg TNT)", 100.0)
                 self._around = _number("build zone around what is protected (m)", 10.0)
-                self._stock = _number("stock of modules", 20.0)
+                self._stock = _number("stock of modules", 20.0, whole=True)
                 self._wall = _number("height of modules (m)", 3.0)
-                self._height = _number("height of buildings without one (m)", None)
+                self._height = _number("height of buildings without one (m)", None, optional=True)
                 self._crs = _text("reference system (EPSG:...), if not in the file")
                 self._units = _text("unit of a drawing (m, mm, ft)")
             self._wait = ui.label("importing...").classes("be-quiet")
@@ -172,11 +174,11 @@ class ImportDialog:
             ),
             protect_near=next(iter(_places(_filled(self._near))), None),
             charge_at=tuple(_places(_filled(self._charges))),
-            tnt_kg=float(self._tnt.value or 100.0),
-            zone_around_m=self._around.value,
-            stock=int(self._stock.value or 1),
-            wall_height_m=float(self._wall.value or 3.0),
-            default_height_m=self._height.value,
+            tnt_kg=self._tnt.filled,
+            zone_around_m=self._around.filled,
+            stock=int(self._stock.filled),
+            wall_height_m=self._wall.filled,
+            default_height_m=self._height.number,
             crs=_filled(self._crs) or None,
             units=_filled(self._units) or None,
         )
@@ -227,8 +229,11 @@ def _text(label: str) -> ui.input:
     return ui.input(label).props("dense outlined stack-label").classes("w-full")
 
 
-def _number(label: str, value: float | None) -> ui.number:
-    return ui.number(label, value=value).props("dense outlined stack-label").classes("w-full")
+def _number(
+    label: str, number: float | None, *, optional: bool = False, whole: bool = False
+) -> NumberField:
+    field = NumberField(label, number, optional=optional, whole=whole)
+    return field.props("stack-label").classes("w-full")
 
 
 def _filled(element: Any) -> str:
@@ -244,7 +249,7 @@ def _places(text: str) -> list[tuple[float, float]]:
     places = []
     for part in filter(None, (each.strip() for each in text.split(";"))):
         try:
-            x, y = (float(value) for value in part.split(","))
+            x, y = (plain_number("a coordinate", value.strip()) for value in part.split(","))
         except ValueError:
             raise BlastEnvError(f"{part!r} is no place: write x, y; x, y") from None
         places.append((x, y))

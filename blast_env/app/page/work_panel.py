@@ -1,6 +1,7 @@
 """The panel on the right: layouts, blasts, proposals, and the work that is under way."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from blast_env.app.cost import cost_words, time_words
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
 from blast_env.app.offers import offered
+from blast_env.app.page.numbers import NumberField
 from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
@@ -183,8 +185,8 @@ class WorkPanel:
         with ui.row().classes("w-full no-wrap gap-1"):
             self._proposer = ui.select([], label="by")
             self._proposer.props("dense outlined options-dense").classes("grow be-whole")
-            self._budget = ui.number("blasts", value=50, min=1, step=50, format="%d")
-            self._budget.props("dense outlined").classes("w-20")
+            self._budget = NumberField("blasts", 50, whole=True, least=1)
+            self._budget.classes("w-20")
         self._budget.bind_enabled_from(
             self._proposer, "value", lambda value: str(value).startswith("search")
         )
@@ -265,8 +267,7 @@ class WorkPanel:
         kind, _, name = str(self._proposer.value).partition(" ")
         session = self._session
         if kind == "search":
-            budget = int(self._budget.value or 0)
-            self._try(lambda: session.search(name, budget, from_layout=False))
+            self._try(lambda: session.search(name, int(self._budget.filled), from_layout=False))
         elif kind == "run":
             self._try(lambda: session.propose(str(self._runs[name]), is_run=True))
         else:
@@ -327,7 +328,8 @@ class WorkPanel:
     def _say_cost_of_search(self) -> None:
         costs = []
         if str(self._proposer.value).startswith("search"):
-            costs = [*self._session.cost_of_search(int(self._budget.value or 0))]
+            with suppress(BlastEnvError):  # the field says what is wrong
+                costs = [*self._session.cost_of_search(int(self._budget.filled))]
         self._search_cost.visible = bool(costs)
         if costs:
             self._search_cost.text = cost_words(costs)

@@ -357,13 +357,39 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     assert not page.faults()
 
 
+def test_numbers_are_read_as_they_are_meant_or_refused(page: Page) -> None:
+    """Number fields of browsers drop the comma and the unit, and keep the digits."""
+    page.begin("courtyard")
+    page.choose("selected", "charge")
+
+    def shows_mass(shown: str) -> bool:
+        for each in page.all(".q-field"):
+            if each.is_displayed() and "mass (kg TNT)" in each.text:
+                number = each.find_element(By.TAG_NAME, "input").get_attribute("value")
+                unit = each.find_element(By.CSS_SELECTOR, ".q-field__suffix").text
+                return f"{number} {unit}" == shown
+        return False
+
+    taken = ("50,5", "50.5 kg TNT"), ("36,2 kg", "36.2 kg TNT"), ("100", "100 kg TNT")
+    for typed, shown in taken:
+        page.fill("mass (kg TNT)", typed + Keys.TAB)
+        page.until(partial(shows_mass, shown))
+    for typed in ("1.000,5", "110 lb", "36,2 m", "1,000"):
+        page.fill("mass (kg TNT)", typed + Keys.TAB)
+        page.sees(f"mass is '{typed}'")
+        page.until(partial(shows_mass, "100 kg TNT"))
+    assert "height is" not in page.text()  # a field that was left as it was
+    page.shoot("numbers")
+    assert not page.faults()
+
+
 def test_search_stop_keep_save_and_lose_nothing(page: Page, server: Server, tmp_path: Path) -> None:
     page.begin("courtyard")
     address = page.driver.current_url.removeprefix(server.url)
     page.choose("engine", "particles: a first look")
     page.choose("by", "search: random")
     budget = next(
-        each for each in page.all("input[type=number]") if each.get_attribute("value") == "50"
+        each for each in page.all("input[inputmode=numeric]") if each.get_attribute("value") == "50"
     )
     budget.send_keys(Keys.CONTROL, "a")
     budget.send_keys("5000")
