@@ -179,7 +179,7 @@ def facade_width(
 
 
 def _psi_s(scenario: Scenario, seed: int) -> float:
-    return simulate(scenario, seed=seed).impulse("building").psi_s
+    return simulate(scenario, seed=seed, engine="pymunk").impulse("building").psi_s
 
 
 if __name__ == "__main__":

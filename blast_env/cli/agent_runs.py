@@ -185,6 +185,7 @@ def _export(
 
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
+    print_line(engine.describe([case.scenario for case in comparison.cases]))
     table, cases = ResultTable(title, _HEADERS), case_table(comparison)
     objective = comparison.cases[0].scenario.objective
     for row in cases.to_dict("records"):
@@ -202,9 +203,9 @@ def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (~)")
     print_means(comparison, objective)
-    calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
-    words = engine.describe([case.scenario for case in comparison.cases])
-    print_line(f"{words}, calibration {', '.join(calibrations)}")
+    if engine.needs_calibration:
+        calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
+        print_line(f"calibration {', '.join(calibrations)}")
 
 
 def _write(comparison: Comparison, record: dict[str, Any], out: Path) -> list[Path]:

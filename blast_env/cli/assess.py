@@ -110,12 +110,12 @@ class AssessCommand(ChargeOptions):
                 found[name] = consequences(
                     scenario, layout, charges, engine, progress, without_fallen=self.without_fallen
                 )
+        print_line(engine.describe([scenario]))
         self._print_verdict(scenario, found, target)
         self._print(scenario, found)
         self._print_neighbours(found)
         self._print_barriers(found)
         self._print_glazing(scenario, list(found.values())[-1], target)
-        print_line(engine.describe([scenario]))
         self._write(scenario, layouts, found)
 
     def _charges(self, scenario: Scenario) -> list[AnyCharge]:

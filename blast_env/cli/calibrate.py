@@ -106,8 +106,8 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
         stored = report.calibration(self.name, self.law)
         stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
         written = _write(report, stored, self.stem)
-        _print(report, stored)
         print_line(engine.describe([study.scenario]))
+        _print(report, stored)
         print_written([*written, kept])
 
     def _scenario(self) -> Scenario:

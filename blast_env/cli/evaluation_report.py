@@ -232,6 +232,7 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:
     """Print the buildings' mean loads, and what the layout does over all threats."""
     count = len(evaluation.threats)
+    print_line(engine.describe([evaluation.scenario]))
     table = ResultTable(
         f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
         f"{threats_text(count, seeds)}",
@@ -250,12 +251,12 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine
             f"{row['threats_in_range']} of {count}",
         )
     result_console().print(table)
-    _print_totals(evaluation, engine)
+    _print_totals(evaluation)
     for note in evaluation.notes:
         print_line(f"note: {note}")
 
 
-def _print_totals(evaluation: LayoutEvaluation, engine: Engine) -> None:
+def _print_totals(evaluation: LayoutEvaluation) -> None:
     """Print what there is to say about the protected structures together."""
     worst, objective = evaluation.worst, evaluation.scenario.objective
     comparison = evaluation.comparison
@@ -272,10 +273,9 @@ def _print_totals(evaluation: LayoutEvaluation, engine: Engine) -> None:
         f"{charge.position_m[1]:.2f}) m, seed {worst.threat.seed}: "
         f"{objective.text(worst.load)}, reduction {percent(worst.reduction)}"
     )
-    print_line(
-        f"{engine.describe([evaluation.scenario])}, calibration {evaluation.calibration}, "
-        f"scenario hash {evaluation.scenario.content_hash[:12]}"
-    )
+    is_scaled = evaluation.engine.needs_calibration
+    law = f"calibration {evaluation.calibration}, " if is_scaled else ""
+    print_line(f"{law}scenario hash {evaluation.scenario.content_hash[:12]}")
 
 
 def _objective_text(objective: ObjectiveSection) -> str:

@@ -11,6 +11,7 @@ from blast_agents.search import proposers
 
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
+    BY_SITE,
     CELL_HELP,
     CELLS_HELP,
     ENGINE_HELP,
@@ -24,7 +25,7 @@ from blast_env.cli.output import (
     print_written,
     progress_bar,
 )
-from blast_env.engines import Engine, find_engine
+from blast_env.engines import Engine, default_engine, find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.provenance import command
 from blast_env.sites import FAMILIES
@@ -71,7 +72,11 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         "again.",
     )
     seed: int = option(0, "Decides cases, threats and searches.")
-    engine: str = option("event", f"{ENGINE_HELP} It judges, and searches spend blasts of it.")
+    engine: str | None = option(
+        None,
+        f"{ENGINE_HELP} It judges, and searches spend blasts of it.",
+        show_default=BY_SITE,
+    )
     first_engine: str | None = option(
         None,
         "Cheaper engine: every search enters once more with blasts of this one; the judge then "
@@ -99,7 +104,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         from blast_agents.surrogate import load_surrogate
 
         with running_on(self.cluster):
-            engine = find_engine(self.engine, self.cell_m, cells=self.cells)
+            engine = find_engine(self.engine or self._by_site(), self.cell_m, cells=self.cells)
             tracks = find_tracks(
                 self.track, self.cases, self.seeds, self.seed, self.scenario, noisy=engine.has_noise
             )
@@ -113,6 +118,15 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
             all_standings = [_play(contest, self.processes) for contest in contests]
             written = write_league(all_standings, self.out, shlex.join(command()))
         print_written(written)
+
+    def _by_site(self) -> str:
+        """Return the engine that the sites take: those that are named, or of the track's family."""
+        # Here, because it takes half a second to import.
+        from blast_env.envs.strategies import scenario_source
+
+        names = self.scenario or ((self.track,) if self.track in FAMILIES else ())
+        sites = (scenario_source(each).representative for each in names)
+        return default_engine(*sites, particles="event")
 
     def _contest(
         self,

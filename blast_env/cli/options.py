@@ -46,6 +46,7 @@ ENGINE_HELP: Final = (
     f"Engine: {', '.join(ENGINE_NAMES)}. {JUDGE} is gas dynamics, "
     f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
 )
+BY_SITE: Final = f"{JUDGE} where the site states heights, else particles"
 CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
 CELLS_HELP: Final = (
     "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "

@@ -75,8 +75,8 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         print_line(f"{scenario.name}: {layout_counts(result.layout)}{cost}, by {result.by}")
         if self.verify:
             self._verify(problem, result.layout)
-        engine = problem.evaluator.engine
-        print_line(engine.describe() if problem.evaluator.blasts else "no blast was run")
+        if not problem.evaluator.blasts:
+            print_line("no blast was run")
         if self.out is not None:
             self._write(scenario, result.layout, chosen.source, self.out)
 
@@ -109,6 +109,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
                 "rule is proposed"
             )
             budget = chosen.budget if self.budget is None else min(self.budget, chosen.budget)
+            print_line(problem.evaluator.engine.describe())
             print_cost(problem.evaluator, problem.case, budget)
         elif self.budget is not None and not self.verify:
             raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast here")
@@ -134,6 +135,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
             most = self.budget // len(case.threats)
             distinct = list(dict.fromkeys(layouts.values()))[:most]
             layouts = {name: each for name, each in layouts.items() if each in distinct}
+        print_line(problem.evaluator.engine.describe())
         print_cost(problem.evaluator, case, len({*layouts.values()}) * len(case.threats))
         pairs = [(each, threat) for each in layouts.values() for threat in case.threats]
         with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:

@@ -175,6 +175,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
     def _run(self, method: Proposer, evaluator: BlastEvaluator) -> "SearchRun":
         case = self._practice(evaluator.scenario, evaluator.engine)
         problem = LayoutProblem(evaluator, case, self.processes)
+        print_line(evaluator.engine.describe([evaluator.scenario]))
         print_cost(evaluator, case, self.budget)
         problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
         hits, begun_s = evaluator.cache_hits, perf_counter()
@@ -298,7 +299,6 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
         f"{run.seconds:.1f} s"
     )
-    print_line(problem.evaluator.engine.describe([problem.scenario]))
 
 
 def write_search(

@@ -13,6 +13,7 @@ from blast_env.cli.command import argument, option, options_of
 from blast_env.cli.options import (
     CELL_HELP,
     CELLS_HELP,
+    BY_SITE,
     ENGINE_HELP,
     SCENARIO_HELP,
     UNTIL_HELP,
@@ -30,7 +31,7 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.engines import Blast, BlastResult, Engine, find_engine
+from blast_env.engines import Blast, BlastResult, Engine, default_engine, find_engine
 from blast_env.engines.contract import load_plugin
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.geometry import Layout, layout_counts
@@ -66,7 +67,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
     scenario: str = argument(SCENARIO_HELP)
     layout: Path | None = option(None, "JSON file with the barrier's [row, column] cells.")
     seed: int = option(0, "Decides charge, fan and air.", min=0)
-    engine: str = option("pymunk", ENGINE_HELP)
+    engine: str | None = option(None, ENGINE_HELP, show_default=BY_SITE)
     stand_off_m: float | None = option(None, "Distance from charge to facade, m (free_field).")
     film: Path | None = option(None, "Write a film: .mp4 or .gif.", writes=(".mp4", ".gif"))
     excel: Path | None = option(None, "Write a workbook: .xlsx.", writes=(".xlsx",))
@@ -136,7 +137,9 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         scenario = scenario.with_simulation(self.preset)
         # A layout is for the site of the file; preset and stand-off are this command's.
         layout: Layout = () if self.layout is None else tuple(load_layout(self.layout, site))
-        engine = find_engine(self.engine, self.cell_m, self.until, self.cells)
+        engine = find_engine(
+            self.engine or default_engine(scenario), self.cell_m, self.until, self.cells
+        )
         self._check(engine, layout)
         charge = self.fixed(scenario, draw_threat(scenario, self.seed))
         shown = self._shown(scenario, layout, engine, charge)
@@ -151,6 +154,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         if self.any_json:
             print_json(_record(result, written, all_of_it=self.json_all))
         else:
+            print_line(engine.describe([scenario]))
             shown.print_loads(result)
             print_written(written)
 
@@ -245,7 +249,7 @@ class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
         )
 
     def print_end(self, result: _AnyResult, what: str, steps: str, notes: Sequence[str]) -> None:
-        """Print which engine ran what, how it ended, and what there is to say of it."""
+        """Print what ran, how it ended, and what there is to say of it."""
         print_line(
             f"{what}, {result.steps:,} {steps}, {MS_PER_S * result.time_s:.0f} ms simulated; ended "
             f"because {result.end_reason}"
@@ -327,8 +331,9 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         notes = {str(each["error"]) for each in scaled.values() if "error" in each}
         for name, each in scaled.items():
             notes |= {f"outside the calibration (~): {name}, {text}" for text in _notes(each)}
-        what = f"{blast.particle_engine.describe([blast.scenario])}: {len(scene.balls):,} balls"
+        what = f"{len(scene.balls):,} balls"
         texts = [f"impulse (Pa s): {note}" for note in sorted(notes)]
+        texts += blast.scenario.height_notes
         self.print_end(result, what, result.step_name, texts)
 
 
@@ -479,8 +484,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
         texts = [f"outside what was checked (~): {note}" for note in notes]
         texts += result.stepped_notes
-        what = f"{result.blast.engine.describe()}: {cells} cells"
-        self.print_end(result, what, "steps", texts)
+        self.print_end(result, f"{cells} cells", "steps", texts)
 
 
 def _section(text: str | None) -> "VerticalSection | None":

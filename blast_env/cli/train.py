@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from blast_env.cli.command import FOLDER, option, options_of
-from blast_env.cli.options import CELL_HELP, CELLS_HELP, ENGINE_HELP, ClusterOptions, running_on
+from blast_env.cli.options import (
+    BY_SITE,
+    CELL_HELP,
+    CELLS_HELP,
+    ENGINE_HELP,
+    ClusterOptions,
+    running_on,
+)
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
     print_line,
@@ -15,6 +22,8 @@ from blast_env.cli.output import (
     progress_bar,
     save_layout_picture,
 )
+from blast_env.engines import default_engine
+from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.physics.scene import Charge
 from blast_env.scenario import Scenario
@@ -60,7 +69,7 @@ class TrainCommand(ClusterOptions):
         None, "visible or hidden: whether the agent sees the charge.", show_default="visible"
     )
     engine: str | None = option(
-        None, f"{ENGINE_HELP} surrogate guesses them.", show_default="event"
+        None, f"{ENGINE_HELP} surrogate guesses them.", show_default=BY_SITE
     )
     cell_m: float | None = option(None, CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
@@ -132,6 +141,8 @@ class TrainCommand(ClusterOptions):
         names = ("steps", "seed", "threat", "engine", "observation", "cell_m", "cells")
         given = {name: getattr(self, name) for name in names}
         values = {name: value for name, value in given.items() if value is not None}
+        site = scenario_source(scenario).representative
+        values.setdefault("engine", default_engine(site, particles="event"))
         values["start_from"] = None if self.start_from is None else str(self.start_from)
         values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
         hyperparameters = load_hyperparameters(
@@ -147,14 +158,14 @@ def _print_result(result: "TrainingResult") -> None:
     counters, folder = result.progress.counters, result.folder
     settings = result.configuration.settings
     blasts = "guesses" if settings.guesses else "blasts"
-    print_line(
-        f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} {blasts} "
-        f"in {counters.seconds:,.0f} s"
-    )
     scenario = folder.scenario(result.configuration)
     print_line(settings.blast_engine.describe([scenario]))
     if settings.judge.name != settings.blast_engine.name:
         print_line(f"weights chosen by {settings.judge.describe([scenario])}")
+    print_line(
+        f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} {blasts} "
+        f"in {counters.seconds:,.0f} s"
+    )
     for row in result.progress.evaluations:
         if row.steps == counters.best_steps:
             print_line(

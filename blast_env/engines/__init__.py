@@ -11,6 +11,7 @@ from blast_env.engines.contract import (
     Engine,
     EngineOption,
     StructureLoad,
+    default_engine,
     find_engine,
 )
 from blast_env.engines.particles import Blast, BlastResult, ParticleEngine
@@ -27,6 +28,7 @@ __all__ = [
     "EngineOption",
     "ParticleEngine",
     "StructureLoad",
+    "default_engine",
     "find_engine",
     "simulate",
     "simulate_many",

@@ -428,6 +428,20 @@ JUDGE: Final = "gas"
 """The engine whose word counts about protection."""
 
 
+def default_engine(*scenarios: Scenario, particles: str = ENGINE_NAMES[0]) -> str:
+    """Return the name of the engine that sites take where nobody names one.
+
+    Gas dynamics as soon as one site states anything that particles leave aside: a height, a
+    catalogue, a raised charge, walls that do not count, a gauge. Otherwise the particle model,
+    which was made for such sites.
+
+    Args:
+        scenarios: The sites.
+        particles: The engine of the particle model.
+    """
+    return JUDGE if any(each.height_notes for each in scenarios) else particles
+
+
 def find_engine(
     engine: str | Engine,
     cell_m: float | None = None,

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
-from blast_env.engines.contract import BlastOutcome, Engine, find_engine
+from blast_env.engines.contract import BlastOutcome, Engine, default_engine, find_engine
 from blast_env.engines.particles import Blast, BlastResult
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element
 from blast_env.runner import check_workers
-from blast_env.scenario import AnyCharge, AnyScenario
+from blast_env.scenario import AnyCharge, AnyScenario, find_scenario
 
 if TYPE_CHECKING:  # Numba takes a third of a second to import
     from blast_env.engines.gas import GasEngine, GasResult
@@ -36,7 +36,33 @@ def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = ...,
     seed: int = ...,
-    engine: str | Engine = ...,
+    engine: None = ...,
+    charge: AnyCharge | None = ...,
+    progress: Callable[[float], None] | None = ...,
+    cell_m: float | None = ...,
+    until: str | float | None = ...,
+    cells: str | None = ...,
+) -> Any: ...  # the site decides
+
+
+@overload
+def simulate(
+    scenario: AnyScenario,
+    layout: Sequence[Element],
+    seed: int,
+    engine: str | Engine,
+    charge: AnyCharge | None = ...,
+    progress: Callable[[float], None] | None = ...,
+) -> BlastResult: ...
+
+
+@overload
+def simulate(
+    scenario: AnyScenario,
+    layout: Sequence[Element] = ...,
+    seed: int = ...,
+    *,
+    engine: str | Engine,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
 ) -> BlastResult: ...
@@ -46,7 +72,7 @@ def simulate(
     scenario: AnyScenario,
     layout: Sequence[Element] = (),
     seed: int = 0,
-    engine: str | Engine = "pymunk",
+    engine: str | Engine | None = None,
     charge: AnyCharge | None = None,
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
@@ -62,7 +88,8 @@ def simulate(
         layout: (row, column) of the build-zone cells that hold a barrier module.
         seed: Decides the charge, where the scenario leaves it open, the fan and the air.
         engine: Name of an engine, or an engine: the particle engines `"pymunk"` and `"event"`, or
-            gas dynamics, `"gas"`, for which the seed does no more than draw the charge.
+            gas dynamics, `"gas"`, for which the seed does no more than draw the charge. The site
+            decides unless one is given; see `default_engine`.
         charge: The charge, instead of one drawn from the scenario.
         progress: Called from time to time with the share of the time limit that has passed.
         cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
@@ -84,8 +111,9 @@ def simulate(
     """
     # Anything else is refused where it is read.
     elements = tuple(layout) if isinstance(layout, Iterable) else layout
-    found = find_engine(engine, cell_m, until, cells)
-    return found.blast(scenario, elements, seed, charge).run(progress)
+    site = find_scenario(scenario)
+    found = find_engine(default_engine(site) if engine is None else engine, cell_m, until, cells)
+    return found.blast(site, elements, seed, charge).run(progress)
 
 
 def simulate_many(

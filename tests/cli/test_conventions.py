@@ -112,7 +112,8 @@ def test_a_table_that_is_too_wide_goes_on_below_with_the_names_of_its_rows() -> 
 @pytest.mark.parametrize("engine", ["event", "gas"])
 def test_the_loads_of_a_blast_are_readable_in_80_columns(engine: str, hut_file: Path) -> None:
     shown = run("simulate", hut_file, "--engine", engine).stdout
-    table = shown[: shown.index(f"engine {engine} ")].splitlines()
+    assert shown.startswith(f"engine {engine} ")
+    table = shown[: shown.index("ended because")].splitlines()[:-1]
     assert max(map(len, table)) <= NARROW
     assert {"building", "protected", "hut"} <= set(shown.split())
     assert "…" not in shown
