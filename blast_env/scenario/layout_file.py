@@ -37,7 +37,7 @@ _MEASURES: Final[Mapping[str, type[Measure]]] = MappingProxyType(
 )
 """The keys of the names of the measures, in the last version."""
 
-_OTHER_KEYS: Final = ("scenario", "scenario_hash", "provenance", "version")
+_OTHER_KEYS: Final = ("scenario", "site_hash", "provenance", "version")
 _PIECE_KEYS: Final[Mapping[str, type]] = MappingProxyType(
     {"item": str, "row": int, "column": int, "turned": bool}
 )
@@ -54,14 +54,15 @@ class LayoutFile:
     Attributes:
         layout: (row, column) of each module, or the pieces, in the order of the file.
         scenario: Name of the scenario that the layout is for; None if the file does not say.
-        scenario_hash: Its content hash, 64 hexadecimal digits; None if the file does not say.
+        site_hash: Hash of its zone, catalogue and structures, 64 hexadecimal digits; None if the
+            file does not say.
         provenance: How the layout was made: anything that JSON can hold (method, command, seed,
             versions, blasts).
     """
 
     layout: Layout
     scenario: str | None = None
-    scenario_hash: str | None = None
+    site_hash: str | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
@@ -100,7 +101,7 @@ class LayoutFile:
         return cls(
             layout=check_layout(found, layout),
             scenario=found.name,
-            scenario_hash=found.content_hash,
+            site_hash=found.site_hash,
             provenance=dict(provenance or {}),
         )
 
@@ -113,11 +114,11 @@ class LayoutFile:
             scenario: The scenario, or its bundled name or path.
 
         Raises:
-            LayoutError: If the file is for another scenario or another state of it, or if
+            LayoutError: If the file is for another site or another state of it, or if
                 something is off the grid, not available, repeated or beyond the stock.
         """
         found = find_scenario(scenario)
-        if self.scenario_hash not in (None, found.content_hash):
+        if self.site_hash not in (None, found.site_hash):
             raise LayoutError(self._mismatch(found))
         return check_layout(found, self.layout)
 
@@ -162,7 +163,7 @@ class LayoutFile:
                 layout += f',\n  "{key}": {json.dumps(measures[key])}'
         else:
             layout = f'  "cells": {json.dumps([list(cell) for cell in self.layout])}'
-        keys: dict[str, Any] = {"scenario": self.scenario, "scenario_hash": self.scenario_hash}
+        keys: dict[str, Any] = {"scenario": self.scenario, "site_hash": self.site_hash}
         given = {name: value for name, value in keys.items() if value is not None}
         if self.provenance:
             given["provenance"] = dict(self.provenance)
@@ -174,10 +175,12 @@ class LayoutFile:
 
     def _mismatch(self, scenario: Scenario) -> str:
         """Say that the layout is for another scenario, and what can be done."""
-        hashes = (self.scenario_hash or "", scenario.content_hash)
+        hashes = (self.site_hash or "", scenario.site_hash)
         saved, asked = (f"hash {each[:_HASH_DIGITS]}" for each in hashes)
         name = "a scenario without a name" if self.scenario is None else repr(self.scenario)
-        changed = f" ({name} has changed since)" if self.scenario == scenario.name else ""
+        changed = ""
+        if self.scenario == scenario.name:
+            changed = f" (zone, catalogue or structures of {name} have changed since)"
         return (
             f"the layout was saved for {name} ({saved}), not for {scenario.name!r} ({asked})"
             f"{changed}: load the scenario that it is for, or save its cells anew for this one"
@@ -246,16 +249,16 @@ def _parse(content: Any, source: str) -> LayoutFile:
     _check_keys(content, (key, *measures, *_OTHER_KEYS), f"{source}: ")
     if key not in content:
         raise LayoutError(f"{source}: {key}: missing")
-    name, scenario_hash = content.get("scenario"), content.get("scenario_hash")
+    name, site_hash = content.get("scenario"), content.get("site_hash")
     if name is not None and not isinstance(name, str):
         raise LayoutError(f"{source}: scenario: is {type_word(name)}, must be a string")
-    if scenario_hash is not None and not _is_hash(scenario_hash):
+    if site_hash is not None and not _is_hash(site_hash):
         raise LayoutError(
-            f"{source}: scenario_hash: is {type_word(scenario_hash)}, must be 64 hexadecimal digits"
+            f"{source}: site_hash: is {type_word(site_hash)}, must be 64 hexadecimal digits"
         )
-    if name is not None and scenario_hash is None:
+    if name is not None and site_hash is None:
         raise LayoutError(
-            f"{source}: scenario_hash: missing, but the scenario is {value_text(name)}:"
+            f"{source}: site_hash: missing, but the scenario is {value_text(name)}:"
             " without it nothing can be checked"
         )
     provenance = content.get("provenance", {})
@@ -265,7 +268,7 @@ def _parse(content: Any, source: str) -> LayoutFile:
     layout = read(content[key], source, key)
     for name_key, kind in _MEASURES.items():
         layout += _measures(content.get(name_key, []), f"{source}: {name_key}", kind)
-    return LayoutFile(layout, name, scenario_hash, provenance)
+    return LayoutFile(layout, name, site_hash, provenance)
 
 
 def _measures(listed: Any, where: str, kind: type[Measure]) -> Layout:

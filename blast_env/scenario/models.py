@@ -116,6 +116,12 @@ _NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "co
 """Sections that do not count for the hash; what `simulation` says is there as parameters, and
 components count where the response of facades does."""
 
+_BUILT: Final = {
+    *("kind", "name", "corner_m", "rows", "columns", "side_modules"),
+    *("height_m", "base_m", "carries"),
+}
+"""Keys of a structure that say what stands where."""
+
 Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
 """Where the charge comes from."""
 
@@ -266,8 +272,20 @@ class Scenario(Section):
             for area in (*source.get("keep_outs", ()), *slow):
                 del area["reason"]
         content["parameters"] = self.parameters.model_dump(mode="json")
-        text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
-        return sha256(text.encode()).hexdigest()
+        return _digest(content)
+
+    @property
+    def site_hash(self) -> str:
+        """SHA-256 of what a layout belongs to: the build zone, its catalogue and the structures.
+
+        Charges, objective, budget, facades and what counts of a structure may change: the cells and
+        pieces of a layout mean the same.
+        """
+        zone = None if self.build_zone is None else _without_words(self.build_zone)
+        if zone is not None:
+            zone.pop("budget", None)
+        built = [each.model_dump(mode="json", include=_BUILT) for each in self.structures]
+        return _digest({"build_zone": zone, "structures": built})
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any], source: str) -> "Scenario":
@@ -468,6 +486,11 @@ class Scenario(Section):
 
 
 _SOURCES: Final = TypeAdapter(Sources)
+
+
+def _digest(content: dict[str, Any]) -> str:
+    text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
+    return sha256(text.encode()).hexdigest()
 
 
 def _without_words(zone: BuildZone) -> dict[str, Any]:

@@ -72,7 +72,7 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     site, out = tmp_path / "yard.toml", tmp_path / "best.json"
     blast_env.save_scenario(glazed_yard(charges="mean"), site)
     picture = tmp_path / "cost.svg"
-    options = ("--tnt-kg", "0.1", "--budget", "3", "--judge-cell", "0.5")
+    options = ("--tnt-kg", "1", "--budget", "3", "--judge-cell", "0.5")
     files = ("--out", out, "--picture", picture)
     text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
     first, verdict = text.splitlines()[:2]
@@ -84,6 +84,16 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     )
     assert load_layout(out) is not None
     assert picture.stat().st_size > 1000
+    charge = ("--tnt-kg", "1")
+    page = ("--cells", "0.5", "0.5", "--no-items", "--stills", "0", "--places", "1")
+    for command, *words in (
+        ("draw", site, "--layout", out, "--out", tmp_path / "plan.svg"),
+        ("assess", site, "--layout", out, "--charges", "1", *charge),
+        ("evaluate", "--scenario", site, "--layout", out, "--seeds", "1", *charge),
+        ("report", site, "--layout", out, "--charge", "2,6,1", *page, "--out", tmp_path / "a.html"),
+    ):
+        done = CliRunner().invoke(app, [command, *map(str, words)])
+        assert done.exit_code == 0, done.output
 
 
 def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:

@@ -68,7 +68,7 @@ def test_the_layout_says_how_it_was_made(site: Path, tmp_path: Path) -> None:
     result = search("--method", "random", "--scenario", site, *options, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     content = LayoutFile.load(tmp_path / "out" / "layout.json")
-    assert content.scenario_hash == load_scenario(site).content_hash
+    assert content.site_hash == load_scenario(site).site_hash
     assert content.provenance["options"]["method"] == "random"
     assert {each["charge_height_m"] for each in content.provenance["threats"]} == {0.0}
     assert [each["charge_position_m"] for each in content.provenance["threats"]] == [

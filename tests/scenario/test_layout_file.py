@@ -36,10 +36,10 @@ def test_a_file_says_what_it_is_for_and_how_it_was_made(tmp_path: Path) -> None:
     path = tmp_path / "layout.json"
     assert write_layout(path, scenario(), CELLS, PROVENANCE) == path
     file = LayoutFile.load(path)
-    assert file == LayoutFile(CELLS, "full", scenario().content_hash, PROVENANCE)
+    assert file == LayoutFile(CELLS, "full", scenario().site_hash, PROVENANCE)
     assert load_layout(path) == load_layout(path, scenario()) == CELLS
     content = json.loads(path.read_text())
-    assert content["scenario_hash"] == scenario().content_hash
+    assert content["site_hash"] == scenario().site_hash
     assert '"cells": [[3, 1], [2, 0]],' in path.read_text()  # short enough to read
 
 
@@ -91,7 +91,7 @@ def test_a_layout_for_another_scenario_is_refused_with_both_names(tmp_path: Path
     with pytest.raises(LayoutError) as caught:
         load_layout(path, other)
     message = str(caught.value)
-    saved, asked = scenario().content_hash[:12], other.content_hash[:12]
+    saved, asked = scenario().site_hash[:12], other.site_hash[:12]
     assert message.startswith(f"{path}: the layout was saved for 'full' (hash {saved}), ")
     assert f"not for 'courtyard' (hash {asked}): load the scenario that it is for" in message
     assert "or save its cells anew for this one (blast_env.write_layout)" in message
@@ -108,8 +108,14 @@ def test_a_scenario_that_was_changed_since_is_another_one(tmp_path: Path) -> Non
     write_layout(path, original, [cell])
     renamed = Scenario.from_document(full_document(), "test")
     assert load_layout(path, renamed) == (cell,)
+    of_other_questions = document | {
+        "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 7.0}],
+    }
+    asked = Scenario.from_document(of_other_questions, "test")
+    assert asked.content_hash != original.content_hash
+    assert load_layout(path, asked) == (cell,)
     document["build_zone"]["stock"] += 1
-    with pytest.raises(LayoutError, match="'full' has changed since"):
+    with pytest.raises(LayoutError, match="structures of 'full' have changed since"):
         load_layout(path, Scenario.from_document(document, "test"))
 
 
@@ -141,7 +147,7 @@ def test_a_cell_that_cannot_be_used_is_named_with_the_reason(
     path = tmp_path / "layout.json"
     content: dict[str, Any] = {"cells": cells}
     if with_hash:
-        content |= {"scenario": "full", "scenario_hash": scenario().content_hash}
+        content |= {"scenario": "full", "site_hash": scenario().site_hash}
     path.write_text(json.dumps(content))
     with pytest.raises(LayoutError) as caught:
         load_layout(path, scenario())
@@ -185,10 +191,10 @@ def test_a_file_that_could_not_be_read_back_is_not_written(
         (b'{"cells": [[1, true]]}', r"cells\[0\]: is \(1, true"),
         (b'{"cells": 3}', "cells: is 3, must be a list"),
         (b'{"cell": []}', "cell: unknown key, did you mean 'cells'"),
-        (b'{"cells": [], "seed": 1}', "seed: unknown key; known: cells, scenario, scenario_hash"),
+        (b'{"cells": [], "seed": 1}', "seed: unknown key; known: cells, scenario, site_hash"),
         (b'{"cells": [], "scenario": 3}', "scenario: is 3, must be a string"),
-        (b'{"cells": [], "scenario": "a"}', "scenario_hash: missing, but the scenario is 'a'"),
-        (b'{"cells": [], "scenario_hash": "12"}', "scenario_hash: is '12' .a string., must be 64"),
+        (b'{"cells": [], "scenario": "a"}', "site_hash: missing, but the scenario is 'a'"),
+        (b'{"cells": [], "site_hash": "12"}', "site_hash: is '12' .a string., must be 64"),
         (b'{"cells": [], "provenance": []}', "provenance: is an array, must be a table"),
         (b'{"cells": [], "cells": [[1, 2]]}', "a key occurs twice"),
         (b"{}", "cells: missing"),
@@ -220,7 +226,7 @@ def test_layout_file_must_be_a_file(tmp_path: Path) -> None:
 
 KEYS = st.fixed_dictionaries(
     {"cells": JSON | st.lists(st.lists(st.integers(), min_size=2, max_size=2), max_size=3)},
-    optional={"scenario": JSON, "scenario_hash": JSON, "provenance": JSON},
+    optional={"scenario": JSON, "site_hash": JSON, "provenance": JSON},
 )
 
 
