@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from blast_env.cli.command import argument, option, options_of
 from blast_env.cli.options import (
+    BY_SITE,
     CELL_HELP,
     CELLS_HELP,
-    BY_SITE,
     ENGINE_HELP,
     SCENARIO_HELP,
     UNTIL_HELP,
