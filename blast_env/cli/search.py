@@ -214,15 +214,21 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
 
             return method.propose(problem, self.budget, self.seed, report)
 
-    def _check(self, run: "SearchRun") -> LayoutEvaluation:
-        """Evaluate the layout on threats that judge: the search has met none of them."""
+    def _check(self, run: "SearchRun") -> LayoutEvaluation | None:
+        """Evaluate the layout on threats that judge; `None` if the search has met all of them.
+
+        Without noise a charge is one blast: a charge that the search has met is not held out.
+        """
         problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, self.held_out)
         if self.threat == "hidden":
             threats = draw_threats(problem.scenario, seeds)
         else:
             threats = tuple(Threat(problem.threats[0].charge, seed) for seed in seeds)
         if not problem.evaluator.engine.has_noise:  # each charge is one blast
-            threats = one_of_each_charge(threats)
+            met = {each.charge for each in problem.threats}
+            threats = tuple(each for each in one_of_each_charge(threats) if each.charge not in met)
+        if not threats:
+            return None
         with progress_bar(f"check on {len(threats)} other threats") as progress:
             return evaluate_against(
                 problem.evaluator,
@@ -267,7 +273,7 @@ def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
         print_line(f"up to {cost_words([costs[i % len(costs)] for i in range(blasts)])}")
 
 
-def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
+def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
     """Print what the layout does against the search's threats and against others, and the cost."""
     result, problem = run.result, run.problem
     table = ResultTable(
@@ -284,16 +290,22 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
         percent(reductions(load, bare).item()),
         "-",
     )
-    low, high = checked.ci95
-    table.add_row(
-        "held out",
-        str(len(checked.threats)),
-        counts.text(checked.unprotected_load),
-        counts.text(checked.load),
-        percent(checked.mean_reduction),
-        "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
-    )
+    if checked is not None:
+        low, high = checked.ci95
+        table.add_row(
+            "held out",
+            str(len(checked.threats)),
+            counts.text(checked.unprotected_load),
+            counts.text(checked.load),
+            percent(checked.mean_reduction),
+            "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
+        )
     result_console().print(table)
+    if checked is None:
+        print_line(
+            "no threat is held out: by this engine a charge is one blast, and the search has met "
+            "every charge; `evaluate` judges with others"
+        )
     print_line(
         f"{layout_counts(result.layout, of=problem.stock)}; {result.blasts} of {result.budget} "
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
@@ -302,7 +314,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation) -> None:
 
 
 def write_search(
-    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation, out: Path
+    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation | None, out: Path
 ) -> None:
     """Write the layout, the history, the front and a figure, as far as there are such."""
     result = run.result
@@ -330,10 +342,10 @@ def _save_figure(run: SearchRun, out: Path) -> list[Path]:
 
 
 def _provenance(
-    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation
+    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation | None
 ) -> dict[str, Any]:
     result, problem = run.result, run.problem
-    low, high = (None if np.isnan(end) else float(end) for end in checked.ci95)
+    ends = () if checked is None else checked.ci95
     return {
         "command": command(),
         "options": options,
@@ -354,9 +366,9 @@ def _provenance(
             "load": result.load,
             "unit": problem.scenario.objective.unit,
             "threats_met": result.threats,
-            "held_out_threats": len(checked.threats),
-            "held_out_reduction": checked.mean_reduction,
-            "held_out_reduction_ci95": [low, high],
+            "held_out_threats": 0 if checked is None else len(checked.threats),
+            "held_out_reduction": None if checked is None else checked.mean_reduction,
+            "held_out_reduction_ci95": [None if np.isnan(end) else float(end) for end in ends],
         },
     }
 

@@ -17,7 +17,7 @@ In the open the first is exact, and the second within 7 % of Kingery and Bulmash
 small wall is missing from both, and peaks of coarse cells are low.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -131,11 +131,14 @@ class Consequences:
         responses: One a building with a facade and charge.
         neighbours: One a building without and charge.
         barriers: One a charge.
+        unchecked: A building and why the engine was not checked for the loads on it, one a building
+            and charge for which that is so.
     """
 
     responses: tuple[BuildingResponse, ...]
     neighbours: tuple[Neighbour, ...] = ()
     barriers: tuple[BarrierResponse, ...] = ()
+    unchecked: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
@@ -145,6 +148,7 @@ class Consequences:
             tuple(each for part in every for each in part.responses),
             tuple(each for part in every for each in part.neighbours),
             tuple(each for part in every for each in part.barriers),
+            tuple(each for part in every for each in part.unchecked),
         )
 
     @property
@@ -157,6 +161,14 @@ class Consequences:
         """What there is to say of the loads: oblique walls, and bays that are not complete."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
         notes = [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
+        reasons: dict[str, list[str]] = {}
+        for building, reason in self.unchecked:
+            reasons.setdefault(building, []).append(reason)
+        notes += [
+            f"{building}: {len(own)} of {len(self.barriers)} charges are outside what the engine "
+            f"was checked for, e.g. {own[0]}"
+            for building, own in reasons.items()
+        ]
         tails = [tail for each in self.responses for tail in each.tails.values()]
         late = sum(not each.complete for each in tails)
         if late:
@@ -356,7 +368,17 @@ def consequences_of(
         tuple(responses),
         tuple(neighbours_of(scenario, result, charge)),
         (BarrierResponse(charge, result.pieces, taken_away),),
+        tuple(_unchecked(scenario, result)),
     )
+
+
+def _unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
+    """Yield each building whose loads the engine was not checked for, and why."""
+    reasons: dict[str, dict[str, None]] = {}
+    for name in result.structures["structure"]:
+        own = reasons.setdefault(scenario.building_names.get(name, name), {})
+        own.update(dict.fromkeys(result.impulse(name).notes))
+    yield from ((building, "; ".join(own)) for building, own in reasons.items() if own)
 
 
 def _blast(

@@ -96,7 +96,7 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
 def _charge_legend(evaluation: LayoutEvaluation) -> list[Artist]:
     handles: list[Artist] = [_charge_handle("o", "charge")]
     if not evaluation.in_range:
-        handles.append(_charge_handle("s", "charge outside the calibration's range"))
+        handles.append(_charge_handle("s", "charge outside the checked range"))
     return [*handles, _worst_ring()]
 
 
@@ -135,6 +135,7 @@ _HEIGHT_IN, _RIGHT_IN = 8.4, 7.2
 _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 5.6, (4.8, 8.4)
 _MOST_NAMED_THREATS = 40
 _MOST_UPRIGHT_NAMES = 16
+_MOST_UPRIGHT_LETTERS = 64
 
 
 def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
@@ -185,12 +186,13 @@ def _title(evaluation: LayoutEvaluation) -> str:
 
 def _subtitle(evaluation: LayoutEvaluation) -> str:
     stand_off = stand_off_text(evaluation.scenario, evaluation.layout)
-    range_note = "" if evaluation.in_range else "; partly outside the calibration's range"
+    law = f"calibration {evaluation.calibration}, " if evaluation.engine.needs_calibration else ""
+    range_note = "" if evaluation.in_range else "; partly outside the checked range"
     return (
         f"{count_of('threat', len(evaluation.threats))}; worst: "
         f"{charge_text(evaluation.worst.charge)}, {_load_text(evaluation, evaluation.worst.load)}; "
         f"{stand_off and f'{stand_off}; '}"
-        f"calibration {evaluation.calibration}, engine {evaluation.engine.name}{range_note}"
+        f"{law}engine {evaluation.engine.words}{range_note}"
     )
 
 
@@ -232,7 +234,12 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
     axes.set_title("Every threat, the worst with the barrier first", fontsize=11)
     axes.legend(loc="upper center", ncols=2, fontsize=8.5, frameon=False)
     axes.grid(axis="y", alpha=0.3)
-    _name_threats(axes, [outcome.threat.seed for outcome in outcomes])
+    if evaluation.engine.has_noise:
+        _name_threats(axes, "seed of the threat", [str(each.threat.seed) for each in outcomes])
+    else:  # the seed only draws the charge
+        places = (each.charge.position_m for each in outcomes)
+        names = [f"({x_m:.1f}, {y_m:.1f})" for x_m, y_m in places]
+        _name_threats(axes, "charge of the threat (m)", names)
 
 
 def _load_text(evaluation: LayoutEvaluation, load: float) -> str:
@@ -248,19 +255,19 @@ def _load_name(evaluation: LayoutEvaluation) -> str:
     return f"weighted sum of the {noun} on the" if weighted else f"{noun} on the"
 
 
-def _name_threats(axes: Axes, seeds: Sequence[int]) -> None:
-    bands = "; bands: 95 % intervals of the means" if len(seeds) > 1 else ""
-    if len(seeds) > _MOST_NAMED_THREATS:
+def _name_threats(axes: Axes, what: str, names: Sequence[str]) -> None:
+    bands = "; bands: 95 % intervals of the means" if len(names) > 1 else ""
+    if len(names) > _MOST_NAMED_THREATS:
         axes.set_xlabel(f"rank of the threat{bands}")
         return
-    upright = len(seeds) <= _MOST_UPRIGHT_NAMES and max(seeds) < 10_000
+    upright = len(names) <= _MOST_UPRIGHT_NAMES and sum(map(len, names)) <= _MOST_UPRIGHT_LETTERS
     axes.set_xticks(
-        range(1, len(seeds) + 1),
-        [str(seed) for seed in seeds],
+        range(1, len(names) + 1),
+        names,
         fontsize=8,
         rotation=0.0 if upright else 90.0,
     )
-    axes.set_xlabel(f"seed of the threat{bands}")
+    axes.set_xlabel(f"{what}{bands}")
 
 
 def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: BlastSite) -> None:
@@ -296,7 +303,9 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
         )
     figure = panels[0].get_figure(root=True)
     assert figure is not None
-    label = "mean impulse per module\n(simulation units); white: not hit"
+    is_scaled = evaluation.engine.needs_calibration
+    words = "impulse per module\n(simulation units)" if is_scaled else "momentum per module\n(N·s)"
+    label = f"mean {words}; white: not hit"
     add_bar(figure, panels, ScalarMappable(scale, load_colours()), label, shrink=0.9, pad=0.03)
 
 
@@ -444,5 +453,5 @@ def _cases_subtitle(panels: Sequence[_Panel]) -> str:
     else:
         parts.append(count_of("case", len(panels)))
     if not all(panel.in_range for panel in panels):
-        parts.append("~ outside the calibration's range")
+        parts.append("~ outside the checked range")
     return "; ".join(parts)

@@ -101,8 +101,12 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     result = search("--method", "surrogate", "--scenario", tmp_path / "yard.toml", *options)
     assert result.exit_code == 0, result.output
     assert "1 of 1 blasts spent" in result.stdout
+    assert "no threat is held out: by this engine a charge is one blast" in result.stdout
+    assert "held out " not in result.stdout.replace("is held out", "")
     found, provenance = packaged_surrogate(), LayoutFile.load(out / "layout.json").provenance
     assert provenance["options"]["surrogate"] == found.digest
+    assert provenance["result"]["held_out_threats"] == 0
+    assert provenance["result"]["held_out_reduction"] is None
     case = practice_visible(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
     problem = LayoutProblem(BlastEvaluator(scenario, "gas"), case)
     expected = search_by(found).propose(problem, 1, 0)

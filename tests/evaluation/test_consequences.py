@@ -1,11 +1,13 @@
 """What charges do to buildings, neighbours and the barrier, on a yard where a blast is cheap."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from blast_env.calibration import kingery_bulmash
+from blast_env.engines import simulate
 from blast_env.engines.gas import GasEngine
 from blast_env.evaluation.consequences import (
     BuildingResponse,
@@ -52,6 +54,17 @@ def test_what_stands_without_a_facade_is_a_neighbour(found: Consequences) -> Non
     assert order == sorted(order, reverse=True)
     assert 0.0 < order[0] < 1.0
     assert found.buildings == ("hut",)
+
+
+def test_a_charge_that_the_engine_was_not_checked_for_is_named(found: Consequences) -> None:
+    """5 kg on cells of 0.5 m, as the blast itself says."""
+    result = simulate(site(), WALL, charge=CHARGE, engine=GasEngine())
+    reason = "; ".join(result.impulse("hut").notes)
+    assert "cells per m/kg^(1/3)" in reason
+    words = "are outside what the engine was checked for, e.g."
+    assert f"hut: 1 of 1 charges {words} {reason}" in found.notes
+    both = Consequences.together([found, replace(found, unchecked=())])
+    assert f"hut: 1 of 2 charges {words} {reason}" in both.notes
 
 
 @pytest.mark.parametrize("scaled", [5.0, 10.0, 15.0])

@@ -101,11 +101,11 @@ def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
     low, high = (f"{100.0 * end:.0f} %" for end in evaluation.ci95)
     share = f"{100.0 * evaluation.mean_reduction:.0f} %"
     assert f"reduction of the impulse {share} (95 %: {low} to {high})" in title
-    assert any("outside the calibration" in text.get_text() for text in figure.axes[0].texts)
+    assert any("outside the checked range" in text.get_text() for text in figure.axes[0].texts)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[:3] == [
         "charge",
-        "charge outside the calibration's range",
+        "charge outside the checked range",
         "charge with the largest impulse",
     ]
     assert "barrier module, as high as the air: 10 of 16" in labels
@@ -132,7 +132,13 @@ def test_the_parts_of_a_building_are_drawn_together() -> None:
     scenario = Scenario.from_document(document, "halves")
     engine = GasEngine(border_m=0.0, until=0.01)
     found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
-    panels = evaluation_figure(found).axes[2:4]
+    figure = evaluation_figure(found)
+    panels = figure.axes[2:4]
+    assert figure.axes[1].get_xlabel().startswith("charge of the threat (m)")
+    bar = next(each for each in figure.axes if "per module" in each.get_ylabel())
+    assert bar.get_ylabel() == "mean momentum per module\n(N·s); white: not hit"
+    words = [each.get_text() for axes in figure.axes for each in axes.texts]
+    assert not any("calibration" in each for each in words)
     table = found.table.set_index("structure")
     (hall,) = found.building_table.to_dict("records")
     assert (hall["structure"], hall["weight"], hall["protected"]) == ("hall", 1.0, True)
