@@ -118,7 +118,7 @@ def criterion_row(scenario: Scenario, judge: Engine, first: Engine) -> Row:
         layout_words(found),
         f"{Placement(scenario, found).cost:g} of {scenario.zone.budget:g}",
         min(judged.level(each) for each in judged.buildings).label,
-        "passes" if judged.stands_up(target) else "fails",
+        "passes" if judged.passes(target) else "fails",
     )
 
 

@@ -133,7 +133,7 @@ class Verdict(Kept):
     Attributes:
         building: Its name.
         level: Level of protection that it reaches, from 0, below standards, to 4, high.
-        sharper_level: The same with peaks as sharp as Kingery and Bulmash's, which cells clip.
+        level_on_cells: The same by the clipped peaks on the cells alone.
         panes: Panes that it has.
         broken: Panes that are expected to break.
         condition: Performance condition of its worst pane, GSA.
@@ -142,7 +142,7 @@ class Verdict(Kept):
 
     building: str
     level: int
-    sharper_level: int
+    level_on_cells: int
     panes: int
     broken: float
     condition: str

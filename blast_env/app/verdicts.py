@@ -131,7 +131,7 @@ def _verdict(building: BuildingResponse) -> Verdict:
     return Verdict(
         building=building.building,
         level=facade.level_of_protection,
-        sharper_level=building.sharpened.level_of_protection,
+        level_on_cells=building.on_cells.level_of_protection,
         panes=facade.panes,
         broken=facade.broken_panes,
         condition=facade.worst_condition.label,
@@ -159,13 +159,13 @@ def verdict_rows(
 
 
 def _badness(verdict: Verdict) -> tuple[int, int, float]:
-    return -verdict.level, -verdict.sharper_level, verdict.broken
+    return -verdict.level, -verdict.level_on_cells, verdict.broken
 
 
 def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
     level = LevelOfProtection(verdict.level).label
-    if verdict.sharper_level < verdict.level:
-        level += f"; {LevelOfProtection(verdict.sharper_level).label} if peaks are sharp"
+    if verdict.level_on_cells > verdict.level:
+        level += f"; {LevelOfProtection(verdict.level_on_cells).label} on the cells"
     return VerdictRow(
         layout=layout,
         threat=threat,

@@ -212,6 +212,22 @@ def burst_of(height_m: float, charge_kg: float) -> Burst:
     return "hemispherical" if low else "spherical"
 
 
+def largest_reflected_peak_pa(distance_m: FloatArray, charge_kg: float) -> FloatArray:
+    """Return the peak on a wall at right angles in the open, by the burst that makes most of it.
+
+    That is the hemispherical one. Beyond the range of the curve its end holds, which is too much
+    far away, and nearer than 0.06 m/kg^(1/3) too little.
+
+    Args:
+        distance_m: Distances from the charge, above 0.
+        charge_kg: TNT-equivalent mass, above 0.
+    """
+    low, high = _curves()["hemispherical", "reflected_overpressure"].range
+    scale = float(np.cbrt(charge_kg))
+    distance_m = np.clip(distance_m, low * scale, high * scale)
+    return kingery_bulmash("reflected_overpressure", distance_m, charge_kg)
+
+
 def scaled_distance(distance_m: float | Numbers, charge_kg: float | Numbers) -> FloatArray:
     """Return Z = R / W^(1/3), m/kg^(1/3) (Hopkinson-Cranz).
 

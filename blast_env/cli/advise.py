@@ -179,8 +179,8 @@ class AdviseCommand(ChargeOptions):
                 str(each.blasts),
                 min(levels).label,
                 "yes" if each.passes else "no",
+                "passes" if seen.passes_on_cells(target) else "fails",
                 "passes" if seen.passes(target) else "fails",
-                "passes" if seen.stands_up(target) else "fails",
             )
         result_console().print(table)
         print_line(
@@ -190,9 +190,10 @@ class AdviseCommand(ChargeOptions):
 
 
 def _verdict_of(seen: Consequences, target: LevelOfProtection) -> AdviceVerdict:
-    if seen.stands_up(target):
+    if seen.passes(target):
         return AdviceVerdict.PASSES
-    return AdviceVerdict.PASSES_BARELY if seen.passes(target) else AdviceVerdict.FAILS
+    barely = seen.passes_on_cells(target)
+    return AdviceVerdict.PASSES_BARELY if barely else AdviceVerdict.FAILS
 
 
 def _answer(

@@ -133,7 +133,7 @@ class AssessCommand(ChargeOptions):
             f"{target.label!r} under {count} charges"
         )
         if doubt := judged.doubt(target):
-            print_line(f"but it FAILS {doubt}")
+            print_line(doubt)
 
     def _print(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
         rows = [
@@ -256,7 +256,7 @@ def _row(found: Consequences, building: str) -> Sequence[str]:
     facades = [each.facade for each in found.of(building)]
     worst = max(facades, key=lambda facade: facade.broken_panes)
     return (
-        found.level(building).label,
+        found.level_words(building),
         f"{worst.broken_panes:.1f} of {worst.panes}",
         max(facade.worst_condition for facade in facades).label,
         max(facade.worst_damage for facade in facades).name.lower(),

@@ -53,7 +53,10 @@ if TYPE_CHECKING:  # a third of a second to import
 
     from blast_env.engines.gas import GasResult
 
-_SHARPER: Final = "with peaks as sharp as Kingery and Bulmash's: take smaller cells"
+_CLIPPED: Final = (
+    "by the peaks on its cells it passes, which clip them; by peaks as sharp as Kingery and"
+    " Bulmash's of the same impulse it does not: smaller cells may tell"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +66,7 @@ class BuildingResponse:
     Attributes:
         building: Its name; structures that are parts of one building are one.
         charge: The charge where it went off.
-        facade: What became of its bays.
+        on_cells: What became of its bays by the histories on the cells, which clip peaks.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
         tails: How much is still to come to its bays, by name, where that is known.
         stepped: Whether a wall of it is a staircase of modules, as an oblique one is.
@@ -71,17 +74,19 @@ class BuildingResponse:
 
     building: str
     charge: Charge
-    facade: FacadeResponse
+    on_cells: FacadeResponse
     peak_factor: float = 1.0
     tails: Mapping[str, BayTail] = field(default_factory=dict)
     stepped: bool = False
 
     @cached_property
-    def sharpened(self) -> FacadeResponse:
-        """What would become of its bays with larger peaks of the same impulse."""
-        found = self.facade
+    def facade(self) -> FacadeResponse:
+        """What counts: the worse of that and of larger peaks of the same impulse, bay by bay."""
+        found = self.on_cells
+        if self.peak_factor <= 1.0:
+            return found
         histories = sharpened(found.time_s, found.pressure_pa, self.peak_factor)
-        return respond(found.bays, *histories)
+        return found.or_worse(respond(found.bays, *histories))
 
 
 _AMBIENT_PA: Final = 101_325.0
@@ -186,28 +191,32 @@ class Consequences:
         """Return the level of protection that a building reaches under every charge."""
         return min(each.facade.level_of_protection for each in self.of(building))
 
+    def level_on_cells(self, building: str) -> LevelOfProtection:
+        """Return the same by the histories on the cells, which clip peaks."""
+        return min(each.on_cells.level_of_protection for each in self.of(building))
+
+    def level_words(self, building: str) -> str:
+        """Return the level that counts, and that on the cells where it is another one."""
+        level, on_cells = self.level(building), self.level_on_cells(building)
+        return level.label + (f" ({on_cells.label} on the cells)" if on_cells > level else "")
+
     @property
     def worst_damage(self) -> float:
         """The worst damage of all components under every charge, from 0 to 5."""
         return worst(each.facade.worst_number for each in self.responses)
 
-    def depends_on_cells(self, target: LevelOfProtection) -> bool:
-        """Return whether sharper peaks would turn a verdict that passes."""
-        return self.passes(target) and any(
-            each.sharpened.level_of_protection < target for each in self.responses
-        )
-
-    def stands_up(self, target: LevelOfProtection) -> bool:
-        """Return whether all buildings reach a level, with sharper peaks as well."""
-        return self.passes(target) and not self.depends_on_cells(target)
+    def passes_on_cells(self, target: LevelOfProtection) -> bool:
+        """Return whether all buildings reach a level by the clipped peaks on the cells."""
+        return all(self.level_on_cells(building) >= target for building in self.buildings)
 
     def doubt(self, target: LevelOfProtection) -> str:
-        """Return with what a verdict that passes would fail, in words; empty if with nothing.
+        """Return why a verdict that fails rests on sharper peaks, in words; empty if it does not.
 
         Args:
-            target: The level that the buildings reach.
+            target: The level that the buildings are to reach.
         """
-        return _SHARPER if self.depends_on_cells(target) else ""
+        fails = not self.passes(target)
+        return _CLIPPED if fails and self.passes_on_cells(target) else ""
 
     @property
     def worst_neighbours(self) -> tuple[Neighbour, ...]:
@@ -240,13 +249,13 @@ class Consequences:
             responses=tuple(
                 replace(
                     each,
-                    facade=respond(
+                    on_cells=respond(
                         [
                             replace(bay, glazing=bay.glazing and with_glass(bay.glazing, glazing))
-                            for bay in each.facade.bays
+                            for bay in each.on_cells.bays
                         ],
-                        each.facade.time_s,
-                        each.facade.pressure_pa,
+                        each.on_cells.time_s,
+                        each.on_cells.pressure_pa,
                     ),
                 )
                 for each in self.responses

@@ -19,6 +19,7 @@ from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
 from blast_env.physics.gas.solver import Gas
 from blast_env.physics.scene import WALLS, WallName
+from blast_env.reporting.peaks import CountedPeak, counted_peak
 from blast_env.scenario import AnyStructure, Scenario
 from blast_env.scenario.sections import buildings_of
 from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
@@ -181,6 +182,7 @@ class TargetLoad:
         impulse_pa_s: Impulse of all positive phases, mean over the walls.
         first_impulse_pa_s: Impulse of the first positive phase, mean over the walls.
         peak_pa: Largest overpressure on a face of a cell.
+        counted: The peak that limits are held against.
         arrival_s: When the wave comes; NaN if it does not.
         wall: The wall with the largest impulse.
         wall_impulse_pa_s: Impulse of all positive phases on it, mean.
@@ -193,6 +195,7 @@ class TargetLoad:
     impulse_pa_s: float
     first_impulse_pa_s: float
     peak_pa: float
+    counted: CountedPeak
     arrival_s: float
     wall: WallName
     wall_impulse_pa_s: float
@@ -251,6 +254,7 @@ class MeasuredBlast:
             impulse_pa_s=mean_over_area(walls, "positive_impulse_pa_s"),
             first_impulse_pa_s=float(walls["first_impulse_pa_s"].mean()),
             peak_pa=float(walls["peak_pa"].max()),
+            counted=counted_peak(self.result.run.site, self.result.run.grid.cell_m, walls),
             arrival_s=float(np.nanmin(arrivals)) if np.isfinite(arrivals).any() else float("nan"),
             wall=wall,
             wall_impulse_pa_s=float(by_wall.max()),

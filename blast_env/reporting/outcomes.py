@@ -23,7 +23,7 @@ class Limit:
     Attributes:
         target: Name of the building.
         impulse_pa_s: Largest impulse on its most loaded wall; infinite without a limit.
-        peak_pa: Largest overpressure on a face of a cell; infinite without a limit.
+        peak_pa: Largest overpressure, see `blast_env.reporting.peaks`; infinite without a limit.
     """
 
     target: str
@@ -61,7 +61,7 @@ class Limit:
 
     def is_kept(self, load: TargetLoad) -> bool:
         """Whether a load is within the limit."""
-        return load.wall_impulse_pa_s <= self.impulse_pa_s and load.peak_pa <= self.peak_pa
+        return load.wall_impulse_pa_s <= self.impulse_pa_s and load.counted.pa <= self.peak_pa
 
 
 def check_limits(limits: Sequence[Limit], targets: Sequence[ReportedBuilding]) -> None:

@@ -27,7 +27,9 @@ from blast_env.reporting.figures import (
     site_plan,
     worth_map,
 )
+from blast_env.reporting.loads import TargetLoad, UnitSystem
 from blast_env.reporting.outcomes import LoadPair
+from blast_env.reporting.peaks import PeakSource
 from blast_env.reporting.study import Study
 from blast_env.reporting.threats import other_places
 from blast_env.reporting.verdict import ReportVerdict, verdict_of
@@ -119,6 +121,7 @@ def report_html(study: Study, commands: list[str]) -> str:
     environment.filters |= {
         "impulse": lambda pa_s: _number(units.impulse_of(pa_s)),
         "pressure": lambda pa: _number(units.pressure_of(pa)),
+        "counted": lambda load: _counted(load, units),
         "percent": _percent,
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),
@@ -292,7 +295,7 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
         for number, (words, of_blast) in enumerate(sides):
             where = f"worst of the threats; {blasts(of_blast)}; response of its bays"
             values = (
-                ("level of protection", each.levels[number].label),
+                ("level of protection", each.levels[number]),
                 ("panes that break", f"{each.broken[number]:.1f} of {each.panes}"),
                 ("panels that fail", f"{each.failed[number]} of {each.panels}"),
             )
@@ -351,6 +354,14 @@ def _number(value: float) -> str:
         return "0"
     digits = max(0, 2 - int(np.floor(np.log10(abs(value)))))
     return f"{value:,.{digits}f}".replace("-", _MINUS)
+
+
+def _counted(load: TargetLoad, units: UnitSystem) -> str:
+    """Return the peak that limits are held against, and where it comes from."""
+    peak, source = _number(units.pressure_of(load.counted.pa)), load.counted.source
+    if source is PeakSource.GAS:
+        return f"{peak} ({source})"
+    return f"{peak} ({source}; gas {_number(units.pressure_of(load.peak_pa))})"
 
 
 def _percent(share: float) -> str:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from blast_env.evaluation.consequences import BarrierResponse, Consequences, other_glazing
 from blast_env.reporting.outcomes import Limit, LoadPair
 from blast_env.reporting.study import Study
-from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.walls import DamageLevel
 
 
@@ -33,7 +32,7 @@ class BuildingLine:
 
     Attributes:
         name: The building.
-        levels: Level of protection.
+        levels: Level of protection in words, with that on the cells where it is another one.
         broken: Panes that are expected to break.
         panes: Panes that it has.
         conditions: Performance condition of the worst pane, GSA.
@@ -43,7 +42,7 @@ class BuildingLine:
     """
 
     name: str
-    levels: tuple[LevelOfProtection, ...]
+    levels: tuple[str, ...]
     broken: tuple[float, ...]
     panes: int
     conditions: tuple[str, ...]
@@ -78,7 +77,7 @@ class ReportVerdict:
         passes: Whether all that was asked for is kept; `None` where nothing was.
         passes_bare: The same without the layout.
         words: What was asked for.
-        doubt: With what a verdict that passes would fail; empty if with nothing.
+        doubt: Why a verdict that fails rests on sharper peaks; empty if it does not.
         buildings: The buildings with a facade.
         limits: The limits that were given.
         barrier: The barrier under the threat that tilts a piece most.
@@ -144,7 +143,7 @@ def _line(study: Study, name: str) -> BuildingLine:
     first = facades[0][0]
     return BuildingLine(
         name=name,
-        levels=tuple(each.level(name) for each in both),
+        levels=tuple(each.level_words(name) for each in both),
         broken=tuple(max(each.broken_panes for each in own) for own in facades),
         panes=first.panes,
         conditions=tuple(max(each.worst_condition for each in own).label for own in facades),

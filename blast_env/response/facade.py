@@ -6,7 +6,7 @@ serves all that stands in it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import cbrt, floor
 from typing import Final
@@ -207,6 +207,14 @@ class FacadeResponse:
     glazing: GlazingResponses
     walled: FloatArray
     walls: PanelResponses
+
+    def or_worse(self, other: "FacadeResponse") -> "FacadeResponse":
+        """Return for each pane and panel of the same bays what it did here or there, if worse."""
+        return replace(
+            self,
+            glazing=self.glazing.or_worse(other.glazing),
+            walls=self.walls.or_worse(other.walls),
+        )
 
     @property
     def broken_panes(self) -> float:

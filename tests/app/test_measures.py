@@ -60,11 +60,12 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     _, after = blasted.verdicts()
     found = consequences(blasted.scenario, (*WALL, GLASS), [threat.charge], find_engine("gas"))
     facade = found.responses[0].facade
-    assert after.panes == f"{facade.broken_panes:.1f} of {facade.panes}" != before.panes
+    assert after.panes == f"{facade.broken_panes:.1f} of {facade.panes}"
     assert after.condition == facade.worst_condition.label
-    sharper = found.responses[0].sharpened.level_of_protection
-    assert sharper < facade.level_of_protection
-    assert after.level == f"{facade.level_of_protection.label}; {sharper.label} if peaks are sharp"
+    on_cells = found.responses[0].on_cells.level_of_protection
+    assert on_cells > facade.level_of_protection
+    words = f"{facade.level_of_protection.label}; {on_cells.label} on the cells"
+    assert after.level == words != before.level
     assert after.damage == before.damage  # its walls are as they were
     assert blasted.verdicts()[0] == bare
     assert {row.cost for row in blasted.comparison()} == {"0", "70"}
@@ -79,8 +80,9 @@ def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Sess
     (threat,) = blasted.chosen_threats()
     bare, own = blasted.shown(threat)
     assert own.key == bare.key
-    rows = blasted.verdicts()
-    assert rows[0].panes != rows[1].panes
+    assert [row.layout for row in blasted.verdicts()] == ["no barrier", own.name]
+    (without,), (with_glass,) = (blasted.verdicts_on(each, threat) for each in (bare, own))
+    assert with_glass.broken < without.broken
     blasted.undo()
 
 

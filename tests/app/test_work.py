@@ -249,7 +249,7 @@ def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:
     record = gas.folder.record_of(own.key)
     assert record is not None
     (verdict,) = gas.verdicts_on(own, threat)
-    milder = verdict.model_copy(update={"level": 4, "sharper_level": 4, "broken": 0.0})
+    milder = verdict.model_copy(update={"level": 4, "level_on_cells": 4, "broken": 0.0})
     other = record.model_copy(update={"threat": "other"})
     rows = [*verdict_rows([("A", other, [milder]), ("A", record, [verdict])])]
     assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]

@@ -21,7 +21,7 @@ from blast_env.evaluation.consequences import (
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
-from blast_env.response.facade import peak_factor, respond
+from blast_env.response.facade import peak_factor, respond, sharpened
 from blast_env.scenario import Scenario
 from tests.catalogue_sites import ITEMS, WALL, yard_document
 
@@ -96,7 +96,7 @@ def test_pieces_that_fall_in_time_are_taken_away(found: Consequences) -> None:
     assert peaks[0] > peaks[1]
 
 
-def test_a_verdict_that_passes_says_if_sharper_peaks_would_turn_it() -> None:
+def test_no_verdict_passes_on_peaks_that_cells_clip() -> None:
     assert peak_factor(0.5, 5.0) == pytest.approx(1.0 + 9.3 * 0.5 / 5.0 ** (1.0 / 3.0))
     document = site().model_dump(mode="json")
     facade = FACADE | {"glazing": "window_tempered_6", "wall": "block_190"}
@@ -108,9 +108,15 @@ def test_a_verdict_that_passes_says_if_sharper_peaks_would_turn_it() -> None:
         history = np.tile([peak_pa, 0.0, -0.4 * peak_pa, 0.0, 0.0], (len(bays), 1))
         response = BuildingResponse("hut", CHARGE, respond(bays, time_s, history), 2.0)
         found = Consequences((response,))
+        sharper = respond(bays, *sharpened(time_s, history, 2.0)).level_of_protection
+        on_cells = response.on_cells.level_of_protection
+        assert found.level("hut") == min(sharper, on_cells)
         for level in LevelOfProtection:
-            turns = response.sharpened.level_of_protection < level <= found.level("hut")
-            assert ("sharp" in found.doubt(level)) == turns == found.depends_on_cells(level)
+            turns = sharper < level <= on_cells
+            assert ("sharp" in found.doubt(level)) == turns
+            assert found.passes(level) == (min(sharper, on_cells) >= level)
+            assert found.passes_on_cells(level) == (on_cells >= level)
+            assert ("on the cells" in found.level_words("hut")) == (sharper < on_cells)
             doubted.add(turns)
     assert doubted == {False, True}
 

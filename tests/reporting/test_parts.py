@@ -14,6 +14,7 @@ from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, StudyOptions, UnitSystem
 from blast_env.reporting.loads import TargetLoad, first_phase_s, targets_of
 from blast_env.reporting.outcomes import check_limits
+from blast_env.reporting.peaks import CountedPeak, PeakSource
 from blast_env.reporting.study import Runs, layout_from
 from blast_env.reporting.threats import asked_threats, chief_threats, other_masses, other_places
 from blast_env.scenario import Scenario, ScenarioError
@@ -131,7 +132,8 @@ def test_structures_of_a_building_are_one_target() -> None:
 
 
 def load(impulse_pa_s: float, peak_pa: float) -> TargetLoad:
-    return TargetLoad("hut", 1.0, 1.0, peak_pa, 0.001, "west", impulse_pa_s, 0.01, complete=True)
+    counted = CountedPeak(peak_pa, PeakSource.CURVE)
+    return TargetLoad("hut", 1.0, 1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True)
 
 
 def test_limit_is_kept_by_loads_up_to_it() -> None:

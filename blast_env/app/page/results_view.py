@@ -102,7 +102,8 @@ class ResultsView:
             self._verdicts = ui.table(columns=verdict_columns, rows=[], row_key="id")
             self._verdicts.props("dense flat bordered").classes("be-verdicts w-full mb-2")
             self._sharp = ui.label(
-                "Cells clip peaks: where a level is lower if peaks are sharp, take smaller cells."
+                "Cells clip peaks, and sharper ones count: where the level on the cells is "
+                "higher, take smaller cells."
             ).classes("be-quiet mb-2")
             self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
             self._cards = ui.element("div").classes("be-cards")

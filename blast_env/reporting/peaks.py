@@ -1,0 +1,63 @@
+"""The peak that a limit is held against: cells clip peaks, and no limit is kept by that.
+
+Where the charge sees a face, the larger of the peak on its cells and of Kingery and Bulmash's
+reflected one counts. That is the hemispherical one at right angles, whatever the angle and the
+height of the charge: the safe side. Elsewhere no curve holds, and the peak on the cells is
+multiplied by what they may clip (`peak_factor`).
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import pandas as pd
+
+from blast_env.calibration.references import largest_reflected_peak_pa
+from blast_env.physics.scene import OUTWARDS, BlastSite
+from blast_env.physics.sight import in_sight
+from blast_env.response.facade import peak_factor
+
+
+class PeakSource(StrEnum):
+    """Where a peak comes from, in the words of a report."""
+
+    GAS = "gas"
+    CURVE = "Kingery-Bulmash reflected"
+    EXTRAPOLATED = "gas, extrapolated from the cells"
+
+
+@dataclass(frozen=True)
+class CountedPeak:
+    """The peak on a building that limits are held against.
+
+    Attributes:
+        pa: The peak.
+        source: Where it comes from.
+    """
+
+    pa: float
+    source: PeakSource
+
+
+def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> CountedPeak:
+    """Return the largest of the peaks that count on faces of cells.
+
+    Args:
+        site: What stands where, with the barrier.
+        cell_m: Side of the cells.
+        faces: The faces, as in `GasResult.on_walls`; at least one.
+    """
+    charge = site.charge
+    points_m = faces[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
+    outward = np.array([(*OUTWARDS[face], 0.0) for face in faces["face"]])
+    seen = in_sight(site, points_m, outward)
+    away_m = np.linalg.norm(points_m - [*charge.position_m, charge.height_m], axis=1)
+    gas_pa = faces["peak_pa"].to_numpy(dtype=np.float64)
+    curve_pa = np.where(seen, largest_reflected_peak_pa(away_m, charge.tnt_kg), 0.0)
+    factor = np.where(seen, 1.0, peak_factor(cell_m, charge.tnt_kg))
+    counted_pa = np.maximum(factor * gas_pa, curve_pa)
+    which = int(counted_pa.argmax())
+    source = PeakSource.EXTRAPOLATED
+    if seen[which]:
+        source = PeakSource.CURVE if curve_pa[which] > gas_pa[which] else PeakSource.GAS
+    return CountedPeak(float(counted_pa[which]), source)
