@@ -1,9 +1,9 @@
 """What the package proposes for a site: `blast_env.propose` and `blast_env.search`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from blast_agents.search.methods import BestRuleSearch
 from blast_agents.search.problem import LayoutProblem, Proposer, Report, SearchResult
@@ -13,13 +13,23 @@ from blast_env.envs.episode import find_realisations
 from blast_env.errors import import_extra
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
-from blast_env.geometry import Layout
+from blast_env.geometry import Element, Layout, Removal
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.sites import FAMILIES
+from blast_env.statistics import reductions
+
+if TYPE_CHECKING:  # half a second to import
+    from blast_agents.surrogate.search import Guesses
 
 HIDDEN_THREATS: Final = 8
 """Threats that layouts meet where the charge is not known."""
+
+LEAST_GAIN: Final = 0.03
+"""Share of the load that a layout must be expected to take off; otherwise nothing is proposed."""
+
+LEAST_PIECE_GAIN: Final = 0.001
+"""Share of the load that a piece must be expected to take off; otherwise it is left out."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +41,14 @@ class Chosen:
         by: What it goes by, in words.
         budget: Blasts that it takes to do all that it can.
         source: What repeats the proposal: which weights, surrogate or rules.
+        is_guessed: Whether the surrogate's guesses choose.
     """
 
     proposer: Proposer
     by: str
     budget: int
     source: Mapping[str, str]
+    is_guessed: bool = False
 
     def propose(
         self,
@@ -45,14 +57,83 @@ class Chosen:
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
-        """Return the layout, and in `by` what it comes from; a smaller budget may be given."""
+        """Return the layout, what it is expected to gain, and in `by` what it comes from.
+
+        It is empty where nothing is expected to gain `LEAST_GAIN`, by blasts or by guesses. What
+        guesses choose is held against the layouts of the rules: see `worth_its_pieces`. Weights
+        were judged on their site by gas dynamics: no rule takes their place by a guess.
+
+        Args:
+            problem: What is asked.
+            budget: Most blasts, where it takes some.
+            seed: Decides what is drawn.
+            report: Is told how far it has come.
+        """
         blasts = self.budget if budget is None else min(budget, self.budget)
         result = self.proposer.propose(problem, blasts, seed, report)
-        by = self.by
+        layout, by = result.layout, self.by
+        gain: float | None = None
+        rules = layouts_by_rule(problem.scenario, problem.told)
         if self.budget:  # which rule is it?
-            rules = layouts_by_rule(problem.scenario, problem.told)
-            by = f"{by}: {next(name for name, each in rules.items() if each == result.layout)}"
-        return replace(result, method=PackageProposer.name, by=by)
+            by = f"{by}: {next(name for name, each in rules.items() if each == layout)}"
+            gain = problem.reduction(result.history[-1])
+        elif problem.scenario.zone.items:
+            guesses = _guesses(problem)
+            if self.is_guessed:
+                layout = worth_its_pieces(guesses, layout, rules.values())
+            else:
+                by = f"{by}; the gain is a guess"
+            gain = reductions(*guesses.loads([layout, ()])).item()
+        if gain is not None and not gain >= LEAST_GAIN:  # NaN: nothing arrives
+            by = (
+                f"{by}: no layout is expected to take off {100.0 * LEAST_GAIN:g} %, the "
+                f"best one {100.0 * gain:.1f} %"
+            )
+            layout, gain = (), 0.0
+        return replace(result, method=PackageProposer.name, by=by, layout=layout, gain=gain)
+
+
+def _guesses(problem: LayoutProblem) -> "Guesses":
+    # Here, because it takes half a second to import.
+    from blast_agents.surrogate import packaged_surrogate
+    from blast_agents.surrogate.search import Guesses, case_for
+
+    return Guesses.of(packaged_surrogate(), case_for(problem.scenario, problem.told))
+
+
+def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]) -> Layout:
+    """Return a layout without the pieces that bring nothing.
+
+    Where a rule's layout is better by the same guesses, it takes the place of the layout. Each
+    piece that takes off less than `LEAST_PIECE_GAIN` goes, those that bring least first, as long as
+    the rest is not worse than the best rule's layout and gains `LEAST_GAIN`.
+
+    Args:
+        guesses: What a layout is worth.
+        layout: The layout.
+        rules: The layouts of the rules.
+    """
+
+    def load(each: Layout) -> float:
+        return guesses.loads([each]).item()
+
+    bare, ruled = load(()), [tuple(sorted(each)) for each in rules]
+    best = min([layout, *ruled], key=load)
+    most = min(map(load, ruled), default=bare)
+    if load(best) <= (1.0 - LEAST_GAIN) * bare:
+        most = min(most, (1.0 - LEAST_GAIN) * bare)
+
+    def without(piece: Element) -> Layout:
+        return tuple(each for each in best if each != piece)
+
+    # A wall that is taken away stays away: something may stand in its place.
+    pieces = [each for each in best if not isinstance(each, Removal)]
+    guesses.loads([without(piece) for piece in pieces])  # all at once
+    for piece in sorted(pieces, key=lambda each: load(without(each))):
+        fewer = without(piece)
+        if load(fewer) <= min(load(best) + LEAST_PIECE_GAIN * bare, most):
+            best = fewer
+    return best
 
 
 def chosen_for(problem: LayoutProblem) -> Chosen:
@@ -77,7 +158,7 @@ def chosen_for(problem: LayoutProblem) -> Chosen:
     if scenario.zone.items:
         surrogate = packaged_surrogate()
         known = {"surrogate": surrogate.digest}
-        return Chosen(search_by(surrogate), "guesses of gas dynamics", 0, known)
+        return Chosen(search_by(surrogate), "guesses of gas dynamics", 0, known, is_guessed=True)
     blasts = len(layouts_by_rule(scenario, problem.told)) * len(problem.threats)
     rules = {"method": BestRuleSearch.name}
     return Chosen(BestRuleSearch(), "the best rule by gas dynamics", blasts, rules)

@@ -101,25 +101,27 @@ def run_task(folder: Path) -> None:
 
 def _propose(task: ProposalTask, teller: Teller) -> None:
     scenario = task.site
-    layout = _proposed(task, scenario, teller)
+    layout, expectation = _proposed(task, scenario, teller)
     words = placing.counted(scenario, layout)
-    text = f"{words}, proposed by {title_of(task.proposer)}"
+    text = f"{words}, proposed by {title_of(task.proposer)}{expectation and f', {expectation}'}"
     teller.tell(state="done", share=1.0, text=text, layout=placing.plain(layout))
 
 
-def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> Layout:
+def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[Layout, str]:
+    """Return the layout that is proposed, and what it is expected to gain, in words."""
     known = [each.charge for each in task.threats]
     if task.is_run:
         from blast_agents.training import load_agent  # torch takes seconds to import
 
         agent = load_agent(task.proposer)
-        return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None))
+        return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None)), ""
     if task.proposer != PACKAGED:
-        return proposed(task.proposer, scenario, known)
+        return proposed(task.proposer, scenario, known), ""
     case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
     problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
     report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
-    return chosen_for(problem).propose(problem, report=report).layout
+    found = chosen_for(problem).propose(problem, report=report)
+    return found.layout, found.expectation if found.layout else found.by
 
 
 def _search(task: SearchTask, teller: Teller) -> None:

@@ -45,7 +45,8 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
     not, from the surrogate of gas dynamics, which was fitted to other sites. That takes seconds,
     and no blast. Where there is no catalogue, of which the surrogate knows nothing, it is the best
     rule's layout: that takes a blast of gas dynamics for each rule and threat, some minutes, which
-    are told before; fewer with --budget. Without --charge it is for all places where the charge may
+    are told before; fewer with --budget. Nothing is proposed where no layout is expected to take
+    off 3 %. Without --charge it is for all places where the charge may
     be.
     """
 
@@ -70,9 +71,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         engine = find_engine(JUDGE, cells=self.cells)
         problem = problem_of(scenario, self._charge(scenario), self.processes, engine)
         chosen, result = self._proposed(problem)
-        placement = Placement.of(scenario, result.layout)
-        cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"
-        print_line(f"{scenario.name}: {layout_counts(result.layout)}{cost}, by {result.by}")
+        print_line(f"{scenario.name}: {_words(scenario, result)}, by {result.by}")
         if self.verify:
             self._verify(problem, result.layout)
         if not problem.evaluator.blasts:
@@ -160,6 +159,16 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         picture = out.with_suffix(".png")
         written += save_pictures(lambda: [save_layout_picture(scenario, layout, picture)])
         print_written(written)
+
+
+def _words(scenario: Scenario, result: SearchResult) -> str:
+    """Return what is proposed, what it costs and what it is expected to gain."""
+    if not result.layout:
+        return "nothing is proposed"
+    placement = Placement.of(scenario, result.layout)
+    cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"
+    gain = result.expectation
+    return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
 
 
 def _print_verdict(loads: Mapping[str, float], case: Case) -> None:

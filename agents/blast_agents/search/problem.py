@@ -190,6 +190,8 @@ class SearchResult:
         layout: The layout, its cells sorted; empty if a search ended before it had one.
         method: Name of the proposer.
         by: What has proposed it where a proposer asks others, in words.
+        gain: Share of what counts that it is expected to take off, by what has proposed it; `None`
+            where that expects nothing.
         load: Its load over the threats that it has met, in the unit of the scenario's objective;
             `None` without a blast. A search chose it by these blasts: on others it is somewhat
             more.
@@ -207,6 +209,7 @@ class SearchResult:
     layout: Layout
     method: str = ""
     by: str = ""
+    gain: float | None = None
     load: float | None = None
     threats: int = 0
     blasts: int = 0
@@ -215,6 +218,11 @@ class SearchResult:
     history: tuple[Candidate, ...] = ()
     interrupted: bool = False
     front: tuple[Candidate, ...] = ()
+
+    @property
+    def expectation(self) -> str:
+        """The gain that is expected, in words; empty where none is known."""
+        return "" if self.gain is None else f"expected to take off {100.0 * self.gain:.1f} %"
 
     def best_at(self, blasts: int) -> Candidate | None:
         """Return the best layout after so many blasts, or `None` if there was none yet.

@@ -212,7 +212,7 @@ class LearntSearch(Search):
         """
         if self.surrogate is None:
             return tuple(sorted(_given(self.agent).propose(scenario, charge)))
-        guesses = Guesses.of(self.surrogate, _case_for(scenario, charge))
+        guesses = Guesses.of(self.surrogate, case_for(scenario, charge))
         tell(0.5 * _SITE_SHARE)
         if self.agent is None:
             begin_with = [(), *layouts_by_rule(scenario, charge).values()]
@@ -307,7 +307,7 @@ def _given(agent: SamplingAgent | None) -> SamplingAgent:
     return agent
 
 
-def _case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
+def case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
     """Return what a proposal is guessed against: the charge, or some of those that may be."""
     if charge is not None:
         return practice_visible(scenario, charge, 1, 0)
