@@ -211,27 +211,27 @@ class Pane:
         """Return B of a constant pressure.
 
         Args:
-            pressure_pa: Pressure on the inner pane.
+            pressure_pa: Pressure on the pane; double glazing bears it with both panes.
             duration_s: Its duration.
         """
-        own = _single(self, self.thickness_m)
-        risk = np.interp(
-            np.log(pressure_pa / self.kind.type_factor), np.log(own.load_pa), np.log(own.risk_60)
-        )
+        own = self.curve
+        risk = np.interp(np.log(pressure_pa), np.log(own.load_pa), np.log(own.risk_60))
         return float(np.exp(risk) * (duration_s / _REFERENCE_S) ** (WEIBULL_M / STATIC_FATIGUE))
 
     def load_resistance_pa(self, probability: float = 0.008, duration_s: float = 3.0) -> float:
         """Return the pressure that breaks such a share of panes, Pa (E1300's NFL times its factor).
 
+        Of double glazing it is borne by both panes, and breaks the inner one.
+
         Args:
             probability: Share of panes that break.
             duration_s: Duration of the pressure.
         """
-        own = _single(self, self.thickness_m)
+        own = self.curve
         shorter = (duration_s / _REFERENCE_S) ** (WEIBULL_M / STATIC_FATIGUE)
         wanted = np.log(-np.log1p(-probability) / shorter)
         load = np.interp(wanted, np.log(own.risk_60), np.log(own.load_pa))
-        return float(np.exp(load) * self.kind.type_factor)
+        return float(np.exp(load))
 
 
 @dataclass(frozen=True, eq=False)
