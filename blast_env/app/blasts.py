@@ -36,6 +36,7 @@ from blast_env.calibration.model import CalibrationError
 from blast_env.engines import Blast
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.evaluation.consequences import unchecked
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
 from blast_env.provenance import versions
@@ -176,16 +177,17 @@ def _particles(
     frames = (paint_at(run, painter, time_s, plan.real_time_factor) for time_s in times_s)
     _write_film(frames, times_s, folder, share_of(tell, 0, 10, 5))
     notes = [*scenario.height_notes]
+    kept: dict[str, Any] = {"loads": (), "unchecked": ()}
     if scenario.objective.needs_peaks:
         noun = scenario.objective.noun
-        return {"loads": (), "notes": (*notes, f"no loads: {noun} counts here; blast it with gas")}
+        return kept | {"notes": (*notes, f"no loads: {noun} counts here; blast it with gas")}
     try:
         loads = _particle_loads(task, scenario, layout, charge, share_of(tell, 5, 10, 5))
     except CalibrationError as error:
-        return {"loads": (), "notes": (*notes, f"no loads: {error}")}
+        return kept | {"notes": (*notes, f"no loads: {error}")}
     notes += dict.fromkeys(note for each in loads for own in each.structures for note in own.notes)
     notes.append(f"particles overrate walls; mean over {len(SEEDS)} seeds, judge by gas")
-    return {"loads": _mean_loads(loads), "notes": tuple(notes)}
+    return kept | {"loads": _mean_loads(loads), "notes": tuple(notes)}
 
 
 def _particle_loads(
@@ -242,6 +244,7 @@ def _gas(
         "loads": _gas_loads(result),
         "buildings": tuple(_buildings(result)),
         "notes": tuple(dict.fromkeys(notes)),
+        "unchecked": tuple(unchecked(scenario, result)),
         "pictures": pictures,
         "waves": tuple(_waves(result)),
     }

@@ -160,6 +160,7 @@ class BlastRecord(Kept):
         loads: All structures; the first one is of all protected ones together.
         buildings: Buildings of several structures, where their mean is known.
         notes: What there is to say about it.
+        unchecked: A building and why loads on it by gas are to be distrusted, one each.
         pictures: Pictures beside the film.
         waves: Histories of the gauges.
         seconds: How long it took.
@@ -173,6 +174,7 @@ class BlastRecord(Kept):
     loads: tuple[Load, ...]
     buildings: tuple[Load, ...] = ()
     notes: tuple[str, ...] = ()
+    unchecked: tuple[tuple[str, str], ...]
     pictures: tuple[Picture, ...] = ()
     waves: tuple[Wave, ...] = ()
     seconds: float
@@ -278,6 +280,7 @@ class VerdictRow(Kept):
         panes: How many panes are expected to break, of how many.
         condition: Performance condition of the worst pane, GSA.
         damage: Damage of the worst wall panel.
+        flags: Why the loads that this rests on are to be distrusted; a dash where they are not.
     """
 
     layout: str
@@ -287,6 +290,7 @@ class VerdictRow(Kept):
     panes: str
     condition: str
     damage: str
+    flags: str
 
 
 @dataclass(frozen=True)

@@ -147,22 +147,25 @@ def verdict_rows(
     Args:
         records: Name of the layout, the blast, and the verdicts on it.
     """
-    found: dict[tuple[str, str], list[tuple[str, Verdict]]] = {}
+    found: dict[tuple[str, str], list[tuple[str, Verdict, tuple[str, ...]]]] = {}
     for name, record, verdicts in records:
         for verdict in verdicts:
-            found.setdefault((name, verdict.building), []).append((record.threat, verdict))
+            flags = tuple(why for building, why in record.unchecked if building == verdict.building)
+            key = name, verdict.building
+            found.setdefault(key, []).append((record.threat, verdict, flags))
     for (name, _), own in found.items():
         if len(own) > 1:
-            worst = max((each for _, each in own), key=_badness)
-            yield _verdict_row(name, f"worst of {len(own)}", worst)
-        yield from (_verdict_row(name, threat, each) for threat, each in own)
+            worst = max((each for _, each, _ in own), key=_badness)
+            flags = tuple(dict.fromkeys(flag for *_, each in own for flag in each))
+            yield _verdict_row(name, f"worst of {len(own)}", worst, flags)
+        yield from (_verdict_row(name, *each) for each in own)
 
 
 def _badness(verdict: Verdict) -> tuple[int, int, float]:
     return -verdict.level, -verdict.level_on_cells, verdict.broken
 
 
-def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
+def _verdict_row(layout: str, threat: str, verdict: Verdict, flags: tuple[str, ...]) -> VerdictRow:
     level = LevelOfProtection(verdict.level).label
     if verdict.level_on_cells > verdict.level:
         level += f"; {LevelOfProtection(verdict.level_on_cells).label} on the cells"
@@ -174,4 +177,5 @@ def _verdict_row(layout: str, threat: str, verdict: Verdict) -> VerdictRow:
         panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
         condition=verdict.condition if verdict.panes else _DASH,
         damage=verdict.damage or _DASH,
+        flags="; ".join(flags) or _DASH,
     )

@@ -29,7 +29,7 @@ from blast_env.engines.contract import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
-from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation.consequences import Consequences, consequences, verdict_word
 from blast_env.geometry import Layout, layout_words
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
@@ -165,6 +165,8 @@ class AdviseCommand(ChargeOptions):
         judge: Engine,
     ) -> None:
         print_line(_answer(scenario, target, best, found, judged))
+        for note in judged[best.layout].notes:
+            print_line(f"flag: {note}")
         title = (
             f"{scenario.name}: what {scenario.zone.budget:g} buys, level {target.label!r} wanted"
         )
@@ -179,8 +181,8 @@ class AdviseCommand(ChargeOptions):
                 str(each.blasts),
                 min(levels).label,
                 "yes" if each.passes else "no",
-                "passes" if seen.passes_on_cells(target) else "fails",
-                "passes" if seen.passes(target) else "fails",
+                verdict_word(seen.passes_on_cells(target), seen.is_flagged).lower(),
+                seen.verdict(target).lower(),
             )
         result_console().print(table)
         print_line(
@@ -206,12 +208,14 @@ def _answer(
     """Return the answer in a line or two: what it costs to pass, and whether walls help."""
     by_kind = {each.kind: each for each in found}
     cost = Placement(scenario, best.layout).cost
+    flagged = " (flagged)" if judged[best.layout].is_flagged else ""
     if not judged[best.layout].passes(target):
         answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}."
     elif not best.layout:
-        answer = f"{scenario.name}: the empty site reaches {target.label!r}."
+        answer = f"{scenario.name}: the empty site reaches {target.label!r}{flagged}."
     else:
-        answer = f"{scenario.name}: {target.label!r} costs {cost:g}: {layout_words(best.layout)}."
+        words = layout_words(best.layout)
+        answer = f"{scenario.name}: {target.label!r} costs {cost:g}{flagged}: {words}."
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
     if shield is None or judged[shield.layout].passes(target):
         return answer

@@ -36,6 +36,7 @@ from blast_env.evaluation.consequences import (
     consequences,
     other_glazing,
     piece_table,
+    verdict_word,
 )
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
@@ -129,9 +130,11 @@ class AssessCommand(ChargeOptions):
         name, judged = list(found.items())[-1]
         count = len(judged.barriers)
         print_line(
-            f"{scenario.name}, {name}: {'PASSES' if judged.passes(target) else 'FAILS'} level "
-            f"{target.label!r} under {count} charges"
+            f"{scenario.name}, {name}: {judged.verdict(target)} level {target.label!r} "
+            f"under {count} charges"
         )
+        for note in judged.notes:
+            print_line(f"flag: {note}")
         if doubt := judged.doubt(target):
             print_line(doubt)
 
@@ -142,9 +145,9 @@ class AssessCommand(ChargeOptions):
             for building in each.buildings
         ]
         print_table(f"{scenario.name}: the worst of all charges", _HEADERS, rows, text_columns=3)
-        for name, each in found.items():
+        for name, each in list(found.items())[:-1]:
             for note in each.notes:
-                print_line(f"{name}: {note}")
+                print_line(f"flag, {name}: {note}")
 
     def _print_neighbours(self, found: dict[str, Consequences]) -> None:
         if not any(each.neighbours for each in found.values()):
@@ -173,13 +176,13 @@ class AssessCommand(ChargeOptions):
     def _print_glazing(
         self, scenario: Scenario, judged: Consequences, target: LevelOfProtection
     ) -> None:
-        headers = ("glass in all windows", *_HEADERS[1:], "passes")
+        headers = ("glass in all windows", *_HEADERS[1:], "verdict")
         table = ResultTable("the same loads, other glass", headers, text_columns=3)
         for name, glazing in other_glazing(scenario).items():
             other = judged.with_glazing(glazing)
             for building in other.buildings:
-                passes = "yes" if other.level(building) >= target else "no"
-                table.add_row(name, building, *_row(other, building), passes)
+                passes = verdict_word(other.level(building) >= target, other.is_flagged)
+                table.add_row(name, building, *_row(other, building), passes.lower())
         result_console().print(table)
 
     def _write(

@@ -32,6 +32,7 @@ from blast_env.engines.gas_tables import means_by_wall
 from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout
+from blast_env.physics.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.physics.scene import WALLS, Charge
 from blast_env.response.buildings import (
     BuildingDamage,
@@ -57,6 +58,8 @@ _CLIPPED: Final = (
     "by the peaks on its cells it passes, which clip them; by peaks as sharp as Kingery and"
     " Bulmash's of the same impulse it does not: smaller cells may tell"
 )
+
+_BREACH: Final = "so near, walls may be breached: the response knows bending alone"
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +139,8 @@ class Consequences:
         responses: One a building with a facade and charge.
         neighbours: One a building without and charge.
         barriers: One a charge.
-        unchecked: A building and why the engine was not checked for the loads on it, one a building
-            and charge for which that is so.
+        unchecked: A building and why the loads on it are to be distrusted, one a building and
+            charge for which that is so.
     """
 
     responses: tuple[BuildingResponse, ...]
@@ -174,14 +177,26 @@ class Consequences:
             f"was checked for, e.g. {own[0]}"
             for building, own in reasons.items()
         ]
-        tails = [tail for each in self.responses for tail in each.tails.values()]
-        late = sum(not each.complete for each in tails)
-        if late:
+        late = [not each.complete for each in self._tails]
+        if any(late):
             notes.append(
-                f"{late} of {len(tails)} bays of all charges are not complete: more than 2 % of"
+                f"{sum(late)} of {len(late)} bays of all charges are not complete: more than 2 % of"
                 " their impulse may still come"
             )
         return tuple(notes)
+
+    @property
+    def _tails(self) -> list[BayTail]:
+        return [tail for each in self.responses for tail in each.tails.values()]
+
+    @property
+    def is_flagged(self) -> bool:
+        """Whether there is a note on the loads of a building with a facade."""
+        return (
+            any(building in self.buildings for building, _ in self.unchecked)
+            or any(each.stepped for each in self.responses)
+            or not all(each.complete for each in self._tails)
+        )
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
         """Return what the charges do to one building."""
@@ -237,6 +252,10 @@ class Consequences:
     def passes(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level under every charge."""
         return all(self.level(building) >= target for building in self.buildings)
+
+    def verdict(self, target: LevelOfProtection) -> str:
+        """Return in a word or two whether all buildings reach a level; see `verdict_word`."""
+        return verdict_word(self.passes(target), self.is_flagged)
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
         """Return the same with other glass in all windows; sizes and sills stay.
@@ -377,16 +396,37 @@ def consequences_of(
         tuple(responses),
         tuple(neighbours_of(scenario, result, charge)),
         (BarrierResponse(charge, result.pieces, taken_away),),
-        tuple(_unchecked(scenario, result)),
+        tuple(unchecked(scenario, result)),
     )
 
 
-def _unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
-    """Yield each building whose loads the engine was not checked for, and why."""
+def verdict_word(passes: bool, flagged: bool) -> str:
+    """Return a verdict: no bare "PASSES" rests on loads that are flagged.
+
+    Args:
+        passes: Whether all that was asked for is kept.
+        flagged: Whether there is a note on the loads.
+    """
+    if not passes:
+        return "FAILS"
+    return "PASSES (flagged)" if flagged else "PASSES"
+
+
+def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
+    """Yield each building whose loads are to be distrusted, and why.
+
+    They are outside what the engine or the response was checked for, or not complete.
+    """
+    from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
+
     reasons: dict[str, dict[str, None]] = {}
-    for name in result.structures["structure"]:
-        own = reasons.setdefault(scenario.building_names.get(name, name), {})
-        own.update(dict.fromkeys(result.impulse(name).notes))
+    for outline in result.run.site.structures:
+        if outline.cells is None:
+            name = scenario.building_names.get(outline.name, outline.name)
+            own = reasons.setdefault(name, {})
+            own.update(dict.fromkeys(result.impulse(outline.name).notes))
+            if scaled_distance(result.run.site, outline) < CHECKED_SCALED_DISTANCE[0]:
+                own[_BREACH] = None
     yield from ((building, "; ".join(own)) for building, own in reasons.items() if own)
 
 

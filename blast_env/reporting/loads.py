@@ -189,6 +189,7 @@ class TargetLoad:
         duration_s: How long the mean overpressure on it stays positive at first; NaN if no wave
             comes or the run ends before.
         complete: Whether at most 2 % of these impulses is still to come.
+        flagged: Whether there is a note on them.
     """
 
     target: str
@@ -201,6 +202,7 @@ class TargetLoad:
     wall_impulse_pa_s: float
     duration_s: float
     complete: bool
+    flagged: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,6 +251,8 @@ class MeasuredBlast:
         by_wall = means_by_wall(walls, "positive_impulse_pa_s")
         wall = next(each for each in WALLS if each == by_wall.idxmax())
         arrivals = walls["arrival_s"].to_numpy()
+        complete = self._is_complete(target, wall)
+        in_range = all(self.result.impulse(name).in_range for name in target.names)
         return TargetLoad(
             target=target.name,
             impulse_pa_s=mean_over_area(walls, "positive_impulse_pa_s"),
@@ -259,7 +263,8 @@ class MeasuredBlast:
             wall=wall,
             wall_impulse_pa_s=float(by_wall.max()),
             duration_s=self._duration_s(target.name, wall),
-            complete=self._is_complete(target, wall),
+            complete=complete,
+            flagged=not (complete and in_range),
         )
 
     def _is_complete(self, target: ReportedBuilding, wall: WallName) -> bool:

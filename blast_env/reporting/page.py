@@ -15,6 +15,7 @@ import tomli_w
 
 from blast_env.engines.bays import bay_rows
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation.consequences import verdict_word
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.geometry import layout_counts, layout_text
 from blast_env.physics.gas.settings import CHECKED_SCALED_DISTANCE
@@ -122,6 +123,7 @@ def report_html(study: Study, commands: list[str]) -> str:
         "impulse": lambda pa_s: _number(units.impulse_of(pa_s)),
         "pressure": lambda pa: _number(units.pressure_of(pa)),
         "counted": lambda load: _counted(load, units),
+        "word": lambda passes, flagged: verdict_word(passes, flagged).lower(),
         "percent": _percent,
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),

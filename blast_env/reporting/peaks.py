@@ -2,8 +2,9 @@
 
 Where the charge sees a face, the larger of the peak on its cells and of Kingery and Bulmash's
 reflected one counts. That is the hemispherical one at right angles, whatever the angle and the
-height of the charge: the safe side. Elsewhere no curve holds, and the peak on the cells is
-multiplied by what they may clip (`peak_factor`).
+height of the charge: the safe side. Elsewhere the peak on the cells is multiplied by what they may
+clip (`peak_factor`), up to the curve: what hides a face adds nothing to the wave in the open. Where
+the cells alone exceed the curve, as between walls, it is no bound.
 """
 
 from dataclasses import dataclass
@@ -53,11 +54,13 @@ def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> Counted
     seen = in_sight(site, points_m, outward)
     away_m = np.linalg.norm(points_m - [*charge.position_m, charge.height_m], axis=1)
     gas_pa = faces["peak_pa"].to_numpy(dtype=np.float64)
-    curve_pa = np.where(seen, largest_reflected_peak_pa(away_m, charge.tnt_kg), 0.0)
-    factor = np.where(seen, 1.0, peak_factor(cell_m, charge.tnt_kg))
-    counted_pa = np.maximum(factor * gas_pa, curve_pa)
+    curve_pa = largest_reflected_peak_pa(away_m, charge.tnt_kg)
+    grown_pa = peak_factor(cell_m, charge.tnt_kg) * gas_pa
+    bounded = gas_pa <= curve_pa
+    hidden_pa = np.where(bounded, np.minimum(grown_pa, curve_pa), grown_pa)
+    counted_pa = np.where(seen, np.maximum(gas_pa, curve_pa), hidden_pa)
     which = int(counted_pa.argmax())
-    source = PeakSource.EXTRAPOLATED
-    if seen[which]:
-        source = PeakSource.CURVE if curve_pa[which] > gas_pa[which] else PeakSource.GAS
+    source = PeakSource.GAS if seen[which] else PeakSource.EXTRAPOLATED
+    if bounded[which] and counted_pa[which] == curve_pa[which]:
+        source = PeakSource.CURVE
     return CountedPeak(float(counted_pa[which]), source)

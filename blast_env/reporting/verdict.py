@@ -3,7 +3,12 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from blast_env.evaluation.consequences import BarrierResponse, Consequences, other_glazing
+from blast_env.evaluation.consequences import (
+    BarrierResponse,
+    Consequences,
+    other_glazing,
+    verdict_word,
+)
 from blast_env.reporting.outcomes import Limit, LoadPair
 from blast_env.reporting.study import Study
 from blast_env.response.walls import DamageLevel
@@ -76,6 +81,8 @@ class ReportVerdict:
     Attributes:
         passes: Whether all that was asked for is kept; `None` where nothing was.
         passes_bare: The same without the layout.
+        flagged: Whether there is a note on a load that the verdict rests on.
+        flagged_bare: The same without the layout.
         words: What was asked for.
         doubt: Why a verdict that fails rests on sharper peaks; empty if it does not.
         buildings: The buildings with a facade.
@@ -86,6 +93,8 @@ class ReportVerdict:
 
     passes: bool | None
     passes_bare: bool | None
+    flagged: bool
+    flagged_bare: bool
     words: str
     doubt: str
     buildings: tuple[BuildingLine, ...]
@@ -96,7 +105,7 @@ class ReportVerdict:
     @property
     def word(self) -> str:
         """In a word."""
-        return {True: "PASSES", False: "FAILS", None: "NO VERDICT"}[self.passes]
+        return "NO VERDICT" if self.passes is None else verdict_word(self.passes, self.flagged)
 
 
 def verdict_of(study: Study) -> ReportVerdict:
@@ -120,6 +129,8 @@ def verdict_of(study: Study) -> ReportVerdict:
     return ReportVerdict(
         passes=all(kept) if asked else None,
         passes_bare=all(kept_bare) if asked else None,
+        flagged=study.walled.is_flagged or any(each.pair.walled.flagged for each in limits),
+        flagged_bare=study.bare.is_flagged or any(each.pair.bare.flagged for each in limits),
         words=" and ".join(asked),
         doubt=doubt,
         buildings=tuple(_line(study, name) for name in study.walled.buildings),

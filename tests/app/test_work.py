@@ -141,6 +141,7 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
             engine=EngineRecord(name="gas"),
             layout=plain(layout),
             loads=tuple(loads),
+            unchecked=(),
             seconds=1.0,
             repeat={},
         )
@@ -241,6 +242,8 @@ def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None
     assert rows[1].panes == f"{facade.broken_panes:.1f} of {facade.panes}"
     assert rows[1].condition == facade.worst_condition.label
     assert rows[1].damage == facade.worst_damage.name.lower()
+    assert "cells per m/kg^(1/3)" in rows[1].flags
+    assert rows[1].flags == dict(found.unchecked)["hut"]
 
 
 def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:

@@ -38,8 +38,10 @@ def site(**wall: Any) -> Scenario:
     return Scenario.from_document(document, "yard")
 
 
-def judge(scenario: Scenario, layout: Layout, without_fallen: bool = False) -> Consequences:
-    return consequences(scenario, layout, [CHARGE], GasEngine(), without_fallen=without_fallen)
+def judge(
+    scenario: Scenario, layout: Layout, without_fallen: bool = False, charge: Charge = CHARGE
+) -> Consequences:
+    return consequences(scenario, layout, [charge], GasEngine(), without_fallen=without_fallen)
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +67,29 @@ def test_a_charge_that_the_engine_was_not_checked_for_is_named(found: Consequenc
     assert f"hut: 1 of 1 charges {words} {reason}" in found.notes
     both = Consequences.together([found, replace(found, unchecked=())])
     assert f"hut: 1 of 2 charges {words} {reason}" in both.notes
+
+
+def test_no_verdict_passes_without_the_flags_of_its_loads(found: Consequences) -> None:
+    """5 kg on cells of 0.5 m."""
+    below = LevelOfProtection.BELOW_STANDARDS
+    assert found.verdict(below) == "PASSES (flagged)"
+    assert replace(found, unchecked=()).is_flagged == any(
+        not each.complete for each in found.responses[0].tails.values()
+    )
+    bare = Consequences((replace(found.responses[0], tails={}),))
+    assert bare.verdict(below) == "PASSES"
+    assert bare.verdict(LevelOfProtection.HIGH) == "FAILS"
+    assert replace(bare, unchecked=(("kiosk", "too near"),)).verdict(below) == "PASSES"
+
+
+def test_bending_alone_is_no_verdict_on_a_wall_that_may_be_breached() -> None:
+    """100 kg 5.5 m from the hut, 1.18 m/kg^(1/3); 5 kg there are 3.2 m/kg^(1/3) away."""
+    near = judge(site(), (), charge=CHARGE._replace(tnt_kg=100.0))
+    (why,) = (why for building, why in near.unchecked if building == "hut")
+    assert "walls may be breached" in why
+    assert "checked from 1.7 to 8.6" in why
+    far = judge(site(), ())
+    assert not any("breached" in why for _, why in far.unchecked)
 
 
 @pytest.mark.parametrize("scaled", [5.0, 10.0, 15.0])

@@ -31,8 +31,12 @@ def test_in_sight_the_larger_of_gas_and_the_curve_counts() -> None:
 
 @pytest.mark.parametrize(("layout", "face"), [(WALL, "west"), ((), "east")])
 def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(layout: Layout, face: str) -> None:
+    curve_pa, factor = kingery_bulmash("reflected_overpressure", 4.0, 5.0), peak_factor(0.5, 5.0)
     found = counted(1e4, layout, face)
-    assert found == CountedPeak(peak_factor(0.5, 5.0) * 1e4, PeakSource.EXTRAPOLATED)
+    assert found == CountedPeak(factor * 1e4, PeakSource.EXTRAPOLATED)
+    assert counted(0.9 * curve_pa, layout, face).pa == pytest.approx(curve_pa)
+    # Between walls more may come than in the open: then the curve is no bound.
+    assert counted(1.1 * curve_pa, layout, face).pa == pytest.approx(factor * 1.1 * curve_pa)
 
 
 def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(study: Study) -> None:

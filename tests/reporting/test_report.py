@@ -164,10 +164,12 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
 def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
     assert fine.walled.wall_impulse_pa_s < 300.0 < fine.bare.wall_impulse_pa_s
-    verdicts = re.findall(r'<span class="(\w+)">(\w+)</span>', page)
-    whole, *limits = verdicts
-    assert whole[1] in ("PASSES", "FAILS")
-    assert limits == [("fail", "FAIL"), ("pass", "pass")]
+    whole, *limits = re.findall(r'<span class="(\w+)">([^<]+)</span>', page)
+    assert fine.bare.flagged  # 6.8 cells per m/kg^(1/3)
+    assert fine.walled.flagged
+    assert whole[1] in ("PASSES (flagged)", "FAILS")
+    assert limits == [("fail", "fails"), ("pass", "passes (flagged)")]
+    assert ">passes<" not in page
     assert "1 of 1</strong> cases with the layout, 0 without" in page
 
 

@@ -35,6 +35,7 @@ _VERDICT_COLUMNS: Final = (
     ("panes", "panes broken", "right"),
     ("condition", "worst pane (GSA)", "left"),
     ("damage", "worst wall panel", "left"),
+    ("flags", "flags of its loads", "left"),
 )
 # Okabe and Ito, with a dash each: no colour alone says which line is which.
 _LINES: Final = (
