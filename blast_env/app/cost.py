@@ -22,9 +22,11 @@ class ReportCost:
 
     Attributes:
         parts: What `run_study` says when it does a part, and its blasts.
+        drawn: How many blasts there are pictures of.
     """
 
     parts: tuple[tuple[str, tuple[CostGuess, ...]], ...]
+    drawn: int
 
     @classmethod
     def of(cls, scenario: Scenario, layout: Layout, options: "StudyOptions") -> "ReportCost":
@@ -37,10 +39,17 @@ class ReportCost:
         from blast_env.reporting.study import blasts_of, threats_of
 
         threats = threats_of(scenario, options)
-        charge = threats[0].charge
-        one = {size: GasEngine.with_cells(size).cost(scenario, charge) for size in options.sizes}
         parts = blasts_of(scenario, layout, options, threats)
-        return cls(tuple((label, (one[size],) * count) for label, count, size in parts))
+        asked = {(each.cells, charge) for each in parts for charge in each.charges}
+        one = {pair: GasEngine.with_cells(pair[0]).cost(scenario, pair[1]) for pair in asked}
+        costs = [tuple(one[each.cells, charge] for charge in each.charges) for each in parts]
+        labelled = zip((each.label for each in parts), costs, strict=True)
+        return cls(tuple(labelled), sum(len(each.charges) for each in parts if each.is_drawn))
+
+    @property
+    def words(self) -> str:
+        """The cost for people."""
+        return cost_words(self.blasts, self.drawn)
 
     @property
     def blasts(self) -> tuple[CostGuess, ...]:
@@ -57,22 +66,19 @@ class ReportCost:
         return min((before_s + share * costs_s[label]) / sum(costs_s.values()), 1.0)
 
 
-def cost_words(costs: Sequence[CostGuess], with_films: bool = False) -> str:
+def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
     """Return what some blasts cost one after the other, for people.
 
     Args:
         costs: Of each.
-        with_films: Whether film, maps and walls are drawn of each.
+        drawn: Of how many of them film, maps or walls are drawn.
     """
     if not costs:
         return "nothing to run: all of it is there"
-    drawn_s = _DRAWING_S if with_films else 0.0
     blasts = "a blast" if len(costs) == 1 else f"{len(costs)} blasts"
+    seconds = sum(each.seconds for each in costs) + drawn * _DRAWING_S
     memory_gb = max(each.memory_bytes for each in costs) / 1e9
-    return (
-        f"{blasts} of gas: about {time_words(sum(each.seconds + drawn_s for each in costs))} on a"
-        f" busy core, {memory_gb:.1f} GB"
-    )
+    return f"{blasts} of gas: about {time_words(seconds)} on a busy core, {memory_gb:.1f} GB"
 
 
 def time_words(seconds: float) -> str:

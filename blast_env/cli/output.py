@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import isnan
 from pathlib import Path
+from signal import SIG_DFL, SIGINT, SIGTERM, getsignal, signal
+from threading import current_thread, main_thread
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,6 +31,7 @@ if TYPE_CHECKING:  # a third of a second to import
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
+_EXIT_OF_SIGNALS: Final = 128  # of shells; the number of the signal is added
 _BETWEEN: Final = 2  # characters between columns
 
 LAYOUT_PICTURE: Final = "layout.png"
@@ -65,27 +68,65 @@ def printable(text: str) -> str:
     return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
-@contextmanager
-def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
-    """Turn errors of the user into a message and exit code 2, Ctrl-C into exit code 130.
+class InterruptedCommandError(Exception):
+    """A command was interrupted after it had a part of its result, which it has written.
 
     Args:
-        resume: Says how to go on after Ctrl-C, where a command can.
+        parts: What is kept, and how to go on.
     """
-    try:
-        yield
-    except BlastEnvError as error:
-        message_console().print(printable(f"error: {error}"), style="red")
-        raise typer.Exit(2) from error
-    except KeyboardInterrupt:
-        show_interruption("no file was left half-written", "" if resume is None else resume())
-        raise typer.Exit(130) from None
+
+    def __init__(self, *parts: str) -> None:
+        self.parts = parts
+        super().__init__(*parts)
 
 
-def show_interruption(*parts: str) -> None:
-    """Say on standard error that the command was interrupted, what is kept and how to go on."""
+@contextmanager
+def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
+    """Turn errors of the user into a message and exit code 2, interruptions into 130 or 143.
+
+    SIGTERM (`timeout`, a batch system, a shutdown) ends the block as Ctrl-C does.
+
+    Args:
+        resume: Says how to go on after an interruption, where a command can.
+    """
+    with _sigterm_as_interrupt() as terminated:
+        try:
+            yield
+        except KeyboardInterrupt:
+            parts: tuple[str, ...] = ("no file was left half-written", resume() if resume else "")
+        except InterruptedCommandError as interrupted:
+            parts = interrupted.parts
+        except BlastEnvError as error:
+            message_console().print(printable(f"error: {error}"), style="red")
+            raise typer.Exit(2) from error
+        else:
+            return
     text = "; ".join(part for part in parts if part)
     message_console().print(printable(f"interrupted: {text}"), style="yellow")
+    raise typer.Exit(_EXIT_OF_SIGNALS + (SIGTERM if terminated else SIGINT))
+
+
+@contextmanager
+def _sigterm_as_interrupt() -> Iterator[list[int]]:
+    """Raise `KeyboardInterrupt` on SIGTERM; yield a list that then has the signal in it.
+
+    Where signals are not ours to handle, in threads or because the parent lets them be ignored,
+    nothing is changed.
+    """
+    received: list[int] = []
+    if current_thread() is not main_thread() or getsignal(SIGTERM) is not SIG_DFL:
+        yield received
+        return
+
+    def interrupt(number: int, _frame: object) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    signal(SIGTERM, interrupt)
+    try:
+        yield received
+    finally:
+        signal(SIGTERM, SIG_DFL)
 
 
 def print_json(content: Mapping[str, object]) -> None:

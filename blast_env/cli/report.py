@@ -5,10 +5,16 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from blast_env.app.cost import ReportCost, cost_words
+from blast_env.app.cost import ReportCost
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import SCENARIO_HELP, TARGET_HELP, CacheOptions, ProcessOptions
-from blast_env.cli.output import message_console, print_line, print_written, progress_bar
+from blast_env.cli.output import (
+    InterruptedCommandError,
+    message_console,
+    print_line,
+    print_written,
+    progress_bar,
+)
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.physics.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.physics.scene import Charge
@@ -73,7 +79,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         options = self._study_options()
         check_layout(scenario, layout)
         cost = ReportCost.of(scenario, layout, options)
-        message_console().print(cost_words(cost.blasts))
+        message_console().print(cost.words)
         with progress_bar(f"report on {scenario.name}") as progress:
 
             def tell(label: str, part: float) -> None:
@@ -82,12 +88,17 @@ class ReportCommand(ProcessOptions, CacheOptions):
                     progress(share)
 
             study = run_study(scenario, layout, options, tell)
-        if study.stopped:
-            message_console().print(
-                f"stopped before: {study.stopped}; what was done by then is written"
-            )
         print_line(" and ".join((options.coarse.describe(), options.words[1])))
         print_written(write_report(study, self.out, self.pdf))
+        if study.stopped:
+            raise InterruptedCommandError(
+                f"{self.out} has what was done before: {study.stopped}", self.how_to_resume()
+            )
+
+    def how_to_resume(self) -> str:
+        """Return how to go on after an interruption: with the loads that are kept, if they are."""
+        kept = super().how_to_resume()
+        return kept if self.cache is None else f"{kept}, and draws the threats again"
 
     def _study_options(self) -> "StudyOptions":
         from blast_env.reporting import Limit, StudyOptions, UnitSystem

@@ -7,7 +7,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import typer
 from blast_agents.search import (
     LayoutProblem,
     Proposer,
@@ -34,6 +33,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
+    InterruptedCommandError,
     ResultTable,
     message_console,
     percent,
@@ -43,7 +43,6 @@ from blast_env.cli.output import (
     result_console,
     save_layout_picture,
     save_pictures,
-    show_interruption,
 )
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
@@ -138,12 +137,11 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
                 write_search(run, options, checked, self.out)
         if run.result.interrupted:
             layout = None if self.out is None else self.out / LAYOUT_NAME
-            show_interruption(
+            raise InterruptedCommandError(
                 "the best layout so far was kept",
                 "" if layout is None else f"--start-from {layout} begins with it",
                 self.how_to_resume(),
             )
-            raise typer.Exit(130)
 
     def _options(self) -> dict[str, Any]:
         """Return the options that decide what is found, as plain data."""

@@ -156,6 +156,14 @@ class BlastEvaluator:
             for loads, layout in zip(loads_of, layouts, strict=True)
         ]
 
+    def keep(self, layout: Sequence[Element], threat: Threat, loads: BlastLoads) -> None:
+        """Remember the loads of a blast that was run elsewhere, with the same engine.
+
+        Raises:
+            LayoutError: If the layout does not fit the build zone.
+        """
+        self._keep(self._key(layout, threat), loads)
+
     def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
         cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))
         # Without noise there is nothing to draw: a charge has one realisation.

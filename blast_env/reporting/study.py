@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -301,28 +301,57 @@ def run_study(
     )
 
 
+class PlannedPart(NamedTuple):
+    """A part of a report before it is run.
+
+    Attributes:
+        label: The label that `run_study` reports; of parts with several, how they begin.
+        cells: Their cells.
+        charges: The charge of each blast; of equal blasts, only the first is run.
+        is_drawn: Whether there are pictures of each blast.
+    """
+
+    label: str
+    cells: Cells
+    charges: tuple[AnyCharge, ...]
+    is_drawn: bool = False
+
+
 def blasts_of(
     scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[NamedCharge]
-) -> tuple[tuple[str, int, Cells], ...]:
-    """Return the parts of a report in their order: label, blasts, and their cells.
-
-    Labels are those that `run_study` tells; of parts with several, what they begin with.
-    """
+) -> tuple[PlannedPart, ...]:
+    """Return the parts of a report in their order, with the blasts that are run for each."""
     coarse = options.cells[0]
-    count, items = len(threats), len(standing(layout)) if options.items else 0
-    parts: list[tuple[str, int, Cells]] = [
-        (_label(threat, words, size), 1, size)
+    parts = [
+        PlannedPart(_label(threat, words, size), size, (threat.charge,), is_drawn=True)
         for size in options.sizes
         for threat in threats
         for words in (_BARE, _WALLED)
     ]
-    parts.append((_FILM, 2 if options.stills else 0, coarse))
-    parts += [(f"{each.name}, {_MASSES_PART}", 2 * len(_MASSES), coarse) for each in threats]
-    parts.append((_ITEMS, count * (items + 2) if items else 0, coarse))
-    parts.append((_PLACES, 2 * len(other_places(scenario, options.places)), coarse))
-    front = len(front_layouts(options.front, scenario))
-    parts.append((_FRONT, count * (front + 1) if front else 0, coarse))
+    own = [threat.charge for threat in threats]
+    parts.append(PlannedPart(_FILM, coarse, (own[0],) * 2 if options.stills else ()))
+    known = {(each, charge) for each in ((), layout) for charge in own}
+
+    def asked(label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]) -> None:
+        pairs = dict.fromkeys((each, charge) for each in layouts for charge in charges)
+        new = [pair for pair in pairs if pair not in known]
+        known.update(new)
+        parts.append(PlannedPart(label, coarse, tuple(charge for _, charge in new)))
+
+    for each in threats:
+        masses, _ = other_masses(scenario, each.charge, _MASSES)
+        charges = [mass.charge for mass in masses]
+        asked(f"{each.name}, {_MASSES_PART}", ((), layout), charges)
+    asked(_ITEMS, _fewer(layout) if options.items else (), own)
+    places = [each.charge for each in other_places(scenario, options.places)]
+    asked(_PLACES, ((), layout), places)
+    asked(_FRONT, front_layouts(options.front, scenario), own)
     return tuple(parts)
+
+
+def _fewer(layout: Layout) -> list[Layout]:
+    """Return a layout without each of its modules or pieces."""
+    return [tuple(each for each in layout if each != piece) for piece in standing(layout)]
 
 
 def _label(threat: NamedCharge, words: str, cells: Cells) -> str:
@@ -408,6 +437,8 @@ class Runs:
         measured = measure(blast, self.targets, partial(self.progress, label))
         self.notes += [f"{label}: {note}" for note in measured.notes]
         self.digests.append((label, measured.result.digest))
+        if cells == self.options.cells[0]:
+            self._evaluator.keep(layout, Threat(threat.charge, 0), measured.result.loads())
         return measured
 
     def _pairs(
@@ -473,9 +504,8 @@ class Runs:
     def item_worths(self) -> tuple[ItemWorth, ...]:
         """Return what every module or piece is worth: the impulse where it alone is left out."""
         pieces = standing(self.layout)
-        fewer = [tuple(each for each in self.layout if each != piece) for piece in pieces]
         charges = [each.charge for each in self.threats]
-        impulses = self._loads(_ITEMS, ((), self.layout, *fewer), charges)
+        impulses = self._loads(_ITEMS, ((), self.layout, *_fewer(self.layout)), charges)
         bare, whole, without = impulses[0], impulses[1], impulses[2:]
         worths = ((without - whole) / bare).mean(axis=1)
         items = [

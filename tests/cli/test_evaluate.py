@@ -1,6 +1,7 @@
 """`blast-env evaluate`, run in this process."""
 
 import json
+import signal
 from pathlib import Path
 
 import pandas as pd
@@ -133,3 +134,29 @@ def test_an_interruption_leaves_nothing_half_written(
     assert result.exit_code == 130
     assert "interrupted" in result.stderr
     assert list(tmp_path.iterdir()) == [layout]
+
+
+def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
+    layout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    advance, runs = EventRun.advance, [0]
+
+    def terminated(self: EventRun, until_s: float) -> None:
+        runs[0] += 1
+        if runs[0] == 4:
+            signal.raise_signal(signal.SIGTERM)
+        advance(self, until_s)
+
+    options = ("--layout", layout, "--seeds", "2", "--out", tmp_path / "out")
+    cache = tmp_path / "cache"
+    monkeypatch.setattr(EventRun, "advance", terminated)
+    result = evaluate(*options, "--cache", cache)
+    assert result.exit_code == 128 + signal.SIGTERM
+    assert f"goes on with the blasts that are kept in {cache}" in " ".join(result.stderr.split())
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert not (tmp_path / "out").exists()
+    before = runs[0]
+    assert evaluate(*options, "--cache", cache).exit_code == 0
+    again = runs[0] - before
+    evaluate(*options)
+    assert again < runs[0] - before - again

@@ -1,8 +1,10 @@
 """Whole reports: what they say is what the blasts gave."""
 
 import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pypdfium2
@@ -11,8 +13,9 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
-from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.evaluation.consequences import Consequences
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Layout, Measure, layout_text
@@ -384,12 +387,37 @@ def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
 
 
 @pytest.mark.usefixtures("_without_pictures")
-def test_the_blasts_that_are_counted_before_are_those_that_are_run(study: Study) -> None:
-    """Each part that is told of is one that was counted."""
+@pytest.mark.parametrize("items", [False, True])
+def test_the_blasts_that_are_counted_before_are_those_that_are_run(
+    study: Study, items: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each part that is told of is one that was counted; the threats' own blasts run once."""
     told: list[str] = []
-    options = replace(study.options, front=None, items=False, stills=0)
+    charges: list[Any] = []
+    run = GasBlast.run
+
+    def counted_run(self: GasBlast, *arguments: Any) -> GasResult:
+        charges.append(self.threat)
+        return run(self, *arguments)
+
+    monkeypatch.setattr(GasBlast, "run", counted_run)
+    options = replace(study.options, front=None, items=items, stills=0, cache=tmp_path)
     run_study(small_hut(), LAYOUT, options, lambda label, _: told.append(label))
     parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
-    counted = {label for label, blasts, _ in parts if blasts}
-    assert set(told) == counted - {"other places"}  # the one place is the threat's, and known
-    assert sum(blasts for _, blasts, _ in parts) == 4 + 4 + 2
+    assert set(told) == {each.label for each in parts if each.charges}
+    assert Counter(charges) == Counter(charge for each in parts for charge in each.charges)
+    assert len(charges) == 4 + 4 + (len(LAYOUT) if items else 0)
+
+    threat = Threat(study.threats[0].charge, 0)
+    kept = BlastEvaluator(small_hut(), options.coarse, cache=tmp_path)
+    anew = BlastEvaluator(small_hut(), options.coarse)
+    for layout in ((), LAYOUT):
+        one, other = (
+            [
+                (each.impulse_pa_s, each.peak_pa)
+                for each in evaluator.loads(layout, threat).structures
+            ]
+            for evaluator in (kept, anew)
+        )
+        assert one == other
+    assert kept.blasts == 0

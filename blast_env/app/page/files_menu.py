@@ -7,7 +7,6 @@ from typing import Final
 import tomli_w
 from nicegui import events, ui
 
-from blast_env.app.cost import cost_words
 from blast_env.app.design import SLOTS
 from blast_env.app.page.uploads import complain, file_upload, read_upload, site_upload
 from blast_env.app.session import Session
@@ -177,7 +176,7 @@ class ReportDialog:
         )
 
     def _say_cost(self) -> None:
-        self._cost.text = cost_words(self._session.cost_of_report(self._choice).blasts)
+        self._cost.text = self._session.cost_of_report(self._choice).words
 
     def _begin(self) -> None:
         session = self._session

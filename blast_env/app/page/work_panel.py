@@ -323,7 +323,8 @@ class WorkPanel:
         session = self._session
         self._there = session.folder.blasts_there()
         self._cost.visible = not session.engine.is_first_look
-        self._cost.text = cost_words(session.cost([session.design.active]), with_films=True)
+        costs = session.cost([session.design.active])
+        self._cost.text = cost_words(costs, drawn=len(costs))
 
     def _say_cost_of_search(self) -> None:
         costs = []
