@@ -239,6 +239,7 @@ def _gas(
     keep_histories(result, folder)
     pictures = tuple(_pictures(result, scale, folder))
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
+    notes += [f"{each.building}: {each.words}" for each in result.unjudged]
     notes += [*result.stepped_notes, *result.gauge_notes]
     return {
         "loads": _gas_loads(result),

@@ -484,6 +484,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
         texts = [f"outside what was checked (~): {note}" for note in notes]
         texts += result.stepped_notes
+        texts += (f"{each.building}: {each.words}" for each in result.unjudged)
         self.print_end(result, f"{cells} cells", "steps", texts)
 
 

@@ -4,7 +4,7 @@ A bay's history is the mean overpressure on the faces of cells in it, step by st
 before them, as in a wall between two parts of a building, have none and are left out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -17,6 +17,7 @@ from blast_env.engines.gas_tables import TAIL_COLUMNS
 from blast_env.engines.oblique_walls import ObliqueLoads
 from blast_env.errors import UnknownNameError
 from blast_env.physics.gas.settings import FACE_NAMES, is_complete, still_to_come
+from blast_env.physics.scene import StructureOutline
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
 from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
 from blast_env.response.glass import GlazingCondition
@@ -192,6 +193,64 @@ class BayLoads:
             complete = bool(is_complete(impulse_pa_s, to_come_pa_s))
             tails[filled.bay.name] = BayTail(to_come_pa_s, complete)
         return tails
+
+
+class UnjudgedWalls(NamedTuple):
+    """Walls that count, of a building with a facade, but stand in no bay: no verdict covers them.
+
+    Attributes:
+        building: Its name; structures that are parts of one building are one.
+        area_m2: Their area that touches air, m2.
+        of_m2: That of all its walls that count, m2.
+        structures: The parts that they belong to.
+    """
+
+    building: str
+    area_m2: float
+    of_m2: float
+    structures: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """How much it is, of which parts."""
+        parts = ", ".join(self.structures)
+        return (
+            f"{self.area_m2:.1f} of {self.of_m2:.1f} m2 of its walls stand in no bay ({parts}): "
+            "no verdict covers them"
+        )
+
+
+def unjudged_walls(
+    table: "FaceTable",
+    outlines: Sequence[StructureOutline],
+    buildings: Mapping[str, str],
+    bays: Sequence[FilledBay],
+    area_m2: FloatArray,
+) -> tuple[UnjudgedWalls, ...]:
+    """Return what no verdict covers of buildings with a facade, one each, where there is any.
+
+    Args:
+        table: The faces of cells.
+        outlines: The structures of the run; each says which of its walls count.
+        buildings: The building of each structure of the scenario.
+        bays: The bays of the scenario.
+        area_m2: Area of each face along the normal of its wall, m2 (faces,).
+    """
+    structures = [each.name for each in outlines]
+    left_out, counts = bay_patches(table, structures, bays) < 0, np.zeros(len(table.face), bool)
+    for index, each in enumerate(outlines):
+        walls = [FACE_NAMES.index(name) for name in each.faces]
+        counts |= (table.structure == index) & np.isin(table.face, walls)
+    found = []
+    for building in dict.fromkeys(buildings[each.bay.structure] for each in bays):
+        parts = [i for i, name in enumerate(structures) if buildings.get(name) == building]
+        own = counts & np.isin(table.structure, parts)
+        without = own & left_out
+        if without.any():
+            names = tuple(structures[i] for i in np.unique(table.structure[without]).tolist())
+            left_m2, of_m2 = float(area_m2[without].sum()), float(area_m2[own].sum())
+            found.append(UnjudgedWalls(building, left_m2, of_m2, names))
+    return tuple(found)
 
 
 def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
-from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayLoads
+from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayLoads, UnjudgedWalls, unjudged_walls
 from blast_env.engines.contract import BlastLoads, Engine, EngineOption, StructureLoad
 from blast_env.engines.gas_tables import (
     BUILDING_COLUMNS,
@@ -322,6 +322,19 @@ class GasResult:
         if self.bay_loads is None:
             return table_of([], LOADED_BAY_COLUMNS)
         return self.bay_loads.table(self.run)
+
+    @cached_property
+    def unjudged(self) -> tuple[UnjudgedWalls, ...]:
+        """Walls of buildings with a facade that stand in no bay, one a building."""
+        scenario, table = self.blast.scenario, self.run.table
+        share = np.ones(len(table.face)) if self.oblique is None else self.oblique.share
+        return unjudged_walls(
+            table,
+            self.run.site.structures,
+            scenario.building_names,
+            scenario.bays_with(self.blast.layout),
+            share * self.run.grid.cell_m**2,
+        )
 
     def bay_history(self, name: str) -> "pd.DataFrame":
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.

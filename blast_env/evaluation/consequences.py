@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayTail, bay_rows
+from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayTail, UnjudgedWalls, bay_rows
 from blast_env.engines.contract import Engine
 from blast_env.engines.gas_tables import means_by_wall
 from blast_env.engines.pieces import PIECE_COLUMNS
@@ -141,12 +141,14 @@ class Consequences:
         barriers: One a charge.
         unchecked: A building and why the loads on it are to be distrusted, one a building and
             charge for which that is so.
+        unjudged: Walls of buildings with a facade that no verdict covers.
     """
 
     responses: tuple[BuildingResponse, ...]
     neighbours: tuple[Neighbour, ...] = ()
     barriers: tuple[BarrierResponse, ...] = ()
     unchecked: tuple[tuple[str, str], ...] = ()
+    unjudged: tuple[UnjudgedWalls, ...] = ()
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
@@ -157,6 +159,7 @@ class Consequences:
             tuple(each for part in every for each in part.neighbours),
             tuple(each for part in every for each in part.barriers),
             tuple(each for part in every for each in part.unchecked),
+            tuple(dict.fromkeys(each for part in every for each in part.unjudged)),
         )
 
     @property
@@ -166,9 +169,10 @@ class Consequences:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What there is to say of the loads: oblique walls, and bays that are not complete."""
+        """What there is to say of a verdict: walls that it does not cover, and of its loads."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
-        notes = [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
+        notes = [f"{each.building}: {each.words}" for each in self.unjudged]
+        notes += [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
         reasons: dict[str, list[str]] = {}
         for building, reason in self.unchecked:
             reasons.setdefault(building, []).append(reason)
@@ -191,9 +195,10 @@ class Consequences:
 
     @property
     def is_flagged(self) -> bool:
-        """Whether there is a note on the loads of a building with a facade."""
+        """Whether a building with a facade has a note: on its loads, or on walls without a bay."""
         return (
             any(building in self.buildings for building, _ in self.unchecked)
+            or bool(self.unjudged)
             or any(each.stepped for each in self.responses)
             or not all(each.complete for each in self._tails)
         )
@@ -397,6 +402,7 @@ def consequences_of(
         tuple(neighbours_of(scenario, result, charge)),
         (BarrierResponse(charge, result.pieces, taken_away),),
         tuple(unchecked(scenario, result)),
+        result.unjudged,
     )
 
 
