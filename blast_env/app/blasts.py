@@ -239,13 +239,15 @@ def _gas(
     keep_histories(result, folder)
     pictures = tuple(_pictures(result, scale, folder))
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
-    notes += [f"{each.building}: {each.words}" for each in result.unjudged]
     notes += [*result.stepped_notes, *result.gauge_notes]
     return {
         "loads": _gas_loads(result),
         "buildings": tuple(_buildings(result)),
         "notes": tuple(dict.fromkeys(notes)),
-        "unchecked": tuple(unchecked(scenario, result)),
+        "unchecked": (
+            *unchecked(scenario, result),
+            *((each.building, each.words) for each in result.unjudged),
+        ),
         "pictures": pictures,
         "waves": tuple(_waves(result)),
     }

@@ -160,7 +160,8 @@ class BlastRecord(Kept):
         loads: All structures; the first one is of all protected ones together.
         buildings: Buildings of several structures, where their mean is known.
         notes: What there is to say about it.
-        unchecked: A building and why loads on it by gas are to be distrusted, one each.
+        unchecked: A building and why a verdict on it is to be distrusted, one each: loads by gas,
+            or walls that stand in no bay.
         pictures: Pictures beside the film.
         waves: Histories of the gauges.
         seconds: How long it took.
