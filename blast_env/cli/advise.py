@@ -114,7 +114,7 @@ class AdviseCommand(ChargeOptions):
             made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
             print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
         if self.picture is not None:
-            self._draw(self.picture, scenario, target, found, judged, judge)
+            self._draw(self.picture, scenario, target, found, judged, engine, judge)
 
     def _draw(
         self,
@@ -123,6 +123,7 @@ class AdviseCommand(ChargeOptions):
         target: LevelOfProtection,
         found: list[Advice],
         judged: dict[Layout, Consequences],
+        engine: Engine,
         judge: Engine,
     ) -> None:
         # Here, because pictures need the extra `render`.
@@ -132,13 +133,15 @@ class AdviseCommand(ChargeOptions):
         tried = {
             str(each.kind): [PricedDamage(x.cost, x.damage) for x in each.tried] for each in found
         }
-        points = [
-            PricedDamage(Placement(scenario, layout).cost, seen.worst_damage)
+        searched = {x.layout: PricedDamage(x.cost, x.damage) for each in found for x in each.tried}
+        pairs = [
+            (point, point._replace(damage=seen.worst_damage(scenario)))
             for layout, seen in judged.items()
+            for point in [searched[layout]]
         ]
         charges = len(next(iter(judged.values())).barriers)
         title = f"{scenario.name}: what each step up costs, the worst of {charges} charges"
-        figure = cost_level_figure(tried, points, target, title, judge.words)
+        figure = cost_level_figure(tried, pairs, target, title, (engine.words, judge.words))
         print_line(f"wrote {save_figure(figure, path)}")
 
     def _asked(self, scenario: Scenario) -> Scenario:

@@ -220,10 +220,17 @@ class Consequences:
         level, on_cells = self.level(building), self.level_on_cells(building)
         return level.label + (f" ({on_cells.label} on the cells)" if on_cells > level else "")
 
-    @property
-    def worst_damage(self) -> float:
-        """The worst damage of all components under every charge, from 0 to 5."""
-        return worst(each.facade.worst_number for each in self.responses)
+    def worst_damage(self, scenario: Scenario) -> float:
+        """Return the worst damage that the objective counts, of what is protected, from 0 to 5.
+
+        Args:
+            scenario: Says what is protected, and whether panes alone count.
+        """
+        names = {each.building_name for each in scenario.structures if each.protected}
+        own = [each.facade for each in self.responses if each.building in names]
+        if scenario.objective.measure == "glazing":
+            return worst(float(each.glazing.hazard.max(initial=0.0)) for each in own)
+        return worst(each.worst_number for each in own)
 
     def passes_on_cells(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level by the clipped peaks on the cells."""

@@ -44,24 +44,24 @@ def cheapest(points: Iterable[PricedDamage]) -> list[PricedDamage]:
 
 def cost_level_figure(
     tried: Mapping[str, Sequence[PricedDamage]],
-    judged: Sequence[PricedDamage],
+    judged: Sequence[tuple[PricedDamage, PricedDamage]],
     target: LevelOfProtection,
     title: str,
-    judge_words: str,
+    words: tuple[str, str],
 ) -> Figure:
     """Return a picture of cost against level of protection.
 
     Args:
         tried: What was looked at, by the kind of measures.
-        judged: What finer cells say of the best of each kind.
+        judged: The best of each kind, by the search and by finer cells.
         target: The level that is wanted.
         title: Above the picture.
-        judge_words: What judged: `cells of 0.25 m`.
+        words: What searched and what judged: `gas, cells of 0.5 m`.
     """
     figure = Figure(figsize=(8.6, 5.6), layout="constrained")
     axes = figure.subplots()
     every = [point for points in tried.values() for point in points]
-    most = max((point.cost for point in (*every, *judged)), default=0.0) or 1.0
+    most = max((point.cost for point in every), default=0.0) or 1.0
     _draw_levels(axes, target, most)
     front = cheapest(every)
     ends = [*front, PricedDamage(most, front[-1].damage)]
@@ -72,16 +72,18 @@ def cost_level_figure(
     for (kind, points), (colour, marker) in zip(tried.items(), _KINDS, strict=False):
         places = zip(*points, strict=True)
         handles += axes.plot(*places, marker, color=colour, markersize=5.0, label=kind, zorder=3)
+    for pair in judged:
+        axes.plot(*zip(*pair, strict=True), color="black", linestyle=":", linewidth=1.0, zorder=2)
     handles += axes.plot(
-        *zip(*judged, strict=True),
+        *zip(*(ring for _, ring in judged), strict=True),
         "o",
         color="black",
         markerfacecolor="none",
         markersize=12.0,
-        label=f"the best of a kind, judged: {judge_words}",
+        label=f"the same layouts, judged: {words[1]}",
         zorder=4,
     )
-    axes.set_title(title, fontsize=11)
+    axes.set_title(f"{title}\npoints: {words[0]}; peaks that cells do not clip", fontsize=11)
     axes.set_xlabel("cost, in the unit of the zone's budget")
     axes.set_ylabel("worst damage of all components and charges (0 to 5)")
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)

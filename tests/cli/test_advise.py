@@ -1,6 +1,7 @@
 """`blast-env advise`: the verdict first, each kind of measure, and blasts for barriers alone."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from blast_agents.search import LayoutProblem
@@ -13,6 +14,7 @@ from blast_agents.search.advice import (
     kinds_for,
     only,
 )
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import blast_env
@@ -94,6 +96,28 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     ):
         done = CliRunner().invoke(app, [command, *map(str, words)])
         assert done.exit_code == 0, done.output
+
+
+def test_rings_are_the_points_of_their_layouts_where_both_have_the_same_cells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of panes alone, too: a wall panel that is worse does not count there."""
+    shown = []
+
+    def keep(*arguments: Any) -> Figure:
+        shown.append(arguments[1])
+        return Figure()
+
+    monkeypatch.setattr("blast_env.rendering.cost_level.cost_level_figure", keep)
+    for measure in ("damage", "glazing"):
+        site = tmp_path / f"{measure}.toml"
+        blast_env.save_scenario(glazed_yard(charges="mean", measure=measure), site)
+        options = ("--tnt-kg", "1", "--budget", "3", "--judge-cell", "0.5", "--rounds", "1")
+        run(site, *options, "--target", "low", "--picture", tmp_path / "cost.png")
+        assert shown[-1]
+        for point, ring in shown[-1]:
+            assert ring == pytest.approx(point, rel=1e-6)
+    assert shown[0] != shown[1]
 
 
 def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
