@@ -3,13 +3,17 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from blast_env.files import write_atomically
-from blast_env.values import path_of
+from blast_env.values import is_plain_number, path_of
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
+
+
+_FORMULA_MARKS: Final = ("=", "+", "-", "@", "\t", "\r")
+"""First characters of texts that spreadsheets take for formulas when they open a CSV file."""
 
 
 class Column(NamedTuple):
@@ -83,8 +87,17 @@ def markdown_table(
     return "\n".join([text[0], rule, *text[1:]])
 
 
+def cell_text(value: Any) -> Any:
+    """Return the value of a cell of a CSV file; a text that a spreadsheet would calculate gets a '.
+
+    Numbers stay as they are, as texts too.
+    """
+    is_formula = isinstance(value, str) and value.startswith(_FORMULA_MARKS)
+    return f"'{value}" if is_formula and not is_plain_number(value) else value
+
+
 def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None = None) -> Path:
-    """Write a table without its index as CSV, complete or not at all.
+    """Write a table without its index as CSV, complete or not at all; see `cell_text`.
 
     Args:
         table: The table.
@@ -97,6 +110,8 @@ def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None 
     Raises:
         BlastEnvError: If it cannot be written there.
     """
+    texts = table.select_dtypes(exclude=["number", "bool"])
+    safe = table.assign(**{str(name): texts[name].map(cell_text) for name in texts})
     with write_atomically(path) as temporary:
-        table.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
+        safe.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
     return path_of(path)

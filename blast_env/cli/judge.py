@@ -1,7 +1,6 @@
 """`blast-env judge`: submissions to the benchmark, played again by gas dynamics."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -35,7 +34,9 @@ from blast_env.problems import (
     standings_tables,
     stored_references,
 )
+from blast_env.problems.judging import FORMAT as JUDGED
 from blast_env.problems.references import cell_key
+from blast_env.problems.submissions import read_runs
 
 _OWN_SITES: Final = 8
 
@@ -185,7 +186,11 @@ def _file_name(method: str) -> str:
 
 def _submission(path: Path) -> Submission:
     """Read a submission, or one that was judged before."""
-    with suppress(BlastEnvError):
+    try:
+        content = read_runs(path)
+    except BlastEnvError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
+    if isinstance(content, dict) and content.get("format") == JUDGED:
         return JudgedSubmission.load(path).submission
     return Submission.load(path)
 

@@ -10,16 +10,15 @@ from typing import Annotated, ClassVar, Final, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from blast_env.documents import checked_as, parse_json, read_text
+from blast_env.documents import checked_as, parse_json
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastCache, BlastEvaluator
 from blast_env.problems.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.problems.problem import shares_of
 from blast_env.problems.references import ScoreReference, Share, cell_key, stored_references
-from blast_env.problems.submissions import MOST_BYTES, Run, Submission, write_runs
+from blast_env.problems.submissions import MOST_RUNS, Run, Submission, read_runs, write_runs
 from blast_env.statistics import Estimate, stratified_estimate
-from blast_env.values import path_of
 
 JUDGE_CELL_M: Final = 0.25
 """Side of the cells that the judge uses."""
@@ -71,7 +70,7 @@ class JudgedSubmission:
     method: str
     cell_m: Annotated[float, Field(gt=0.0)]
     engine: str
-    runs: Annotated[tuple[JudgedRun, ...], Field(min_length=1)]
+    runs: Annotated[tuple[JudgedRun, ...], Field(min_length=1, max_length=MOST_RUNS)]
     note: str = ""
     format: Literal["blast-env judged 1"] = FORMAT
 
@@ -83,7 +82,7 @@ class JudgedSubmission:
             BlastEnvError: If it cannot be read or is anything else.
         """
         try:
-            return checked_as(cls, parse_json(read_text(path_of(path), MOST_BYTES)))
+            return checked_as(cls, read_runs(path))
         except BlastEnvError as error:
             raise BlastEnvError(f"{path}: {error}") from error
 

@@ -22,6 +22,7 @@ from blast_env.problems.definitions import BUDGETS, SEEDS, Definition, find_defi
 from blast_env.problems.references import ScoreReference, stored_references
 from blast_env.problems.space import LayoutSpace
 from blast_env.scenario import Scenario, check_layout
+from blast_env.values import whole_number
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class BenchmarkProblem:
         history: Every layout that was evaluated, in order.
 
     Raises:
-        BlastEnvError: If the budget is negative.
+        BlastEnvError: If the budget is no count of blasts, or more than the largest of `BUDGETS`.
     """
 
     definition: Definition
@@ -65,8 +66,7 @@ class BenchmarkProblem:
     history: list[Evaluated] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        if self.budget < 0:
-            raise BlastEnvError(f"budget is {self.budget} blasts, must be at least 0")
+        whole_number("budget", self.budget, 0, BUDGETS[-1])
         self.meter = BlastMeter(self.budget)
 
     @property

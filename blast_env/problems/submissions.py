@@ -13,19 +13,25 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.journal import Journal
-from blast_env.problems.definitions import DEFINITIONS, Definition
+from blast_env.problems.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.problems.problem import BenchmarkProblem
 from blast_env.scenario import check_layout
-from blast_env.values import path_of
+from blast_env.values import MOST_SEED, path_of
 
 FORMAT: Final = "blast-env submission 1"
-MOST_BYTES: Final = 50_000_000
-"""Most that a file may have: some ten thousand runs."""
+MOST_BYTES: Final = 20_000_000
+"""Most that a file may have."""
+
+MOST_RUNS: Final = 10_000
+"""Most runs of a file: each problem with each budget and sixty seeds."""
+
+MOST_BLASTS: Final = BUDGETS[-1]
+"""The largest budget; larger ones count for no score."""
 
 Method = Callable[[BenchmarkProblem, int], Layout]
 """Finds a layout for a problem within its budget; the number is the seed of what it draws."""
 
-Count = Annotated[int, Field(ge=0)]
+Blasts = Annotated[int, Field(ge=0, le=MOST_BLASTS)]
 
 
 @dataclass(frozen=True)
@@ -43,9 +49,9 @@ class Run:
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
     problem: str
-    budget: Count
-    seed: Count
-    blasts: Count
+    budget: Blasts
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED)]
+    blasts: Blasts
     layout: Layout
 
     @property
@@ -68,7 +74,7 @@ class Submission:
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
     method: Annotated[str, Field(min_length=1, max_length=60)]
-    runs: Annotated[tuple[Run, ...], Field(min_length=1)]
+    runs: Annotated[tuple[Run, ...], Field(min_length=1, max_length=MOST_RUNS)]
     note: Annotated[str, Field(max_length=500)] = ""
     format: Literal["blast-env submission 1"] = FORMAT
 
@@ -82,7 +88,7 @@ class Submission:
             BlastEnvError: If it cannot be read or is anything else, or as `check`.
         """
         try:
-            found = checked_as(cls, parse_json(read_text(path_of(path), MOST_BYTES)))
+            found = checked_as(cls, read_runs(path))
             found.check(definitions)
         except BlastEnvError as error:
             raise BlastEnvError(f"{path}: {error}") from error
@@ -103,7 +109,7 @@ class Submission:
             BlastEnvError: If there is no such problem, a run is there twice or spent more than its
                 budget, or a layout is not legal; the message names run and reason.
         """
-        seen = set()
+        seen, legal = set(), set()
         for index, run in enumerate(self.runs):
             where = f"runs[{index}]"
             if run.problem not in definitions:
@@ -117,10 +123,26 @@ class Submission:
                     f"{where}: {run.blasts} blasts were spent, the budget is {run.budget}"
                 )
             seen.add(run.key)
+            if (run.problem, run.layout) in legal:
+                continue
             try:
                 check_layout(definitions[run.problem].scenario, run.layout)
             except BlastEnvError as error:
                 raise BlastEnvError(f"{where}: {run.problem}: {error}") from error
+            legal.add((run.problem, run.layout))
+
+
+def read_runs(path: str | Path) -> Any:
+    """Return the content of a file of runs, before it is checked.
+
+    Raises:
+        BlastEnvError: If it cannot be read, is no JSON, or has more than `MOST_RUNS` runs.
+    """
+    content = parse_json(read_text(path_of(path), MOST_BYTES))
+    runs = content.get("runs") if isinstance(content, dict) else None
+    if isinstance(runs, list) and len(runs) > MOST_RUNS:
+        raise BlastEnvError(f"has {len(runs):,} runs, must have at most {MOST_RUNS:,}")
+    return content
 
 
 def write_runs(path: str | Path, record: Any) -> Path:

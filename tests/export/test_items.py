@@ -1,6 +1,7 @@
 """Layouts of pieces for other programs: names, heights and costs, read back by their readers."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -130,3 +131,13 @@ def test_what_is_written_has_no_stray_files(tmp_path: Path, suffix: str) -> None
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
     if suffix == ".json":
         assert load_layout(path, yard()) == WALL
+
+
+def test_a_description_that_looks_like_a_formula_is_a_text_in_the_bill(tmp_path: Path) -> None:
+    document = yard().model_dump(mode="json", exclude_none=True)
+    for item in document["build_zone"]["items"]:
+        item["description"] = "=HYPERLINK(1)"
+    site = Scenario.from_document(document, "yard")
+    bill = export_layout(plan(site), tmp_path / "yard.bill.csv")
+    assert "'=HYPERLINK(1)" in bill.read_text()
+    assert not re.search(r'(^|[,"])=', bill.read_text(), re.MULTILINE)

@@ -1,5 +1,6 @@
 """Scores between best rule and best known; what was submitted is played again."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from blast_env.problems import (
     ScoreReference,
     Submission,
     judge,
+    make,
     shipped_standings,
     standings_page,
     standings_tables,
@@ -196,3 +198,44 @@ def test_after_ctrl_c_it_is_said_what_goes_on(tmp_path: Path) -> None:
 def never_asked(problem: BenchmarkProblem, seed: int) -> Layout:
     """Fail where a method runs that should not."""
     raise AssertionError(f"{problem.name}, {seed}")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("budget", 10**18, "less than or equal to 1000"),
+        ("budget", True, "valid integer"),
+        ("budget", 1.0, "valid integer"),
+        ("seed", 2**63, "less than or equal to"),
+        ("blasts", "1", "valid integer"),
+        ("layout", [["16", 0, "low_wall", True]], "valid integer"),
+        ("layout", [[16.0, 0, "low_wall", True]], "valid integer"),
+        ("layout", [[16, 0, "low_wall", 1]], "valid boolean"),
+    ],
+)
+def test_values_of_a_submission_are_not_converted(
+    tmp_path: Path, key: str, value: object, words: str
+) -> None:
+    path = Submission("own", (run(16, 50),)).save(tmp_path / "own.json")
+    assert _submission(path) == Submission("own", (run(16, 50),))
+    content = json.loads(path.read_text())
+    content["runs"][0][key] = value
+    path.write_text(json.dumps(content))
+    with pytest.raises(BlastEnvError) as caught:
+        _submission(path)
+    assert f"runs[0].{key}" in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_so_many_runs_and_no_more_before_any_is_looked_at(tmp_path: Path) -> None:
+    path = tmp_path / "many.json"
+    path.write_text(json.dumps({"runs": [0] * 10_001}))
+    with pytest.raises(
+        BlastEnvError, match=r"many\.json: has 10,001 runs, must have at most 10,000"
+    ):
+        _submission(path)
+
+
+def test_a_problem_has_no_budget_that_counts_for_no_score() -> None:
+    with pytest.raises(BlastEnvError, match="budget is 1001, must be an integer from 0 to 1000"):
+        make(NAME, 1001, engine=RowEngine())

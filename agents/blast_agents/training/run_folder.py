@@ -35,6 +35,7 @@ from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
 from blast_env.provenance import versions
 from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.tables import cell_text
 
 CONFIGURATION_FORMAT: Final = 1
 THREATS: Final = ("visible", "hidden")
@@ -279,7 +280,8 @@ def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
     ):
         writer = csv.DictWriter(file, [field.name for field in fields(kind)])
         writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
+        for row in rows:
+            writer.writerow({name: cell_text(value) for name, value in asdict(row).items()})
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
