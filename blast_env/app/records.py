@@ -138,6 +138,8 @@ class Verdict(Kept):
         broken: Panes that are expected to break.
         condition: Performance condition of its worst pane, GSA.
         damage: Damage of its worst wall panel; empty where it has none.
+        total_damage: Damage of all its components, added up.
+        impulse_pa_s: Mean impulse on its bays.
     """
 
     building: str
@@ -147,6 +149,8 @@ class Verdict(Kept):
     broken: float
     condition: str
     damage: str
+    total_damage: float
+    impulse_pa_s: float
 
 
 class BlastRecord(Kept):

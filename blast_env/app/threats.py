@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from blast_env.app.records import Kept
+from blast_env.evaluation.governing import Severity, governing
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,
@@ -28,9 +29,8 @@ class NamedThreat(Kept):
 def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
     """Return the charges that a site is held against.
 
-    Of a line its middle and its ends, of an area its middle and its corners; the middle comes
-    first, since most blasts are run there. Of a vehicle its worst place, wherever the layout lets
-    it come, and the next ones.
+    Of a line its middle and its ends, of an area its middle and its corners. Of a vehicle its worst
+    place, wherever the layout lets it come, and the next ones.
     """
     named: list[NamedThreat] = []
     for index, source in enumerate(scenario.charge):
@@ -70,9 +70,17 @@ def _of_vehicle(name: str, source: VehicleSource) -> Iterator[NamedThreat]:
 
 
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of the threats that a blast is run with unless others are chosen."""
-    return tuple(each.name for each in threats_of(scenario) if _is_first(each.name))
+    """Return the names of the threats that a blast is run with unless others are chosen.
 
+    Of each source the place that governs by its load in the open; a vehicle's as near as it comes.
+    """
+    sources: dict[str, list[NamedThreat]] = {}
+    for threat in threats_of(scenario):
+        sources.setdefault(threat.name.partition(",")[0], []).append(threat)
 
-def _is_first(name: str) -> bool:
-    return name.endswith((", middle", _NEAREST)) or "," not in name
+    def severity(threat: NamedThreat) -> Severity:
+        if isinstance(threat.charge, VehicleCharge):
+            return Severity(load=-threat.charge.rank)
+        return Severity.in_the_open(scenario, threat.charge)
+
+    return tuple(governing(own, severity).name for own in sources.values())

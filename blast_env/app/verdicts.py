@@ -16,6 +16,7 @@ import numpy as np
 from blast_env.app.records import BlastRecord, Verdict, VerdictRow
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.consequences import BuildingResponse, by_building
+from blast_env.evaluation.governing import Severity, governing
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
@@ -136,6 +137,8 @@ def _verdict(building: BuildingResponse) -> Verdict:
         broken=facade.broken_panes,
         condition=facade.worst_condition.label,
         damage=facade.worst_damage.name.lower() if len(facade.walled) else "",
+        total_damage=building.severity.damage,
+        impulse_pa_s=building.severity.load,
     )
 
 
@@ -155,14 +158,14 @@ def verdict_rows(
             found.setdefault(key, []).append((record.threat, verdict, flags))
     for (name, _), own in found.items():
         if len(own) > 1:
-            worst = max((each for _, each, _ in own), key=_badness)
+            worst = governing((each for _, each, _ in own), _severity)
             flags = tuple(dict.fromkeys(flag for *_, each in own for flag in each))
             yield _verdict_row(name, f"worst of {len(own)}", worst, flags)
         yield from (_verdict_row(name, *each) for each in own)
 
 
-def _badness(verdict: Verdict) -> tuple[int, int, float]:
-    return -verdict.level, -verdict.level_on_cells, verdict.broken
+def _severity(verdict: Verdict) -> Severity:
+    return Severity(4 - verdict.level, verdict.total_damage, verdict.impulse_pa_s)
 
 
 def _verdict_row(layout: str, threat: str, verdict: Verdict, flags: tuple[str, ...]) -> VerdictRow:

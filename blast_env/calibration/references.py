@@ -34,6 +34,9 @@ Quantity = Literal[
 Burst = Literal["hemispherical", "spherical"]
 """Hemispherical: the charge lies on rigid ground. Spherical: far from any surface."""
 
+CURVES_SCALED_M: Final = (0.0674, 40.0)
+"""Scaled distances, m/kg^(1/3), at which the curves of both bursts have peaks and impulses."""
+
 SURFACE_BURST_SCALED_M: Final = 0.4
 """Scaled height of a charge, m/kg^(1/3), below which `burst_of` counts it as on the ground."""
 
@@ -216,15 +219,14 @@ def largest_reflected_peak_pa(distance_m: FloatArray, charge_kg: float) -> Float
     """Return the peak on a wall at right angles in the open, by the burst that makes most of it.
 
     That is the hemispherical one. Beyond the range of the curve its end holds, which is too much
-    far away, and nearer than 0.06 m/kg^(1/3) too little.
+    far away, and nearer too little; see `CURVES_SCALED_M`.
 
     Args:
         distance_m: Distances from the charge, above 0.
         charge_kg: TNT-equivalent mass, above 0.
     """
-    low, high = _curves()["hemispherical", "reflected_overpressure"].range
-    scale = float(np.cbrt(charge_kg))
-    distance_m = np.clip(distance_m, low * scale, high * scale)
+    low_m, high_m = (scaled * np.cbrt(charge_kg) for scaled in CURVES_SCALED_M)
+    distance_m = np.clip(distance_m, low_m, high_m)
     return kingery_bulmash("reflected_overpressure", distance_m, charge_kg)
 
 

@@ -38,6 +38,7 @@ from blast_env.evaluation.consequences import (
     piece_table,
     verdict_word,
 )
+from blast_env.evaluation.governing import governing
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
@@ -242,12 +243,10 @@ class AssessCommand(ChargeOptions):
 
 
 def _worst_rows(found: dict[str, Consequences]) -> list[tuple[str, BuildingResponse]]:
-    """Return the worst building under its worst charge, a layout each."""
-    first = next(iter(found.values()))
-    building = min(first.buildings, key=first.level)
-    bare = first.of(building)
-    worst = max(range(len(bare)), key=lambda k: bare[k].facade.broken_panes)
-    return [(name, each.of(building)[worst]) for name, each in found.items()]
+    """Return the building and the charge that govern the verdict, a layout each."""
+    judged = list(found.values())[-1]
+    number = judged.responses.index(governing(judged.responses, lambda each: each.severity))
+    return [(name, each.responses[number]) for name, each in found.items()]
 
 
 def _charge_text(charge: Charge) -> str:

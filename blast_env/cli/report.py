@@ -45,7 +45,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         "A threat, site metres and kg TNT; more than one will do.",
         flag="--charge",
         metavar="X,Y,KG",
-        show_default="of each charge source the place nearest to what is protected",
+        show_default="of each charge source the worst of its places with the layout",
     )
     most_threats: int = option(2, "How many of those, 1 to 6.", flag="--threats")
     cells: tuple[str, str] = option(

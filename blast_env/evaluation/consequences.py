@@ -31,6 +31,7 @@ from blast_env.engines.contract import Engine
 from blast_env.engines.gas_tables import means_by_wall
 from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.governing import Severity, governing
 from blast_env.geometry import Element, Layout
 from blast_env.physics.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.physics.scene import WALLS, Charge
@@ -90,6 +91,18 @@ class BuildingResponse:
             return found
         histories = sharpened(found.time_s, found.pressure_pa, self.peak_factor)
         return found.or_worse(respond(found.bays, *histories))
+
+    @cached_property
+    def severity(self) -> Severity:
+        """How bad it is; its load is the mean of the positive impulses on its bays, Pa s."""
+        facade = self.facade
+        impulses_pa_s = np.trapezoid(np.maximum(facade.pressure_pa, 0.0), facade.time_s, axis=1)
+        areas_m2 = [each.bay.area_m2 for each in facade.bays]
+        return Severity(
+            4 - facade.level_of_protection,
+            facade.total_damage,
+            float(np.average(impulses_pa_s, weights=areas_m2)),
+        )
 
 
 _AMBIENT_PA: Final = 101_325.0
@@ -248,18 +261,16 @@ class Consequences:
     @property
     def worst_neighbours(self) -> tuple[Neighbour, ...]:
         """Every building without a facade, under the charge that would do most to a house there."""
-        found: dict[str, Neighbour] = {}
+        found: dict[str, list[Neighbour]] = {}
         for each in self.neighbours:
-            worst = found.setdefault(each.building, each)
-            if each.probability[BuildingDamage.MAJOR] > worst.probability[BuildingDamage.MAJOR]:
-                found[each.building] = each
-        return tuple(found.values())
+            found.setdefault(each.building, []).append(each)
+        return tuple(governing(own, _severity_of_neighbour) for own in found.values())
 
     @property
     def worst_barrier(self) -> BarrierResponse | None:
         """The barrier under the charge that tilts a piece most; `None` where no piece stands."""
         standing = [each for each in self.barriers if len(each.pieces)]
-        return max(standing, key=lambda each: float(each.pieces["tilt"].max()), default=None)
+        return governing(standing, _severity_of_barrier) if standing else None
 
     def passes(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level under every charge."""
@@ -292,6 +303,16 @@ class Consequences:
                 for each in self.responses
             ),
         )
+
+
+def _severity_of_neighbour(neighbour: Neighbour) -> Severity:
+    likely = neighbour.probability[BuildingDamage.MAJOR]
+    return Severity(damage=likely, load=neighbour.impulse_pa_s)
+
+
+def _severity_of_barrier(barrier: BarrierResponse) -> Severity:
+    tilt = barrier.pieces["tilt"]
+    return Severity(damage=float(tilt.max()), load=float(tilt.sum()))
 
 
 def other_glazing(scenario: Scenario) -> dict[str, Glazing]:

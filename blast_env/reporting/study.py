@@ -13,8 +13,9 @@ from blast_env.arrays import FloatArray
 from blast_env.documents import parse_csv, read_text
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.consequences import Consequences, consequences_of
+from blast_env.evaluation.governing import Severity
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Element, Layout, Piece, layout_text, standing
 from blast_env.physics.gas.settings import Cells
@@ -66,7 +67,7 @@ class StudyOptions:
     """What is to be looked at, and how finely.
 
     Attributes:
-        charges: The threats; without any, the worst place of each source.
+        charges: The threats; without any, of each source the worst of the places looked at.
         most_threats: How many of those at most, 1 to 6.
         cells: Sides of cells in m, two of them, the coarser one first: loads with both say what the
             grid does. The same twice is one size, and nothing is said of that. For large sites
@@ -227,6 +228,7 @@ def run_study(
 ) -> Study:
     """Run all blasts of a report.
 
+    Without threats that were named, charges at other places come first: the worst are the threats.
     Whoever stops it (`KeyboardInterrupt`) after the threats with the coarser cells gets a report on
     what is done by then.
 
@@ -246,12 +248,12 @@ def run_study(
         raise BlastEnvError("the layout is empty: there is nothing to report on")
     targets = targets_of(scenario)
     check_limits(options.limits, targets)
-    threats = threats_of(scenario, options)
-    for threat in threats:
+    asked = asked_threats(scenario, options.charges)
+    for threat in asked:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
     front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
-    runs = Runs(scenario, cells, options, targets, threats, progress)
+    runs = Runs(scenario, cells, options, targets, asked, progress)
     stills: tuple[Picture, ...] = ()
     masses: dict[str, tuple[Outcome, ...]] = {}
     left_out: tuple[str, ...] = ()
@@ -260,6 +262,8 @@ def run_study(
     points: tuple[FrontPoint, ...] = ()
     part = options.words[1]
     try:
+        if not asked:
+            runs.choose_threats()
         runs.run_threats()
         part = _FILM
         stills = runs.film() if options.stills else ()
@@ -281,7 +285,7 @@ def run_study(
         layout=cells,
         options=options,
         targets=targets,
-        threats=threats,
+        threats=runs.threats,
         bill=bill,
         cost=Placement.of(scenario, cells).cost,
         pairs=tuple(each for each in runs.pairs if each.cells in options.cells),
@@ -322,15 +326,19 @@ def blasts_of(
 ) -> tuple[PlannedPart, ...]:
     """Return the parts of a report in their order, with the blasts that are run for each."""
     coarse = options.cells[0]
-    parts = [
+    own = [threat.charge for threat in threats]
+    places = [each.charge for each in other_places(scenario, options.places)]
+    both = ((), layout)
+    first = [] if options.charges else places  # of which the threats are chosen
+    known = {(each, charge) for each in both for charge in (*first, *own)}
+    parts = [PlannedPart(_PLACES, coarse, tuple(first * len(both)))] if first else []
+    parts += [
         PlannedPart(_label(threat, words, size), size, (threat.charge,), is_drawn=True)
         for size in options.sizes
         for threat in threats
         for words in (_BARE, _WALLED)
     ]
-    own = [threat.charge for threat in threats]
     parts.append(PlannedPart(_FILM, coarse, (own[0],) * 2 if options.stills else ()))
-    known = {(each, charge) for each in ((), layout) for charge in own}
 
     def asked(label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]) -> None:
         pairs = dict.fromkeys((each, charge) for each in layouts for charge in charges)
@@ -341,10 +349,10 @@ def blasts_of(
     for each in threats:
         masses, _ = other_masses(scenario, each.charge, _MASSES)
         charges = [mass.charge for mass in masses]
-        asked(f"{each.name}, {_MASSES_PART}", ((), layout), charges)
+        asked(f"{each.name}, {_MASSES_PART}", both, charges)
     asked(_ITEMS, _fewer(layout) if options.items else (), own)
-    places = [each.charge for each in other_places(scenario, options.places)]
-    asked(_PLACES, ((), layout), places)
+    if options.charges:
+        asked(_PLACES, both, places)
     asked(_FRONT, front_layouts(options.front, scenario), own)
     return tuple(parts)
 
@@ -360,10 +368,14 @@ def _label(threat: NamedCharge, words: str, cells: Cells) -> str:
 
 
 def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[NamedCharge, ...]:
-    """Return the threats of a report: those that were asked for, or the worst places."""
+    """Return the threats of a report before any blast, for its cost.
+
+    Those that were asked for, or stand-ins: of each source a place that is looked at.
+    """
     if options.charges:
         return asked_threats(scenario, options.charges)
-    return chief_threats(scenario, options.most_threats)
+    places = other_places(scenario, options.places)
+    return chief_threats(places, lambda _: Severity(), options.most_threats)
 
 
 class Runs:
@@ -416,7 +428,7 @@ class Runs:
         done = [
             size
             for size in self.options.cells
-            if len(self.pictures.get(size, {})) == len(self.threats)
+            if self.threats and len(self.pictures.get(size, {})) == len(self.threats)
         ]
         if not done:
             raise KeyboardInterrupt
@@ -493,6 +505,18 @@ class Runs:
         places = other_places(self.scenario, self.options.places)
         return self._outcomes(_PLACES, places)
 
+    def choose_threats(self) -> None:
+        """Take the worst of those places with the layout, which is what the verdict is on."""
+        places = other_places(self.scenario, self.options.places)
+        charges = [each.charge for each in places]
+        loads = self._blasts(_PLACES, ((), self.layout), charges)[len(places) :]
+        objective = self.scenario.objective
+        found = dict(
+            zip(charges, (Severity.of_loads(each, objective) for each in loads), strict=True)
+        )
+        most = self.options.most_threats
+        self.threats = chief_threats(places, lambda each: found[each.charge], most)
+
     def _outcomes(self, label: str, charges: Sequence[NamedCharge]) -> tuple[Outcome, ...]:
         layouts: tuple[Layout, ...] = ((), self.layout)
         impulses = self._loads(label, layouts, [each.charge for each in charges])
@@ -536,11 +560,17 @@ class Runs:
         self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
     ) -> FloatArray:
         """Return the loads that count on what is protected (layouts, charges)."""
+        objective = self.scenario.objective
+        counted = [each.load(objective) for each in self._blasts(label, layouts, charges)]
+        return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
+
+    def _blasts(
+        self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
+    ) -> list[BlastLoads]:
+        """Return the loads of every layout under every charge; those that are known, at once."""
         pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]
         told = partial(self.progress, label)
-        loads = self._evaluator.loads_of_many(pairs, self.options.processes, told)
-        counted = [each.load(self.scenario.objective) for each in loads]
-        return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
+        return self._evaluator.loads_of_many(pairs, self.options.processes, told)
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,17 @@
 """The charges that a report looks at: the worst places, other places, other masses."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import cbrt, hypot
 from typing import Final
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.governing import Severity, governing
 from blast_env.geometry import Layout, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.scenario import (
     AnyCharge,
-    AnySource,
     PointSource,
     RectangleSource,
     Scenario,
@@ -35,11 +34,13 @@ class NamedCharge:
         name: `T1`, or what it stands for.
         charge: The charge, at its place or on its vehicle.
         why: Why it is there.
+        source: The charge source that it is of, -1 for none.
     """
 
     name: str
     charge: AnyCharge
     why: str
+    source: int = -1
 
     def against(self, scenario: Scenario, layout: Layout = ()) -> Charge:
         """Return the charge where it goes off: that of a vehicle depends on the layout."""
@@ -51,25 +52,24 @@ class NamedCharge:
         return walled if bare == walled else f"{bare} without the layout, {walled} with it"
 
 
-def chief_threats(scenario: Scenario, most: int) -> tuple[NamedCharge, ...]:
-    """Return the charges that can do most: of each source the place nearest to what is protected.
-
-    That of a vehicle comes as near as the layout lets it, whatever the layout is.
+def chief_threats(
+    places: Sequence[NamedCharge], severity: Callable[[NamedCharge], Severity], most: int
+) -> tuple[NamedCharge, ...]:
+    """Return the charges that do most: of each source the place that governs.
 
     Args:
-        scenario: The scenario.
-        most: How many at most; those of the smallest scaled distance without a barrier are taken.
+        places: The places that are looked at, see `other_places`.
+        severity: How bad a charge there is.
+        most: How many at most; the worst are taken.
     """
-    found: dict[AnyCharge, tuple[float, int]] = {}
-    for index, source in enumerate(scenario.charge):
-        charge = _worst(scenario, source)
-        place_m = charge_against(scenario, (), charge).position_m
-        away_m = hypot(_distance_m(scenario, place_m), charge.height_m)
-        found.setdefault(charge, (away_m / cbrt(charge.tnt_kg), index))
-    ranked = sorted(found.items(), key=lambda item: item[1])[:most]
+    sources: dict[int, list[NamedCharge]] = {}
+    for each in places:
+        sources.setdefault(each.source, []).append(each)
+    worst = [governing(own, severity) for own in sources.values()]
+    ranked = sorted(worst, key=severity, reverse=True)[:most]
     return tuple(
-        NamedCharge(f"T{number}", charge, _why(charge, index, scaled))
-        for number, (charge, (scaled, index)) in enumerate(ranked, start=1)
+        NamedCharge(f"T{number}", each.charge, _why(each, len(sources[each.source])))
+        for number, each in enumerate(ranked, start=1)
     )
 
 
@@ -89,7 +89,8 @@ def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[N
 def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
     """Return charges at even steps along segments, over areas, and at points; each only once.
 
-    Those of a vehicle are at its worst place, its second worst, and so on.
+    And that of each source nearest to what is protected. Those of a vehicle are at its worst place,
+    its second worst, and so on.
 
     Args:
         scenario: The scenario.
@@ -102,11 +103,12 @@ def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
             for rank in range(min(count, source.places)):
                 vehicle = VehicleCharge(source, rank)
                 name = f"vehicle, place {rank + 1} by distance"
-                found.setdefault(vehicle, NamedCharge(name, vehicle, why))
+                found.setdefault(vehicle, NamedCharge(name, vehicle, why, index))
             continue
-        for place in _spread(source, count):
+        nearest = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
+        for place in (*_spread(source, count), nearest):
             charge = Charge(place, source.tnt_kg, source.height_m)
-            found.setdefault(charge, NamedCharge(_place_text(charge), charge, why))
+            found.setdefault(charge, NamedCharge(_place_text(charge), charge, why, index))
     return tuple(found.values())
 
 
@@ -127,24 +129,11 @@ def other_masses(
     return tuple(possible), tuple(notes)
 
 
-def _worst(scenario: Scenario, source: AnySource) -> AnyCharge:
-    """Return the charge of a source at the place nearest to what is protected."""
-    if isinstance(source, VehicleSource):
-        return VehicleCharge(source)
-    place = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
-    return Charge(place, source.tnt_kg, source.height_m)
-
-
-def _why(charge: AnyCharge, index: int, scaled: float) -> str:
-    if isinstance(charge, VehicleCharge):
-        return (
-            f"charge source {index + 1}, a vehicle {charge.source.width_m:g} m wide, as near to "
-            f"what is protected as it can drive: {scaled:.2f} m/kg^(1/3) without a barrier"
-        )
-    return (
-        f"the place of charge source {index + 1} nearest to what is protected, "
-        f"{scaled:.2f} m/kg^(1/3) away"
-    )
+def _why(place: NamedCharge, count: int) -> str:
+    if count == 1:
+        return place.why
+    words = "the worst with the layout"
+    return f"{place.why}, {words} of {count} places that this report looks at"
 
 
 def _with_mass(charge: AnyCharge, tnt_kg: float) -> AnyCharge:

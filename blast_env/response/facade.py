@@ -243,6 +243,11 @@ class FacadeResponse:
         return float(max(self.glazing.hazard.max(initial=0.0), self.walls.damage.max(initial=0.0)))
 
     @property
+    def total_damage(self) -> float:
+        """The damage of all components, added up."""
+        return float(self.glazing.hazard.sum() + self.walls.damage.sum())
+
+    @property
     def level_of_protection(self) -> LevelOfProtection:
         """Level of protection of the building: what its worst component allows."""
         return min(level_by_glass(self.worst_condition), level_of_protection(self.worst_damage))

@@ -257,6 +257,10 @@ def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:
     rows = [*verdict_rows([("A", other, [milder]), ("A", record, [verdict])])]
     assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]
     assert rows[0].level == rows[2].level != rows[1].level == "high"
+    fewer = verdict.model_copy(update={"total_damage": 0.0, "broken": 0.0})
+    rows = [*verdict_rows([("A", other, [fewer]), ("A", record, [verdict])])]
+    assert rows[0].level == rows[1].level
+    assert rows[0].panes == rows[2].panes != rows[1].panes
 
 
 def test_what_is_there_is_not_run_again(gas: Session) -> None:

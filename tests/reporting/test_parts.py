@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation.governing import Severity
 from blast_env.geometry import Piece
 from blast_env.physics.scene import Charge
 from blast_env.reporting import UNITS, Limit, StudyOptions, UnitSystem
@@ -16,7 +17,13 @@ from blast_env.reporting.loads import TargetLoad, first_phase_s, targets_of
 from blast_env.reporting.outcomes import check_limits
 from blast_env.reporting.peaks import CountedPeak, PeakSource
 from blast_env.reporting.study import Runs, layout_from
-from blast_env.reporting.threats import asked_threats, chief_threats, other_masses, other_places
+from blast_env.reporting.threats import (
+    NamedCharge,
+    asked_threats,
+    chief_threats,
+    other_masses,
+    other_places,
+)
 from blast_env.scenario import Scenario, ScenarioError
 from tests.gas_sites import site_document
 from tests.reporting.sites import small_hut
@@ -33,22 +40,29 @@ ROAD = {"kind": "segment", "start_m": [1.0, 1.0], "end_m": [1.0, 7.0], "tnt_kg":
 YARD = {"kind": "rectangle", "corner_m": [1.0, 1.0], "size_m": [2.0, 1.0], "tnt_kg": 1.0}
 
 
-def test_threats_are_the_nearest_places_the_worst_first() -> None:
+def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> None:
     scenario = site_with(ROAD, YARD)
-    first, second = chief_threats(scenario, 6)
-    # The road passes the hut 5 m away: 2.5 m/kg^(1/3); the yard's corner is sqrt(3^2 + 1^2) m away.
-    assert first.against(scenario).position_m[0] == 1.0
-    assert 3.0 <= first.against(scenario).position_m[1] <= 5.0
-    assert second.charge == Charge((3.0, 2.0), 1.0)
+    places = other_places(scenario, 3)
+    loads = {each.charge: float(number) for number, each in enumerate(places)}
+    loads[places[1].charge] = 1e3
+
+    def severity(place: NamedCharge) -> Severity:
+        return Severity(load=loads[place.charge])
+
+    first, second = chief_threats(places, severity, 6)
     assert (first.name, second.name) == ("T1", "T2")
-    assert "source 1" in first.why
-    assert "2.50 m/kg^(1/3)" in first.why
-    assert [each.name for each in chief_threats(scenario, 1)] == ["T1"]
+    assert (first.charge, second.charge) == (places[1].charge, places[-1].charge)
+    assert first.why == (
+        "charge source 1, the worst with the layout of 4 places that this report looks at"
+    )
+    assert [each.charge for each in chief_threats(places, severity, 1)] == [first.charge]
 
 
 @given(st.floats(1.0, 3.0), st.floats(1.0, 7.0), st.floats(1.0, 3.0), st.floats(1.0, 7.0))
 @settings(max_examples=50, deadline=None, derandomize=True)
-def test_no_place_of_a_street_is_nearer(x0: float, y0: float, x1: float, y1: float) -> None:
+def test_no_place_of_a_street_is_nearer_than_those_looked_at(
+    x0: float, y0: float, x1: float, y1: float
+) -> None:
     road = {**ROAD, "start_m": [x0, y0], "end_m": [x1, y1]}
     scenario = site_with(road)
     left, bottom, right, top = scenario.structures[0].rectangle_m
@@ -56,10 +70,11 @@ def test_no_place_of_a_street_is_nearer(x0: float, y0: float, x1: float, y1: flo
     def away_m(x_m: float, y_m: float) -> float:
         return hypot(max(left - x_m, x_m - right, 0.0), max(bottom - y_m, y_m - top, 0.0))
 
-    (threat,) = chief_threats(scenario, 1)
+    places = other_places(scenario, 1)
     shares = np.linspace(0.0, 1.0, 1000)
     nearest = min(away_m(x0 + s * (x1 - x0), y0 + s * (y1 - y0)) for s in shares)
-    assert away_m(*threat.against(scenario).position_m) == pytest.approx(nearest, abs=0.01)
+    looked_at_m = min(away_m(*each.against(scenario).position_m) for each in places)
+    assert looked_at_m == pytest.approx(nearest, abs=0.01)
 
 
 def test_other_places_are_spread_over_every_source() -> None:
@@ -67,20 +82,21 @@ def test_other_places_are_spread_over_every_source() -> None:
     places = other_places(site, 3)
     along_m = [each.against(site).position_m for each in places[:3]]
     assert along_m == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
-    assert len(places) == 3 + 9  # the second road has the same places
-    assert {each.charge.tnt_kg for each in places[3:]} == {1.0}
+    assert 3.0 <= places[3].against(site).position_m[1] <= 5.0  # before the hut
+    assert len(places) == 4 + 9  # the second road has the same places, the yard its nearest corner
+    assert {each.charge.tnt_kg for each in places[4:]} == {1.0}
 
 
 def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
     site = gate_site(vehicle_document(places=3, apart_m=2.0))
-    (threat,) = chief_threats(site, 6)
+    places = other_places(site, 5)
+    threat = places[0]
     # Its square of 2 m touches the hut at x = 10 m, or the posts at x = 4 m.
     assert threat.against(site) == Charge((9.0, 4.0), 5.0)
     assert threat.against(site, POSTS) == Charge((3.0, 4.0), 5.0)
     assert threat.place_text(site, POSTS) == (
         "(9.0, 4.0) m without the layout, (3.0, 4.0) m with it"
     )
-    places = other_places(site, 5)
     assert len({each.against(site, POSTS) for each in places}) == len(places) == 3
     masses, notes = other_masses(site, threat.charge, (2.0, 1e9))
     assert [each.against(site, POSTS) for each in masses] == [Charge((3.0, 4.0), 10.0)]
@@ -89,9 +105,10 @@ def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
 
 def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
     site = gate_site()
-    threats = chief_threats(site, 1)
-    runs = Runs(site, POSTS, StudyOptions(), targets_of(site), threats, lambda _, __: None)
+    runs = Runs(site, POSTS, StudyOptions(), targets_of(site), (), lambda _, __: None)
     (outcome,) = runs.other_places()[:1]
+    runs.choose_threats()
+    assert [each.name for each in runs.threats] == ["T1"]
     near, far = (
         GasBlast(site, layout, charge=Charge((x_m, 4.0), 5.0)).run().impulse("hut").pa_s
         for layout, x_m in (((), 9.0), (POSTS, 3.0))

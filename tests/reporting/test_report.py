@@ -25,7 +25,7 @@ from blast_env.reporting import UNITS, Limit, Study, StudyOptions, run_study, wr
 from blast_env.reporting.loads import MeasuredBlast, measure, targets_of
 from blast_env.reporting.page import report_html
 from blast_env.reporting.study import Runs, blasts_of
-from blast_env.reporting.threats import chief_threats
+from blast_env.reporting.threats import other_places
 from blast_env.reporting.verdict import verdict_of
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import catalogue
@@ -123,7 +123,7 @@ def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: S
 
 def test_pieces_of_a_catalogue_are_the_items() -> None:
     """Ranked one by one, each left out whole."""
-    scenario, threats = yard(), chief_threats(yard(), 1)
+    scenario, threats = yard(), other_places(yard(), 1)[:1]
     runs = Runs(scenario, WALL, StudyOptions(), targets_of(scenario), threats, lambda _, __: None)
     worths = {each.name: each for each in runs.item_worths()}
     assert worths.keys() == {"5,1,wall,turned", "8,1,wall,turned", "4,1,post"}
@@ -391,7 +391,7 @@ def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
 def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     study: Study, items: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each part that is told of is one that was counted; the threats' own blasts run once."""
+    """Each part that is told of is one that was counted; the threats' own blasts run twice."""
     told: list[str] = []
     charges: list[Any] = []
     run = GasBlast.run
@@ -406,7 +406,7 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
     assert set(told) == {each.label for each in parts if each.charges}
     assert Counter(charges) == Counter(charge for each in parts for charge in each.charges)
-    assert len(charges) == 4 + 4 + (len(LAYOUT) if items else 0)
+    assert len(charges) == 2 + 4 + 4 + (len(LAYOUT) if items else 0)  # 2 to choose the threat by
 
     threat = Threat(study.threats[0].charge, 0)
     kept = BlastEvaluator(small_hut(), options.coarse, cache=tmp_path)

@@ -1,0 +1,113 @@
+"""The blast that governs among several: one rule for verdicts, reports and the page.
+
+Facades first, where they count: the lower level of protection, then the damage of all components.
+Equal ones are told apart by their load, as are sites without facades.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.calibration.references import CURVES_SCALED_M, burst_of, kingery_bulmash
+from blast_env.engines.contract import BlastLoads
+from blast_env.physics.scene import OUTWARDS, BlastSite, Charge, StructureOutline
+from blast_env.physics.sight import in_sight
+from blast_env.scenario import ObjectiveSection, Scenario
+from blast_env.scenario.build_scene import build_site
+
+_STEP_M: Final = 1.0
+"""Between the points of a wall that a load in the open is a mean over."""
+
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True, order=True)
+class Severity:
+    """How bad a blast is, in the order in which that is compared.
+
+    Attributes:
+        lost_levels: Levels of protection below "high" of what has a facade.
+        damage: Damage of all components together, or what the objective counts of it.
+        load: The load, in one unit for all that is compared.
+    """
+
+    lost_levels: int = 0
+    damage: float = 0.0
+    load: float = 0.0
+
+    @classmethod
+    def of_loads(cls, loads: BlastLoads, objective: ObjectiveSection) -> "Severity":
+        """Return how bad a blast is by what a site's objective counts.
+
+        Args:
+            loads: Its loads.
+            objective: The objective of the site.
+        """
+        counted = loads.load(objective)
+        if not objective.is_response:
+            return cls(load=counted)
+        return cls(4 - loads.level, counted, loads.protected_impulse_pa_s)
+
+    @classmethod
+    def in_the_open(cls, scenario: Scenario, charge: Charge) -> "Severity":
+        """Return a guess before any blast: Kingery and Bulmash's impulse on the protected walls.
+
+        On those that the charge sees, from the reflected one at right angles to the incident one
+        along the wall; on others the incident one.
+        """
+        site = build_site(scenario, (), 0, charge)
+        protected = [each for each in site.structures if each.protected]
+        return cls(load=sum(each.weight * _open_pa_s(site, each) for each in protected))
+
+
+def governing(found: Iterable[Found], severity: Callable[[Found], Severity]) -> Found:
+    """Return the worst of several, the first one of equals.
+
+    Args:
+        found: At least one.
+        severity: How bad each is.
+    """
+    return max(found, key=severity)
+
+
+def _open_pa_s(site: BlastSite, structure: StructureOutline) -> float:
+    """Return the mean impulse over the walls of a structure that count: incident where unseen."""
+    points_m, outward = _points(site, structure)
+    charge, seen = site.charge, in_sight(site, points_m, outward)
+    way_m = np.array([*charge.position_m, charge.height_m]) - points_m
+    away_m = np.linalg.norm(way_m, axis=1)
+    facing = (way_m * outward).sum(axis=1) / away_m
+    low_m, high_m = (scaled * np.cbrt(charge.tnt_kg) for scaled in CURVES_SCALED_M)
+    burst = burst_of(charge.height_m, charge.tnt_kg)
+    reflected, incident = (
+        kingery_bulmash(quantity, np.clip(away_m, low_m, high_m), charge.tnt_kg, burst)
+        for quantity in ("reflected_impulse", "incident_impulse")
+    )
+    met = incident + (reflected - incident) * facing**2
+    return float(np.where(seen, met, incident).mean())
+
+
+def _points(site: BlastSite, structure: StructureOutline) -> tuple[FloatArray, FloatArray]:
+    """Return points on the walls that count, a step apart, and where each looks (n, 3)."""
+    left, bottom, right, top = structure.rectangle_m
+    high_m = structure.height_m or site.air_height_m
+    z_m = _middles(structure.base_m, high_m)
+    points, outwards = [], []
+    for wall in structure.faces:
+        x_m, y_m = (_middles(*ends) for ends in ((left, right), (bottom, top)))
+        if wall in ("west", "east"):
+            x_m = np.array([left if wall == "west" else right])
+        else:
+            y_m = np.array([bottom if wall == "south" else top])
+        grid = np.stack(np.meshgrid(x_m, y_m, z_m, indexing="ij"), axis=-1).reshape(-1, 3)
+        points.append(grid)
+        outwards.append(np.tile([*OUTWARDS[wall], 0.0], (len(grid), 1)))
+    return np.concatenate(points), np.concatenate(outwards)
+
+
+def _middles(low_m: float, high_m: float) -> FloatArray:
+    count = max(round((high_m - low_m) / _STEP_M), 1)
+    return low_m + (high_m - low_m) * (np.arange(count) + 0.5) / count
