@@ -113,11 +113,11 @@ def criterion_row(scenario: Scenario, judge: Engine, first: Engine) -> Row:
         f"`{scenario.name}`",
         _charge_words(scenario, charges),
         target.label,
-        min(bare.level(each) for each in bare.buildings).label,
+        min(bare.level_on_cells(each) for each in bare.buildings).label,
         ", ".join(passing) or f"none of {len(rules)}",
         layout_words(found),
         f"{Placement(scenario, found).cost:g} of {scenario.zone.budget:g}",
-        min(judged.level(each) for each in judged.buildings).label,
+        min(judged.level_on_cells(each) for each in judged.buildings).label,
         "passes" if judged.passes(target) else "fails",
     )
 

@@ -52,6 +52,16 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
     assert "control_room/west/1/1" in bays.to_numpy()
 
 
+@pytest.mark.slow
+def test_no_verdict_passes_without_the_flags_of_its_loads(site: Path) -> None:
+    """1 kg on cells of 0.5 m: 2 cells per m/kg^(1/3), where 9.2 are wanted."""
+    lines = run(site, "--tnt-kg", "1", "--target", "very low").splitlines()
+    verdict = next(k for k, line in enumerate(lines) if "glazed_room, no barrier" in line)
+    assert "PASSES (flagged) level 'very low'" in lines[verdict]
+    assert lines[verdict + 1].startswith("flag: control_room: 1 of 1 charges are outside")
+    assert not any(line.endswith("passes") for line in lines)
+
+
 def test_a_site_without_facades() -> None:
     output = run("control_room")
     assert "no structure has a facade with bays" in output
