@@ -68,9 +68,14 @@ class Chosen:
             budget: Most blasts, where it takes some.
             seed: Decides what is drawn.
             report: Is told how far it has come.
+
+        Raises:
+            KeyboardInterrupt: If it was interrupted: the best of some rules is no proposal.
         """
         blasts = self.budget if budget is None else min(budget, self.budget)
         result = self.proposer.propose(problem, blasts, seed, report)
+        if result.interrupted:
+            raise KeyboardInterrupt
         layout, by = result.layout, self.by
         gain: float | None = None
         rules = layouts_by_rule(problem.scenario, problem.told)

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.arrays import FloatArray
 from blast_env.cli import app
+from blast_env.engines.gas import GasEngine
 from blast_env.geometry import Layout, Piece, Removal
 from blast_env.physics.scene import Charge
 from blast_env.scenario import load_layout, save_scenario
@@ -86,3 +87,19 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     assert "walled_yard: nothing is proposed, by guesses of gas dynamics: no layout is" in words
     assert "expected to take off 3 %, the best one 1.6 %" in words
     assert load_layout(tmp_path / "none.json", wide_yard()) == ()
+
+
+def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search that was interrupted has the layout of no rule, or of any."""
+
+    def interrupted(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(GasEngine, "loads", interrupted)
+    out = tmp_path / "layout.json"
+    result = CliRunner().invoke(app, ["propose", "courtyard", "--verify", "--out", str(out)])
+    assert result.exit_code == 130, result.output
+    assert "interrupted: no file was left half-written" in result.stderr
+    assert not out.exists()
