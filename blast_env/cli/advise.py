@@ -189,8 +189,8 @@ class AdviseCommand(ChargeOptions):
             )
         result_console().print(table)
         print_line(
-            f"passes: by the search; level, judged: {judge.words}; sharp peaks: the same impulses "
-            "with peaks that cells do not clip."
+            f"passes: by the search; judged: {judge.words}; level, sharp peaks: the same impulses "
+            "with peaks that cells do not clip as well."
         )
 
 
