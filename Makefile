@@ -58,7 +58,28 @@ MATRIX_EXTRAS ?= all
 MATRIX_TESTS ?= $(QUICK:%=tests/%)
 MATRIX_TOOLS := pytest hypothesis pytest-benchmark pytest-xdist imageio openpyxl pypdfium2
 MATRIX_PYTHON = out/matrix/$*/bin/python
-matrix: $(MATRIX:%=matrix-%)
+# The same tests, and those of what is learnt or compiled, with other roundings: vector instructions
+# of torch, Numba's target without FMA, other kernels of the BLAS, glibc's functions without FMA,
+# and other numbers of threads. tests/digests.py says what a digest depends on.
+ROUNDING := default avx2 avx512 generic kernels no-fma one-thread four-threads
+ROUNDING_TESTS ?= $(MATRIX_TESTS) $(addprefix tests/,agents calibration engines response studies test_gas.py)
+matrix: $(MATRIX:%=matrix-%) $(ROUNDING:%=matrix-%)
+
+matrix-default matrix-avx2 matrix-avx512: export ATEN_CPU_CAPABILITY = $(@:matrix-%=%)
+matrix-generic: export NUMBA_CPU_NAME := generic
+matrix-generic: export NUMBA_CPU_FEATURES :=
+matrix-generic: export NUMBA_CACHE_DIR := $(abspath out/matrix/generic)
+matrix-kernels: export OPENBLAS_CORETYPE := Prescott
+matrix-kernels: export MKL_CBWR := COMPATIBLE
+matrix-no-fma: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable
+matrix-one-thread: THREADS := 1
+matrix-four-threads: THREADS := 4
+matrix-one-thread matrix-four-threads: export OMP_NUM_THREADS = $(THREADS)
+matrix-one-thread matrix-four-threads: export MKL_NUM_THREADS = $(THREADS)
+matrix-one-thread matrix-four-threads: export OPENBLAS_NUM_THREADS = $(THREADS)
+matrix-one-thread matrix-four-threads: export NUMBA_NUM_THREADS = $(THREADS)
+$(ROUNDING:%=matrix-%): matrix-%: $(STAMP)
+	$(BIN)/pytest --numprocesses auto --dist worksteal -rs $(ROUNDING_TESTS)
 
 matrix-%: $(VENV)/.uv
 	mkdir -p out/matrix

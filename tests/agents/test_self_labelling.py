@@ -10,7 +10,14 @@ import torch
 from blast_agents.league.trained import TrainedRun
 from blast_agents.search.registry import layouts_by_rule
 from blast_agents.training import load_agent, load_hyperparameters, resume, train
-from blast_agents.training.agent import TrainedAgent, fitted, policy_for
+from blast_agents.training.agent import (
+    Policy,
+    TrainedAgent,
+    as_tensor,
+    fitted,
+    logits_of,
+    policy_for,
+)
 from blast_agents.training.cases import Selection, training_cases
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import AnyHyperparameters
@@ -34,6 +41,7 @@ from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Evaluators
 from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
 from blast_env.scenario import Placement, Scenario, VehicleCharge, save_scenario
 from tests.agents.training_runs import (
     hyperparameters,
@@ -128,18 +136,45 @@ def test_the_loss_counts_wanted_actions_alike_and_illegal_ones_not_at_all() -> N
     assert imitation_loss(surer, legal, wanted).item() == pytest.approx(np.log(2.0), abs=1e-3)
 
 
+def charge_y_m(case: Case) -> float:
+    assert isinstance(case.charge, Charge)
+    return case.charge.position_m[1]
+
+
+def lead(policy: Policy, demonstration: Demonstration) -> float:
+    """Return by how much the likeliest wanted action is ahead of all others, in logits.
+
+    At each of 32 moments in the placing of a layout, the least.
+    """
+    rng = np.random.default_rng(1)
+    steps = [demonstration.draw(rng) for _ in range(32)]
+    legal = torch.as_tensor(np.stack([step.legal for step in steps]))
+    wanted = torch.as_tensor(np.stack([step.wanted for step in steps]))
+    logits = logits_of(policy, as_tensor(policy, np.stack([step.observation for step in steps])))
+    best = logits.masked_fill(~wanted, -torch.inf).amax(dim=1)
+    other = logits.masked_fill(wanted | ~legal, -torch.inf).amax(dim=1)
+    return (best - other).min().item()
+
+
 @pytest.mark.parametrize(("observation", "count"), [("grid", 2), ("features", 1)])
 def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int) -> None:
-    """With the spatial policy a layout for each of two charges."""
+    """With the spatial policy a layout for each of two charges, at both ends of the area.
+
+    The last steps are small, so that no choice hangs on the rounding of a matrix product.
+    """
     scenario = wide_yard()
-    cases = first_cases(scenario, count)
+    ordered = sorted(first_cases(scenario, 32), key=charge_y_m)
+    cases = [ordered[0], ordered[-1]][:count]
     agent = agent_for(scenario, observation)
     layouts = [by_rule(each) for each in cases]
     shown = [Demonstration(*each, 0.4, observation) for each in zip(cases, layouts, strict=True)]
-    loss = imitate(agent.policy, shown, 160, 8, 0.02, 0.5, 0.5, np.random.default_rng(0))
-    assert loss < 1.5
-    for case, layout in zip(cases, layouts, strict=True):
+    rng = np.random.default_rng(0)
+    for updates, learning_rate in ((160, 0.01), (60, 0.001)):
+        loss = imitate(agent.policy, shown, updates, 8, learning_rate, 0.5, 0.5, rng)
+    assert loss < 0.8
+    for case, layout, each in zip(cases, layouts, shown, strict=True):
         assert sorted(agent.propose(scenario, case.charge)) == sorted(layout)
+        assert lead(agent.policy, each) > 0.5
 
 
 def test_sites_with_and_without_vehicles_are_learnt_side_by_side() -> None:

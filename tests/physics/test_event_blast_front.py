@@ -16,14 +16,15 @@ from tests.physics.blast_front import (
 def test_an_elastic_blast_is_sedov_s() -> None:
     """60,000 balls; the air swept up is 20 to 115 times as heavy as the charge.
 
-    One seed's densest place scatters by 2 %, which is 0.02 in an exponent over this range.
+    One seed's densest place scatters by 2 %, which is 0.02 in an exponent over this range. A last
+    bit makes as much of a difference as a seed, so the bounds are three deviations of seeds away.
     """
     case = FrontCase(restitution=1.0, side_spacings=245)
     trace = elastic_front(case, np.geomspace(45.0, 105.0, 8).tolist(), 0)
     assert trace.ratio == pytest.approx(1.0, abs=0.05)
-    assert np.abs(trace.radius / trace.law - 1.0).max() < 0.07
-    assert trace.exponent == pytest.approx(1.0 / 2.0, abs=0.04)
-    assert 1.5 < trace.compression.min() < trace.compression.max() < 3.0  # 3 in a sharp front
+    assert np.abs(trace.radius / trace.law - 1.0).max() < 0.1
+    assert trace.exponent == pytest.approx(1.0 / 2.0, abs=0.06)
+    assert 1.3 < trace.compression.min() < trace.compression.max() < 3.0  # 3 in a sharp front
 
 
 @pytest.mark.parametrize("restitution", [0.1, 0.3])
@@ -32,7 +33,7 @@ def test_an_inelastic_blast_is_a_snowplough(restitution: float) -> None:
     case = FrontCase(restitution=restitution, side_spacings=120, ball_count=100)
     trace = inelastic_front(case, np.geomspace(22.0, 50.0, 8).tolist(), seed=0)
     assert trace.ratio == pytest.approx(1.0, abs=0.05)
-    assert trace.exponent == pytest.approx(1.0 / 3.0, abs=0.04)
+    assert trace.exponent == pytest.approx(1.0 / 3.0, abs=0.06)
     assert trace.compression[-1] > 3.0  # beyond what any elastic front of this gas can reach
 
 
