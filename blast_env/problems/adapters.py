@@ -1,6 +1,6 @@
 """Problems in the form of two other collections: EngiBench's `Problem`, MCBO's tasks.
 
-Neither is a dependency. What is returned is an instance of the collection's own class.
+Neither is a dependency. Each function returns an instance of the collection's class.
 """
 
 from dataclasses import dataclass
@@ -16,24 +16,24 @@ from blast_env.problems.problem import BenchmarkProblem
 
 @dataclass(frozen=True)
 class BlastConditions:
-    """EngiBench's conditions: nothing of a problem can be varied.
+    """Conditions of an EngiBench problem: the name alone, since nothing can be varied.
 
     Attributes:
-        problem: Its name.
+        problem: Name of the problem.
     """
 
     problem: str
 
 
 def engibench_problem(problem: BenchmarkProblem, seed: int = 0) -> Any:
-    """Return a problem as one of EngiBench: designs are random keys.
+    """Return a problem as an EngiBench problem whose designs are random keys.
 
-    Its `simulate` gives the share of the load that is left, and spends blasts; `check_constraints`
-    says whether keys are from 0 to 1; `optimize` is not there, `render` gives the layout.
+    `simulate` returns the share of the load that remains, and spends blasts; `check_constraints`
+    checks that keys are 0 to 1; `render` returns the layout; `optimize` is not implemented.
 
     Args:
         problem: The problem with its budget.
-        seed: Of `random_design`.
+        seed: Seed of `random_design`.
 
     Raises:
         MissingExtraError: If EngiBench is not installed.
@@ -65,10 +65,10 @@ def engibench_problem(problem: BenchmarkProblem, seed: int = 0) -> Any:
 
 
 def mcbo_task(problem: BenchmarkProblem) -> Any:
-    """Return a problem as a task of MCBO.
+    """Return a problem as an MCBO task.
 
-    Its search space has for each piece a nominal variable, what is set down, and two whole numbers,
-    where: the random keys in steps.
+    The search space discretises the random keys. It has three variables per piece: a nominal one
+    for the variant, and two integers for the row and the column.
 
     Raises:
         MissingExtraError: If MCBO is not installed.
@@ -89,7 +89,7 @@ def mcbo_task(problem: BenchmarkProblem) -> Any:
             return np.array([[problem.evaluate(layout)] for layout in layouts])
 
         def keys(self, row: Any) -> FloatArray:
-            """Return the random keys of a row of its search space."""
+            """Return the random keys of a row of the search space."""
             return np.array(
                 [(int(each) + 0.5) / sizes[index % 3] for index, each in enumerate(row)]
             )

@@ -1,4 +1,4 @@
-"""Which problems there are, by name and version, and what each of them asks."""
+"""The benchmark problems by name and version."""
 
 import json
 from collections.abc import Mapping
@@ -27,35 +27,35 @@ BUDGETS: Final = (0, 50, 200, 1000)
 """Gas blasts that a method may spend on a problem."""
 
 SEEDS: Final = 10
-"""Runs of a method that draws numbers, seeds 0 to 9."""
+"""Runs of a stochastic method, seeds 0 to 9."""
 
 _PRACTICE_CHARGES: Final = 4
-"""Places of a hidden charge that `evaluate` meets, unless there are fewer."""
+"""Places of a hidden charge in `evaluate`, unless the site has fewer."""
 
 _JUDGED_CHARGES: Final = 4
-"""Places that the judge takes, others than those."""
+"""Further places of a hidden charge, for the judge."""
 
 _JUDGED_UNSEEN: Final = 2
-"""The same on each of many unseen sites: more sites tell more than more places on one."""
+"""The same per unseen site: additional sites carry more information than additional places."""
 
 _DRAWS: Final = 16
-"""Draws that find all places where there are but a few."""
+"""Draws that find every place where the site has only a few."""
 
 _GENERATED: Final = "site_"
-"""What the names of generated sites begin with; their seed follows."""
+"""Prefix of the names of generated sites, before the seed."""
 
 _SECRET_BITS: Final = 62
 
 
 @dataclass(frozen=True)
 class Definition:
-    """What a problem asks; it never changes what it says, a new version does.
+    """Definition of a problem. It never changes; a changed problem is a new version.
 
     Attributes:
         site: Bundled name, or `site_SEED` for a generated site with heights and a catalogue.
-        family: What is known of the charge.
-        place: Of a told charge: which of the site's charges, from 1.
-        version: From 1.
+        family: Knowledge of the charge.
+        place: Number of the site's charge in the family `told`, from 1.
+        version: Version, from 1.
     """
 
     site: str
@@ -78,17 +78,17 @@ class Definition:
 
     @cached_property
     def case(self) -> Case:
-        """What layouts are judged on; its `practice` is what `evaluate` meets.
+        """The case of the judge; its `practice` is the case of `evaluate`.
 
-        A told charge is the same there and here. Of hidden ones a few are drawn, others for the
-        judge, and the same ones where there are but a few.
+        Both have the same charge in the family `told`. Otherwise each draws a few charges, at
+        different places unless the site has only a few places.
         """
         case = self._told() if self.family == "told" else self._hidden()
         return replace(case, name=self.name)
 
     @cached_property
     def digest(self) -> str:
-        """16 hexadecimal digits of all that the problem says: site, charges, budgets."""
+        """Digest of site, charges and budgets, 16 hexadecimal digits."""
         practice = self.case.practice
         assert practice is not None
         says = {
@@ -132,7 +132,7 @@ _STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
 _OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
 _PUBLIC_VEHICLES: Final = (5103,)
 _PUBLIC_SITES: Final = range(6100, 6115)
-"""Of the unseen family; a judge draws more of its kind with `secret_sites`."""
+"""Seeds of the family `unseen`; a judge draws further sites with `secret_sites`."""
 
 _FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
 
@@ -155,7 +155,7 @@ DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
 """All public problems by name."""
 
 SMALL: Final = ("visitor_entrance-told_2-v1", "control_room-told-v1", "school_and_clinic-told-v1")
-"""A few problems of one blast a layout, for a first look and for methods with many seeds."""
+"""A few problems with one blast per layout, for a first look and for methods with many seeds."""
 
 
 def find_definition(name: str) -> Definition:
@@ -171,14 +171,14 @@ def find_definition(name: str) -> Definition:
 
 @cache
 def secret_sites(secret: str, count: int) -> tuple[Definition, ...]:
-    """Return problems on generated sites that only who knows the secret can draw.
+    """Return problems on generated sites that cannot be drawn without the secret.
 
     Args:
-        secret: A text that the judge keeps; the same one gives the same sites.
-        count: How many, at least 1.
+        secret: A text that the judge keeps; the same text gives the same sites.
+        count: Number of sites, at least 1.
 
     Raises:
-        BlastEnvError: If the secret is shorter than 8 characters, or there are to be none.
+        BlastEnvError: If the secret is shorter than 8 characters, or the count is below 1.
     """
     if len(secret) < 8:
         raise BlastEnvError(f"secret has {len(secret)} characters, must have at least 8")
@@ -187,6 +187,6 @@ def secret_sites(secret: str, count: int) -> tuple[Definition, ...]:
     seeds = []
     for index in range(count):
         drawn = sha256(f"{secret}/{index}".encode()).digest()
-        # Beyond the seeds that trainings and this package's own problems draw.
+        # Beyond the seeds of training and of the public problems.
         seeds.append(2**_SECRET_BITS + int.from_bytes(drawn, "big") % 2**_SECRET_BITS)
     return tuple(Definition(f"{_GENERATED}{seed}", "unseen") for seed in seeds)

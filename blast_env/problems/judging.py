@@ -1,4 +1,4 @@
-"""Playing a submission again by gas dynamics, and its score between best rule and best known."""
+"""Replay of submissions by gas dynamics, and scores from the best rule to the best known layout."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,22 +21,22 @@ from blast_env.problems.submissions import MOST_RUNS, Run, Submission, read_runs
 from blast_env.statistics import Estimate, stratified_estimate
 
 JUDGE_CELL_M: Final = 0.25
-"""Side of the cells that the judge uses."""
+"""Side of the judge's cells, m."""
 
 FORMAT: Final = "blast-env judged 1"
 
 _SAME: Final = 1e-9
-"""Shares that differ by less are equal."""
+"""Tolerance within which shares are equal."""
 
 
 @dataclass(frozen=True)
 class JudgedRun(Run):
-    """A run that was played again; further attributes as of `Run`.
+    """A replayed run; further attributes as in `Run`.
 
     Attributes:
-        share: Share of the load without a barrier that is left.
-        rule: The same of the best rule: score 0.
-        best: The same of the best layout known: score 1.
+        share: Share of the load without a barrier that remains.
+        rule: The same for the best rule: score 0.
+        best: The same for the best known layout: score 1.
     """
 
     share: Share
@@ -45,7 +45,7 @@ class JudgedRun(Run):
 
     @property
     def score(self) -> float:
-        """Score: 0 for the best rule or worse, 1 for the best known, more for a better one."""
+        """Score: 0 for the best rule or worse, 1 for the best known layout, above 1 if better."""
         gain = self.rule - self.share
         if self.rule - self.best < _SAME:
             return 1.0 if gain > -_SAME else 0.0
@@ -54,15 +54,15 @@ class JudgedRun(Run):
 
 @dataclass(frozen=True)
 class JudgedSubmission:
-    """A submission that was played again; the table of standings is made of such files.
+    """A replayed submission; the table of standings is made from files of these.
 
     Attributes:
         method: Name in the table.
         cell_m: Side of the judge's cells, m.
-        engine: The judge, with its version.
-        runs: As submitted, with what is left of the loads.
+        engine: Version of the judge's engine.
+        runs: The submitted runs with the shares of the load that remain.
         note: As submitted.
-        format: Of the file.
+        format: Format of the file.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -79,7 +79,7 @@ class JudgedSubmission:
         """Read a file.
 
         Raises:
-            BlastEnvError: If it cannot be read or is anything else.
+            BlastEnvError: If it cannot be read or has another format.
         """
         try:
             return checked_as(cls, read_runs(path))
@@ -87,7 +87,7 @@ class JudgedSubmission:
             raise BlastEnvError(f"{path}: {error}") from error
 
     def save(self, path: str | Path) -> Path:
-        """Write the file, a run a line.
+        """Write the file, one run per line.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -96,7 +96,7 @@ class JudgedSubmission:
 
     @property
     def submission(self) -> Submission:
-        """The same as it was submitted, to be judged again."""
+        """The submission without its shares, for another judgement."""
         runs = (
             Run(each.problem, each.budget, each.seed, each.blasts, each.layout)
             for each in self.runs
@@ -105,23 +105,23 @@ class JudgedSubmission:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """The problems that were entered."""
+        """The problems of the submission."""
         return tuple(dict.fromkeys(run.problem for run in self.runs))
 
     def score(self, budget: int) -> Estimate:
-        """Return the mean score with a budget, over the problems that were entered.
+        """Return the mean score with a budget over the problems of the submission.
 
-        What was found with fewer blasts counts for more blasts, too; without any it is 0. The 95 %
-        interval says how the mean would change with other seeds of the same runs.
+        Each problem uses its largest submitted budget up to this one, and scores 0 if there is
+        none. The 95 % interval covers the variation of the mean over the seeds of the runs.
         """
         return self._mean({budget: 1.0})
 
     def area(self) -> Estimate:
-        """Return the score over all budgets: the area under it over the logarithm of the blasts."""
+        """Return the area under the score over the logarithm of the blasts."""
         return self._mean(BUDGET_WEIGHTS)
 
     def _mean(self, of_budgets: Mapping[int, float]) -> Estimate:
-        """Return the mean score with budgets, each by its weight."""
+        """Return the mean score over budgets with weights."""
         groups = []
         for name in self.problems:
             weights: dict[int, float] = defaultdict(float)
@@ -132,7 +132,7 @@ class JudgedSubmission:
         return stratified_estimate(groups)
 
     def _spent(self, problem: str, budget: int) -> int:
-        """Return the largest budget up to this one that was entered; -1 if there is none."""
+        """Return the largest submitted budget up to this one; -1 if there is none."""
         entered = {run.budget for run in self.runs if run.problem == problem}
         return max((each for each in entered if each <= budget), default=-1)
 
@@ -142,7 +142,7 @@ class JudgedSubmission:
 
 
 def _budget_weights() -> dict[int, float]:
-    """Return the weight of each budget: the trapezoids over the logarithm of 1 + blasts."""
+    """Return the weight of each budget: trapezoids over the logarithm of 1 + blasts."""
     places = np.log1p(np.array(BUDGETS, dtype=np.float64))
     widths = np.diff(places)
     weights = 0.5 * (np.append(widths, 0.0) + np.append(0.0, widths)) / places[-1]
@@ -150,7 +150,7 @@ def _budget_weights() -> dict[int, float]:
 
 
 BUDGET_WEIGHTS: Final[Mapping[int, float]] = _budget_weights()
-"""Weights of the budgets in the area; together 1."""
+"""Weights of the budgets in the area; their sum is 1."""
 
 
 def judge(
@@ -163,20 +163,20 @@ def judge(
     references: Mapping[str, ScoreReference] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> JudgedSubmission:
-    """Play a submission again by gas dynamics.
+    """Replay a submission by gas dynamics.
 
-    Equal layouts are played once. Best rule and best known are played with the same cells, unless
-    their loads with such cells are stored.
+    Equal layouts run once. The best rule and the best known layout run with the same cells, unless
+    their shares with these cells are stored.
 
     Args:
         submission: The layouts.
-        cell_m: Side of the cells, m.
-        processes: Worker processes; they change nothing but the time.
-        cache: Folder in which blasts are kept for the next call.
+        cell_m: Side of the cells, m; `None` for the engine's default.
+        processes: Number of worker processes; it has no effect on the result.
+        cache: Folder or cache in which blasts are kept for the next call.
         engine: Another engine than gas dynamics, for tests.
         definitions: The problems by name.
-        references: What they are scored between; the stored ones unless given.
-        progress: Called with the share that is done.
+        references: References of the scores by problem; the stored ones unless given.
+        progress: Called with the completed share, 0 to 1.
 
     Raises:
         BlastEnvError: As `Submission.check`, or if a problem has no reference.
@@ -230,7 +230,7 @@ def _judged(
 
 
 def shipped_standings() -> tuple[JudgedSubmission, ...]:
-    """Return the submissions that come with the package."""
+    """Return the bundled judged submissions."""
     folder = files("blast_env.problems").joinpath("data/standings")
     if not folder.is_dir():
         return ()

@@ -1,4 +1,4 @@
-"""A problem as an optimiser meets it: layouts are vectors or lists, blasts are counted."""
+"""The interface of a problem for optimisers: layouts as vectors or lists, blasts counted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -27,13 +27,13 @@ from blast_env.values import whole_number
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A layout that has met blasts.
+    """An evaluated layout.
 
     Attributes:
         layout: Its cells or pieces, sorted.
-        share: Share of the load without a barrier that is left; less is better.
-        threats: How many threats it has met, counted from the first.
-        blasts: Blasts spent by then.
+        share: Share of the load without a barrier that remains; less is better.
+        threats: Number of threats, counted from the first.
+        blasts: Blasts spent up to and including this evaluation.
     """
 
     layout: Layout
@@ -44,18 +44,18 @@ class Evaluated:
 
 @dataclass(eq=False)
 class BenchmarkProblem:
-    """A problem of the benchmark, with so many gas blasts to spend; `make` makes it.
+    """A problem of the benchmark with a budget of gas blasts; see `make`.
 
     Attributes:
-        definition: What it asks.
+        definition: Definition of the problem.
         budget: Most blasts of `evaluate`.
-        engine: Runs the blasts.
-        cache: Folder or cache of blasts; what it knows costs no time, but counts all the same.
+        engine: Engine of the blasts.
+        cache: Folder or cache of blasts; a cached blast takes no time, but counts all the same.
         meter: Counts the blasts: distinct pairs of layout and threat.
-        history: Every layout that was evaluated, in order.
+        history: Every evaluated layout, in order.
 
     Raises:
-        BlastEnvError: If the budget is no count of blasts, or more than the largest of `BUDGETS`.
+        BlastEnvError: If the budget is no whole number from 0 to the largest of `BUDGETS`.
     """
 
     definition: Definition
@@ -86,7 +86,7 @@ class BenchmarkProblem:
 
     @property
     def seeds(self) -> range:
-        """The seeds of runs of a method that draws numbers."""
+        """The seeds of the runs of a stochastic method."""
         return range(SEEDS)
 
     @property
@@ -96,14 +96,14 @@ class BenchmarkProblem:
 
     @property
     def case(self) -> Case:
-        """What `evaluate` meets; who searches may know it, the charges too."""
+        """The case of `evaluate`; methods may use all of it, including the charges."""
         practice = self.definition.case.practice
         assert practice is not None
         return practice
 
     @property
     def reference(self) -> ScoreReference | None:
-        """The best rule and the best layout known; `None` for a site that only a judge draws."""
+        """The best rule and the best known layout; `None` for a site of `secret_sites`."""
         return stored_references().get(self.name)
 
     @cached_property
@@ -113,7 +113,7 @@ class BenchmarkProblem:
 
     @cached_property
     def evaluator(self) -> BlastEvaluator:
-        """Runs the blasts, and remembers them."""
+        """The evaluator, which runs and caches the blasts."""
         most = self.budget + len(self.case.threats)
         return BlastEvaluator(self.scenario, self.engine, cache_size=most, cache=self.cache)
 
@@ -124,41 +124,41 @@ class BenchmarkProblem:
 
     @property
     def blasts_left(self) -> int:
-        """Blasts that are left."""
+        """Blasts that remain in the budget."""
         return self.budget - self.meter.blasts
 
     @property
     def best(self) -> Evaluated | None:
-        """The best layout of those that have met most threats; `None` before the first."""
+        """The best of the layouts evaluated with most threats; `None` before the first."""
         return min(self.history, key=lambda each: (-each.threats, each.share), default=None)
 
     def check(self, layout: Sequence[Element]) -> tuple[str, ...]:
-        """Return why a layout is not legal, a sentence each; none for a legal one.
+        """Return the reasons why a layout is illegal, one sentence each; none if it is legal.
 
         Raises:
-            LayoutError: If it is no list of cells or pieces at all.
+            LayoutError: If it is not a list of cells or pieces.
         """
         return self.space.reasons_against(layout)
 
     def evaluate(self, layout: Sequence[Element], threats: int | None = None) -> float:
-        """Return the share of the load without a barrier that is left with a layout.
+        """Return the share of the load without a barrier that remains with a layout.
 
-        It takes a blast for each threat, unless the same was asked before. The blasts without a
-        barrier are free. Where the response of facades counts, it is the share of that; measures
-        that harden a facade take no blast of their own.
+        It spends one blast per threat, except for pairs of layout and threat that were evaluated
+        before. Blasts without a barrier are free. Where the response of facades counts, the share
+        is that of the response; measures that harden a facade take no further blast.
 
         Args:
             layout: (row, column) of each module, or pieces (row, column, item, turned).
-            threats: How many of the problem's threats, the first ones: they lie far from each
-                other, so that a few stand for all. All of them unless given.
+            threats: Number of the problem's threats, from the first; they are ordered far from
+                each other, so that a few represent all. All of them unless given.
 
         Returns:
-            A number that is to be small; 1 without a barrier.
+            The objective, to be minimised; 1 without a barrier.
 
         Raises:
-            BudgetError: If the budget does not pay for it.
+            BudgetError: If the blasts exceed the budget.
             LayoutError: If the layout is not legal; no blast is counted then.
-            BlastEnvError: If there are not so many threats.
+            BlastEnvError: If `threats` is not 1 to the number of threats.
         """
         most = len(self.case.threats)
         count = most if threats is None else threats
@@ -181,9 +181,9 @@ class BenchmarkProblem:
         return share
 
     def judged(self, layout: Sequence[Element], processes: int = 1) -> float:
-        """Return the share of the load that is left under the threats of the judge.
+        """Return the share of the load that remains under the threats of the judge.
 
-        For reports on what is done: methods do not call it, and its blasts count nowhere.
+        For reports only: methods must not call it, and its blasts are not counted.
 
         Raises:
             LayoutError: If the layout is not legal.
@@ -196,7 +196,17 @@ class BenchmarkProblem:
 def shares_of(
     case: Case, layouts: Sequence[Layout], evaluator: BlastEvaluator, processes: int = 1
 ) -> list[float]:
-    """Return what layouts leave of what counts without a barrier, under the threats of a case."""
+    """Return the objective of each layout relative to that without a barrier.
+
+    Args:
+        case: The case, with its threats.
+        layouts: The layouts.
+        evaluator: Runs the blasts.
+        processes: Number of worker processes.
+
+    Raises:
+        BlastEnvError: If the objective without a barrier is 0.
+    """
     pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
     loads = [
         each.load(case.scenario.objective) for each in evaluator.loads_of_many(pairs, processes)
@@ -222,16 +232,16 @@ def make(
     """Return a problem of the benchmark.
 
     Args:
-        problem: Its name, as `control_room-told-v1`, or its definition.
-        budget: Gas blasts that may be spent.
+        problem: Its name, such as `control_room-told-v1`, or its definition.
+        budget: Most gas blasts.
         cell_m: Side of the cells, m; 0.5 unless given.
         engine: Another engine than gas dynamics, for tests.
-        cache: Folder in which blasts are kept.
+        cache: Folder or cache in which blasts are kept.
 
     Raises:
         UnknownNameError: If there is no such problem; the message names the nearest one.
-        BlastEnvError: If what the problem says is not what its version said when it was made, or
-            an argument is out of bounds.
+        BlastEnvError: If the digest of the definition differs from the stored one, or an argument
+            is out of bounds.
     """
     definition = find_definition(problem) if isinstance(problem, str) else problem
     known = stored_references().get(definition.name)

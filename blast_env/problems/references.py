@@ -1,4 +1,4 @@
-"""What each problem is scored between: the best rule, and the best layout that is known."""
+"""The references of each problem's score: the best rule and the best known layout."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,13 +17,13 @@ Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 @dataclass(frozen=True)
 class KnownLayout:
-    """A layout, and what it leaves of the load.
+    """A layout with the shares of the load that remain.
 
     Attributes:
-        method: What found it.
+        method: Name of the method that found it.
         layout: Its cells or pieces.
-        shares: What the judge finds left of the load without a barrier, by the side of the cells in
-            m, as a text.
+        shares: Judged share of the load without a barrier that remains, by the side of the cells
+            (`cell_key`).
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -35,13 +35,13 @@ class KnownLayout:
 
 @dataclass(frozen=True)
 class ScoreReference:
-    """What is stored with a problem.
+    """The stored references of a problem.
 
     Attributes:
-        digest: Of what the problem says.
-        rules: What each rule leaves of the load, with cells of 0.5 m, by name.
+        digest: Digest of the problem's definition.
+        rules: Share of the load that remains with each rule, with cells of 0.5 m, by name.
         rule: The best of the rules: score 0.
-        best: The best layout known: score 1.
+        best: The best known layout: score 1.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -53,12 +53,12 @@ class ScoreReference:
 
 
 def cell_key(cell_m: float) -> str:
-    """Return the side of cells as `KnownLayout.shares` has it."""
+    """Return the key of `KnownLayout.shares` for a side of the cells in m."""
     return f"{cell_m:g}"
 
 
 @cache
 def stored_references() -> Mapping[str, ScoreReference]:
-    """Return the references that come with the package, by the names of the problems."""
+    """Return the bundled references by the names of the problems."""
     text = files("blast_env.problems").joinpath("data/references.json").read_text("utf-8")
     return MappingProxyType(checked_as(dict[str, ScoreReference], parse_json(text)))

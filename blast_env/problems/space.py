@@ -1,4 +1,4 @@
-"""The layouts of a site as vectors, for optimisers that know nothing of sites."""
+"""The layouts of a site as vectors, for general-purpose optimisers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,22 +12,22 @@ from blast_env.geometry import Cell, Element, Layout
 from blast_env.scenario import Placement, Scenario
 
 KEYS_PER_PIECE = 3
-"""What is set down, and in which row and column."""
+"""The variant, the row and the column."""
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutSpace:
-    """Two forms of a layout as a vector: a choice a place, and random keys.
+    """Two encodings of a layout as a vector: one choice per place, and random keys.
 
-    **A choice a place.** A place is a cell on which something may have its lower left cell. Choice
-    0 is nothing, choice k is the k-th thing that may stand there: one without a catalogue, so that
-    choices are binary, more with one. Each measure that hardens facades follows as a place of its
-    own. Not every vector is legal.
+    **One choice per place.** A place is a cell that some variant may have as its lower left cell.
+    Choice 0 is empty, choice k is the k-th variant that may stand there. Without a catalogue there
+    is one variant, and choices are binary. Each measure that hardens facades follows as a further
+    place. Not every vector is legal.
 
-    **Random keys.** Any vector of numbers from 0 to 1 is a legal layout. There are three keys for
-    each piece of the stock: what is set down (or nothing), and where. If it may not stand there, it
-    stands on the nearest place where it may; if there is none, it is left out. A measure is set
-    down like a piece, wherever that is.
+    **Random keys.** Any vector of numbers from 0 to 1 is a legal layout. Each piece of the stock
+    has three keys: the variant (or none), the row and the column. A piece moves to the nearest
+    legal place, and is left out if there is none. A measure takes keys as a piece does; its row
+    and column do not matter.
 
     Attributes:
         scenario: The scenario; it has a build zone.
@@ -41,7 +41,7 @@ class LayoutSpace:
 
     @cached_property
     def options(self) -> tuple[tuple[Element, ...], ...]:
-        """What may stand on each place, place by place, row by row; then each measure."""
+        """The elements that may stand on each place, row by row; then each measure."""
         catalogue = self._empty.catalogue
         is_measure = np.array([each.is_measure for each in catalogue.variants])
         pieces = self._empty.legal & ~is_measure[:, None, None]
@@ -63,23 +63,23 @@ class LayoutSpace:
 
     @cached_property
     def choices(self) -> IntArray:
-        """How many choices each place has, nothing among them (places,); 2: it is binary."""
+        """Number of choices per place, including the empty one (places,)."""
         counts: IntArray = np.array([1 + len(options) for options in self.options])
         return counts
 
     @property
     def is_binary(self) -> bool:
-        """Whether a place holds a module or none, and there is nothing else to choose."""
+        """Whether every place has two choices, a module or none."""
         return bool((self.choices == 2).all())
 
     def layout(self, choices: Sequence[int] | IntArray) -> Layout:
-        """Return the layout of a vector of choices, legal or not; `check` of the problem says.
+        """Return the layout of a vector of choices, legal or not (`BenchmarkProblem.check`).
 
         Args:
-            choices: A choice a place (places,).
+            choices: One choice per place (places,).
 
         Raises:
-            BlastEnvError: If there are more or fewer, or one that a place has not.
+            BlastEnvError: If their number is wrong, or a choice is out of bounds.
         """
         if len(choices) != len(self.options):
             raise BlastEnvError(f"choices: has {len(choices)}, must have {len(self.options)}")
@@ -104,20 +104,20 @@ class LayoutSpace:
 
     @cached_property
     def key_sizes(self) -> tuple[int, int, int]:
-        """How many values each of a piece's keys tells apart: things, rows and columns.
+        """Number of values per key of a piece: variants with the empty one, rows, columns.
 
-        Things that fit nowhere on the site, such as a wall across a narrow strip, are none of them.
+        Variants that fit nowhere on the site, such as a wall across a narrow strip, do not count.
         """
         return 1 + len(self._fitting), *self._empty.catalogue.shape
 
     @property
     def keys(self) -> int:
-        """How long a vector of random keys is."""
+        """Length of a vector of random keys."""
         return KEYS_PER_PIECE * self.most_pieces
 
     @cached_property
     def most_pieces(self) -> int:
-        """How many pieces a layout can have: by the stock, and by what the cheapest ones cost."""
+        """Most pieces of a layout, by the stock and by the budget at the least costs."""
         zone, catalogue = self.scenario.zone, self._empty.catalogue
         if zone.budget is None:
             return min(zone.stock, sum(catalogue.stocks))
@@ -135,10 +135,10 @@ class LayoutSpace:
         """Return the legal layout of a vector of random keys.
 
         Args:
-            keys: Numbers (keys,); those below 0 or above 1 count as these.
+            keys: Numbers (keys,), clipped to 0 to 1.
 
         Raises:
-            BlastEnvError: If there are more or fewer, or one is no number.
+            BlastEnvError: If their number is wrong, or one is NaN.
         """
         given = np.asarray(keys, dtype=np.float64)
         if given.shape != (self.keys,):
@@ -160,12 +160,12 @@ class LayoutSpace:
         return placement.layout
 
     def reasons_against(self, layout: Sequence[Element]) -> tuple[str, ...]:
-        """Return why a layout is not legal, a sentence for each element that is in the way.
+        """Return the reasons why a layout is illegal, one sentence per illegal element.
 
-        Elements are set down in their order; one that cannot stand is left out.
+        Elements are placed in order; an illegal one is skipped.
 
         Raises:
-            LayoutError: If it is no list of cells or pieces at all.
+            LayoutError: If it is not a list of cells or pieces.
         """
         placement, reasons = self._empty, []
         for element in placement.catalogue.layout_from(layout):
@@ -182,7 +182,7 @@ class LayoutSpace:
 
     @cached_property
     def _place_of(self) -> dict[Element, tuple[int, int]]:
-        """Place and choice of each thing that may stand alone."""
+        """Place and choice of each element that may stand on the empty site."""
         return {
             element: (place, choice)
             for place, options in enumerate(self.options)

@@ -1,4 +1,4 @@
-"""The standings: tables of what was judged, a row a method."""
+"""The standings: tables of the judged submissions, one row per method."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ how much of the load each layout takes off, by gas dynamics. Intervals are of 95
 
 @dataclass(frozen=True)
 class StandingsTable:
-    """Methods on the same problems, judged with the same cells.
+    """A table of methods on the same problems, judged with the same cells.
 
     Attributes:
-        title: What was judged, and how.
-        headers: Of the columns; the first has the methods.
-        rows: The best method first.
+        title: Problems, quantity and cells.
+        headers: Headers of the columns; the first column has the methods.
+        rows: Rows, best method first.
     """
 
     title: str
@@ -35,7 +35,7 @@ class StandingsTable:
 
 
 def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[StandingsTable]:
-    """Yield for each set of problems the scores, then for each problem what is taken off."""
+    """Yield for each set of problems the scores, then the load reduction in each problem."""
     groups: dict[tuple[tuple[str, ...], float], list[JudgedSubmission]] = {}
     for each in judged:
         groups.setdefault((tuple(sorted(each.problems)), each.cell_m), []).append(each)
@@ -45,7 +45,7 @@ def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[StandingsTa
 
 
 def standings_page(judged: Sequence[JudgedSubmission]) -> str:
-    """Return the page of the documentation that shows them."""
+    """Return the page of the documentation with the standings, in Markdown."""
     parts = [_HEAD]
     for table in standings_tables(judged):
         parts += [f"## {table.title}\n", markdown_table(table.headers, table.rows) + "\n"]
@@ -105,6 +105,6 @@ def _reductions(judged: Sequence[JudgedSubmission], problem: str, cell_m: float)
 
 
 def _text(found: Estimate, form: str) -> str:
-    """Return an estimate with its interval, where there is one."""
+    """Return the text of an estimate, with its interval if it has one."""
     value, low, high = (form.format(each) for each in found)
     return value if isnan(found.low) else f"{value} ({low} to {high})"

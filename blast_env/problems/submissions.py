@@ -1,4 +1,4 @@
-"""A submission: the layouts that a method found, one a run, in a file that others can judge."""
+"""Submissions: a method's layouts, one per run, in a file for the judge."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,30 +20,30 @@ from blast_env.values import MOST_SEED, path_of
 
 FORMAT: Final = "blast-env submission 1"
 MOST_BYTES: Final = 20_000_000
-"""Most that a file may have."""
+"""Most bytes of a file."""
 
 MOST_RUNS: Final = 10_000
 """Most runs of a file: each problem with each budget and sixty seeds."""
 
 MOST_BLASTS: Final = BUDGETS[-1]
-"""The largest budget; larger ones count for no score."""
+"""Most blasts of a run: the largest budget of the score."""
 
 Method = Callable[[BenchmarkProblem, int], Layout]
-"""Finds a layout for a problem within its budget; the number is the seed of what it draws."""
+"""Finds a layout for a problem within its budget; the number is the random seed."""
 
 Blasts = Annotated[int, Field(ge=0, le=MOST_BLASTS)]
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a method found once.
+    """One run of a method on a problem.
 
     Attributes:
         problem: Name of the problem.
-        budget: Blasts that it might have spent.
-        seed: Of what it drew.
-        blasts: Blasts that it spent.
-        layout: Its answer.
+        budget: Most blasts of the run.
+        seed: Seed of the run.
+        blasts: Blasts spent.
+        layout: The layout found.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -56,7 +56,7 @@ class Run:
 
     @property
     def key(self) -> tuple[str, int, int]:
-        """What tells it from other runs of the method."""
+        """Problem, budget and seed, which identify the run within a submission."""
         return self.problem, self.budget, self.seed
 
 
@@ -66,9 +66,9 @@ class Submission:
 
     Attributes:
         method: Name in the table.
-        runs: One a problem, budget and seed.
-        note: Settings, versions, where the code is: one line.
-        format: Of the file.
+        runs: One per problem, budget and seed.
+        note: Settings, versions, location of the code: one line.
+        format: Format of the file.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -85,7 +85,7 @@ class Submission:
         """Read a file and check it.
 
         Raises:
-            BlastEnvError: If it cannot be read or is anything else, or as `check`.
+            BlastEnvError: If it cannot be read or has another format, or as `check`.
         """
         try:
             found = checked_as(cls, read_runs(path))
@@ -95,7 +95,7 @@ class Submission:
         return found
 
     def save(self, path: str | Path) -> Path:
-        """Write the file, a run a line.
+        """Write the file, one run per line.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -103,11 +103,11 @@ class Submission:
         return write_runs(path, self)
 
     def check(self, definitions: Mapping[str, Definition] = DEFINITIONS) -> None:
-        """Refuse runs of no use.
+        """Refuse invalid runs.
 
         Raises:
-            BlastEnvError: If there is no such problem, a run is there twice or spent more than its
-                budget, or a layout is not legal; the message names run and reason.
+            BlastEnvError: If a problem is unknown, a run is there twice or exceeds its budget, or a
+                layout is illegal; the message names run and reason.
         """
         seen, legal = set(), set()
         for index, run in enumerate(self.runs):
@@ -133,10 +133,10 @@ class Submission:
 
 
 def read_runs(path: str | Path) -> Any:
-    """Return the content of a file of runs, before it is checked.
+    """Return the unchecked content of a file of runs.
 
     Raises:
-        BlastEnvError: If it cannot be read, is no JSON, or has more than `MOST_RUNS` runs.
+        BlastEnvError: If it cannot be read, is not JSON, or has more than `MOST_RUNS` runs.
     """
     content = parse_json(read_text(path_of(path), MOST_BYTES))
     runs = content.get("runs") if isinstance(content, dict) else None
@@ -146,7 +146,7 @@ def read_runs(path: str | Path) -> Any:
 
 
 def write_runs(path: str | Path, record: Any) -> Path:
-    """Write a dataclass with `runs` as JSON, a run a line.
+    """Write a dataclass with `runs` as JSON, one run per line.
 
     Raises:
         BlastEnvError: If it cannot be written.
@@ -161,12 +161,12 @@ def write_runs(path: str | Path, record: Any) -> Path:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a method is run on.
+    """The runs of a method: every problem, budget and seed.
 
     Attributes:
-        problems: What makes each problem, with a budget.
-        budgets: Blasts.
-        seeds: Of the runs; a method with the budget 0 is run once.
+        problems: Functions that make the problems from a budget.
+        budgets: Budgets, blasts.
+        seeds: Seeds of the runs; with the budget 0 only the first is used.
     """
 
     problems: Sequence[Callable[[int], BenchmarkProblem]]
@@ -174,7 +174,7 @@ class Asked:
     seeds: Sequence[int] = field(default=(0,))
 
     def __iter__(self) -> Any:
-        """Yield what makes a problem, budget and seed; all problems of one seed first."""
+        """Yield (function that makes the problem, budget, seed), seed by seed."""
         for seed in self.seeds:
             for budget in self.budgets:
                 if budget or seed == self.seeds[0]:
@@ -191,13 +191,13 @@ def play(
 
     Args:
         method: The method.
-        asked: What makes each problem, budget and seed; see `Asked`.
-        journal: File in which runs are kept as they come: what is there is not run again.
-        progress: Is told each run.
+        asked: Triples (function that makes the problem, budget, seed); see `Asked`.
+        journal: File to which each run is appended; runs that it already has are not repeated.
+        progress: Called with each run.
 
     Raises:
-        BudgetError: If the method asks for more blasts than its budget.
-        LayoutError: If its answer is not legal.
+        BudgetError: If the method exceeds its budget.
+        LayoutError: If its layout is illegal.
     """
     kept = Journal(journal, Run) if journal is not None else None
     found = {run.key: run for run in kept.read()} if kept else {}
