@@ -1,4 +1,4 @@
-"""Proposers: classical searches and rules, and what they are asked (`registry` lists them all)."""
+"""Proposers: classical searches and rules, with their problem (`registry` lists all of them)."""
 
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (

@@ -1,7 +1,7 @@
-"""What a budget buys by each kind of measure: keep the charge away, shield, harden, or all of them.
+"""Best use of a budget by kind of measure: keep the charge away, shield, harden, or all of them.
 
-A layout needs blasts for what stands on the ground alone. So each barrier that is tried gets the
-measures that suit it best, all choices of them looked at without a blast.
+The loads depend only on the structures on the ground. Each barrier is therefore combined with its
+best choice of the other measures, and the choices are compared without further blasts.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator
@@ -24,30 +24,30 @@ from blast_env.scenario.placement import met_by_blasts
 from blast_env.values import generator
 
 _LOW_M: Final = 1.5
-"""Items that stop vehicles and are lower keep them away; others shield."""
+"""Items that stop vehicles and are lower than this keep them away; others shield."""
 
 _MOST_LOOKED_AT: Final = 10
-"""Of so many measures all choices are looked at; of more only each alone and all together."""
+"""Largest number of measures with all choices compared; of more, only each alone and all."""
 
 _KEPT: Final = 3
-"""How many of the best barriers are changed."""
+"""Number of best barriers that the search changes."""
 
 _MARGIN: Final = 0.1
-"""By how much less damage is wanted than what failed before a judge: a tenth of a level."""
+"""Required reduction of the damage after a layout failed before a judge, in damage levels."""
 
 _TOO_LITTLE: Final = 1e-9
-"""By how much at least a layout is worse than one that passes."""
+"""Least excess over 1 of the worth of a layout that fails."""
 
 _FEWER_SHARE: Final = 0.4
-"""Share of the changes that take a piece away: the cheapest layout that passes is wanted."""
+"""Share of the changes that remove a piece, because the cheapest layout that passes is sought."""
 
 
 class AdviceVerdict(IntEnum):
-    """What a judge says of a layout, the better the larger.
+    """Verdict of a judge on a layout; larger is better.
 
     Attributes:
-        FAILS: It misses the target.
-        PASSES_BARELY: It reaches the target, but not with peaks that cells do not clip.
+        FAILS: The layout misses the target.
+        PASSES_BARELY: It reaches the target, but not with peaks unclipped by the cell size.
         PASSES: It reaches the target either way.
     """
 
@@ -68,13 +68,13 @@ class MeasureKind(StrEnum):
 
 @dataclass(frozen=True, order=True)
 class Tried:
-    """A layout that was looked at: a barrier that got a blast, with some of the measures.
+    """A layout that was assessed: a simulated barrier with some of the measures.
 
     Attributes:
-        worth: By the objective with its target: at most 1 if it passes; see
+        worth: Value of the objective with its target: at most 1 if it passes; see
             `ObjectiveSection.counted`.
-        cost: What it costs.
-        damage: The worst damage of all components under every charge, from 0 to 5; see
+        cost: Its cost, in the unit of the zone's budget.
+        damage: The worst damage of all components under all charges, from 0 to 5; see
             `blast_env.response.damage`.
         layout: The layout.
     """
@@ -91,9 +91,9 @@ class Advice:
 
     Attributes:
         kind: The kind.
-        best: The cheapest that passes, else the one with the least shortfall.
-        blasts: Blasts that were asked for.
-        tried: All that was looked at.
+        best: The cheapest layout that passes, or else the one with the least shortfall.
+        blasts: Blasts requested.
+        tried: All assessed layouts.
     """
 
     kind: MeasureKind
@@ -108,17 +108,17 @@ class Advice:
 
     @property
     def worth(self) -> float:
-        """What it is worth."""
+        """Value of the objective for the layout; at most 1 if it passes."""
         return self.best.worth
 
     @property
     def passes(self) -> bool:
-        """Whether it reaches the target, by the blasts of the search."""
+        """Whether the layout reaches the target under the blasts of the search."""
         return self.worth <= 1.0
 
 
 def kinds_for(scenario: Scenario) -> tuple[MeasureKind, ...]:
-    """Return the kinds of measures that a scenario has on offer, nothing first."""
+    """Return the kinds of measures available in a scenario, `NOTHING` first."""
     kinds = [MeasureKind.NOTHING]
     kinds += [
         kind for kind in (MeasureKind.KEEP_AWAY, MeasureKind.SHIELD) if _items_of(scenario, kind)
@@ -128,7 +128,7 @@ def kinds_for(scenario: Scenario) -> tuple[MeasureKind, ...]:
 
 
 def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
-    """Return the scenario with nothing but one kind in stock."""
+    """Return the scenario restricted to one kind of measures."""
     zone = scenario.zone
     names = _items_of(scenario, kind)
     items = tuple(
@@ -169,17 +169,17 @@ def advise(
 ) -> Advice:
     """Return the best layout of a kind of measures.
 
-    First the rules' layouts, those against each charge alone, and parts of them, then changes of
-    the best: moves of pieces, and fewer of them.
+    The search starts with the rules' layouts, those against each charge alone, and parts of them.
+    It then changes the best by moving or removing pieces.
 
     Args:
-        problem: Of a scenario whose objective has a target.
+        problem: Problem of a scenario whose objective has a target.
         kind: The kind.
-        budget: Most blasts.
-        seed: Decides what is drawn.
-        begin_with: Layouts to begin with: those of kinds that were tried before.
+        budget: Largest number of blasts.
+        seed: Seed of all random draws.
+        begin_with: Initial layouts, for example of other kinds.
         progress: Called with the share of the blasts that is spent.
-        damage_below: What the worst damage must be below as well, for a margin to the target.
+        damage_below: Exclusive bound on the worst damage, for a margin to the target.
     """
     scenario, rng = only(problem.scenario, kind), generator(seed)
     meter = BlastMeter(budget)
@@ -235,19 +235,19 @@ def advise_until(
     *,
     rounds: int = 1,
 ) -> Advice:
-    """Return the best of several searches, until a judge passes what one of them finds.
+    """Search until a judge passes the best layout, and return the best of all searches.
 
-    Each search after the first one wants a margin to what failed before the judge.
+    Each search after the first requires a margin to the damage of the layout that the judge failed.
 
     Args:
-        judge: What the judge says of a layout.
+        judge: Returns the verdict on a layout.
         problem: As for `advise`.
         kind: The kind.
-        budget: Most blasts of a search.
-        seed: Decides what is drawn.
-        begin_with: Layouts to begin with.
+        budget: Largest number of blasts per search.
+        seed: Seed of all random draws.
+        begin_with: Initial layouts.
         progress: Called with the share of the searches that is done.
-        rounds: Most searches.
+        rounds: Largest number of searches.
     """
     every: list[Advice] = []
     below = inf
@@ -270,14 +270,15 @@ def advise_until(
 
 
 def best_of(found: Iterable[Advice], judge: Callable[[Layout], AdviceVerdict]) -> Advice:
-    """Return the cheapest of those that the judge says most for, or the one nearest to passing."""
+    """Return the result with the best verdict; among equals the cheapest or nearest to passing."""
     return min(found, key=lambda each: (-judge(each.layout), each.best))
 
 
 def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
-    """Yield for each rule its layouts against each of several charges, all together.
+    """Yield for each rule the union of its layouts against several charges.
 
-    Each charge gets the same share of the budget.
+    Each charge gets an equal share of the budget. Nothing is yielded for a single charge or a
+    zone without a budget.
     """
     distinct, zone = tuple(dict.fromkeys(charges)), scenario.zone
     if len(distinct) < 2 or zone.budget is None:
@@ -299,12 +300,12 @@ def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
 def _hardened(
     problem: LayoutProblem, scenario: Scenario, barrier: Layout, damage_below: float
 ) -> list[Tried]:
-    """Return a barrier with each choice of the measures that what is left of the budget pays for.
+    """Return a barrier with each choice of measures that the rest of the zone's budget pays for.
 
-    The blasts are those of the barrier alone.
+    Only the barrier alone needs blasts.
 
     Raises:
-        BudgetError: If the blasts do not pay for it.
+        BudgetError: If the blasts exceed the budget of the problem.
     """
     names = [each.name for each in scenario.zone.hardening]
     counts = range(len(names) + 1) if len(names) <= _MOST_LOOKED_AT else (0, 1, len(names))
@@ -325,6 +326,6 @@ def _hardened(
 
 
 def _worst_damage(problem: LayoutProblem, layout: Layout) -> float:
-    """Return the worst damage under every charge; the blasts are those that were run before."""
+    """Return the worst damage over all threats, from the blasts that were run before."""
     loads = problem.evaluator.loads_of_many((layout, threat) for threat in problem.threats)
     return worst(each.worst_damage or 0.0 for load in loads for each in load.protected)

@@ -1,4 +1,4 @@
-"""Genetic search and NSGA-II on pymoo, which is imported when one of them runs."""
+"""Genetic search and NSGA-II on pymoo, which is imported on the first run."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Final
@@ -15,28 +15,28 @@ _MOST_POPULATION: Final = 60
 
 
 def population_size(layouts: int) -> int:
-    """Return the size of a population for a search that can try so many layouts.
+    """Return the population size of a search that can assess a number of layouts.
 
-    It grows with the square root: twice the layouts, 1.4 times the population and the generations.
+    Population and generations both grow with the square root of that number.
     """
     return int(np.clip(round(0.7 * layouts**0.5), _LEAST_POPULATION, _MOST_POPULATION))
 
 
 @dataclass(frozen=True)
 class GeneticSearch(Search):
-    """pymoo's `GA` with sampling, crossover, mutation and repair made for layouts.
+    """pymoo's `GA` with sampling, crossover, mutation and repair for layouts.
 
-    The best of the layouts that the first blasts show are the first population; from then on the
-    best of parents and children survive. The population grows with the square root of the layouts
-    that the budget pays for, and half as many children are made at a time.
+    The best initial layouts form the first population; then the best of parents and children
+    survive. The population grows with the square root of the layouts that the budget pays for,
+    and a generation has half as many children.
 
     Attributes:
-        initial: Layouts that are tried first, beside those that are drawn. None by default, so
-            that what is found is the search's own and not a rule's.
-        draw: Draws the layouts to begin with.
-        starting_share: Share of the exploration that goes into them.
-        crossed_share: Share of the pairs of parents that are crossed; all children are changed.
-        more_moves: How likely a child is changed by each further move after the first.
+        initial: Initial layouts, in addition to random ones. None by default, so that results do
+            not derive from a rule.
+        draw: Draws the random initial layouts.
+        starting_share: Share of the exploration spent on random initial layouts.
+        crossed_share: Share of the pairs of parents that are crossed; all children are mutated.
+        more_moves: Probability of each further move of a child after the first.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -72,21 +72,21 @@ class GeneticSearch(Search):
 
 @dataclass(frozen=True)
 class Nsga2Search(Search):
-    """pymoo's `NSGA2` with the operators of the genetic search, and two things to minimise.
+    """pymoo's `NSGA2` with the operators of the genetic search and two objectives.
 
-    Those are the impulse and the number of modules or, with a catalogue, the cost. The result
-    carries the front: what each further module, or all further spending, is worth. Its best
-    layout is the end of the front with the least impulse.
+    The objectives are the load and the number of modules or, with a catalogue, the cost. The
+    result carries the Pareto front, which shows the benefit of each further module or expense. Its
+    best layout is the end of the front with the least load.
 
-    What is held back of the budget lets the front meet the other threats, and then, as far as it
-    goes, the layouts that were just behind it.
+    The reserve of the budget is spent on the other threats for the front and then, as far as it
+    lasts, for the next fronts.
 
     Attributes:
-        initial: Layouts that are in the first population.
-        draw: Draws the other layouts of the first population.
-        crossed_share: Share of the pairs of parents that are crossed; all children are changed.
-        more_moves: How likely a child is changed by each further move after the first.
-        count_share: Share of the moves that add a module or take one away.
+        initial: Layouts of the first population, in addition to random ones.
+        draw: Draws the random layouts of the first population.
+        crossed_share: Share of the pairs of parents that are crossed; all children are mutated.
+        more_moves: Probability of each further move of a child after the first.
+        count_share: Share of the moves that add or remove a module or piece.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -122,5 +122,5 @@ class Nsga2Search(Search):
         evolve(session, algorithm, objectives)
 
     def choose(self, session: SearchSession) -> None:
-        """Let the front meet more threats."""
+        """Assess the front under more threats."""
         session.confirm_front()

@@ -1,4 +1,4 @@
-"""A search as a figure: the best reduction over the blasts spent, and the front if there is one."""
+"""Figures of a search: the best reduction over the blasts spent, and the Pareto front."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ with render_extra():
         PercentFormatter,
     )
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
+# Okabe and Ito's colours, which are distinguishable with any colour vision.
 _COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#0072B2")
 _BEST = "#0072B2"
 
@@ -30,8 +30,8 @@ def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
     """Return a figure of a search.
 
     Args:
-        result: What the search found; it has spent blasts.
-        problem: What it was asked.
+        result: The result of the search, which has spent blasts.
+        problem: The problem of the search.
     """
     panels = 2 if result.front else 1
     figure = Figure(figsize=(2.0 + 5.6 * panels, 5.4), layout="constrained")
@@ -59,7 +59,7 @@ def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> N
     history = result.history
     ends = [*(each.blasts for each in history[1:]), max(result.blasts, history[-1].blasts)]
     counts = sorted({each.threats for each in history})
-    # The strongest colour last, for most threats.
+    # The strongest colour last, for the largest number of threats.
     colours = _COLOURS[-len(counts) :] if len(counts) <= len(_COLOURS) else (_BEST,) * len(counts)
     for count, colour in zip(counts, colours, strict=True):
         chosen = [(each, end) for each, end in zip(history, ends, strict=True)]
@@ -89,7 +89,7 @@ def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> N
 
 
 def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) -> None:
-    """Draw the reduction that can be had with so many modules, or for what cost."""
+    """Draw the reduction over the number of modules or, with a catalogue, over the cost."""
     prices = [problem.price(each.layout) for each in front]
     reduction = [problem.reduction(each) for each in front]
     axes.step(prices, reduction, where="post", color=unit_interval(QUIET_INK), linewidth=1.0)

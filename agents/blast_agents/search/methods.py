@@ -1,4 +1,4 @@
-"""Search methods that need no further library, and others that begin with the rules of thumb."""
+"""Search methods without further libraries, and searches that start from the rules of thumb."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -22,11 +22,11 @@ from blast_env.scenario import Placement
 
 @dataclass(frozen=True)
 class RandomSearch(Search):
-    """Tries layouts with every module on a random cell, each independent of the others.
+    """Assesses independent layouts whose modules lie on random cells.
 
     Attributes:
-        initial: Layouts to try first.
-        batch: Layouts that are assessed at a time.
+        initial: Layouts to assess first.
+        batch: Layouts per batch.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -34,7 +34,7 @@ class RandomSearch(Search):
     name: str = "random"
 
     def explore(self, session: SearchSession) -> None:
-        """Try one batch after the other."""
+        """Assess batches of random layouts."""
         scenario, rng = session.problem.scenario, session.rng
         if self.initial:
             session.assess(self.initial)
@@ -44,27 +44,28 @@ class RandomSearch(Search):
 
 @dataclass(frozen=True)
 class GreedySearch(Search):
-    """Places every module on the best of the cells that it tries for it, and never moves one.
+    """Places one module after the other on the best candidate cell, and never moves one.
 
-    With a catalogue it tries pieces in places, and takes the one that takes off most for its cost.
+    With a catalogue, the candidates are pieces in their places, and the one with the largest
+    reduction of the load per cost is placed.
 
-    With enough blasts it tries every cell. With fewer it divides what is left evenly among the
-    modules that are left to place. Half of the cells that it tries are those that took off most
-    when they were tried last: what a cell takes off rarely becomes more when others are taken. The
-    others are drawn among those that were never tried.
+    With enough blasts every cell is a candidate. With fewer, the remaining blasts are divided
+    evenly among the remaining modules. Half of the candidates are the cells with the largest
+    reduction in their last trial, because the reduction by a cell rarely grows as others are
+    occupied. The others are drawn among untried cells.
 
-    A module is placed even if none of the tried cells takes anything off: two may help where one
-    does not. What was best on the way is kept all the same.
+    A module is placed even if no candidate reduces the load: two may help where one does not. The
+    best layout on the way is kept in any case.
 
     Attributes:
-        promising_share: Share of the tried cells that were good before.
+        promising_share: Share of the candidates chosen by their last trial.
     """
 
     promising_share: float = 0.5
     name: str = "greedy"
 
     def explore(self, session: SearchSession) -> None:
-        """Place one after the other until nothing more may be placed."""
+        """Place one element after the other until no more may be placed."""
         placement = Placement.empty(session.problem.scenario)
         (load,) = session.assess([()]).tolist()
         gains: dict[Element, float] = {}
@@ -83,7 +84,7 @@ class GreedySearch(Search):
 
     @staticmethod
     def _worth(placement: Placement, element: Element, gains: dict[Element, float]) -> float:
-        """Return what something took off when it was tried last; with a catalogue, for its cost."""
+        """Return the last reduction by an element; for a piece, the reduction per cost."""
         if not isinstance(element, Piece):
             return gains[element]
         number = placement.catalogue.variant_number(element)
@@ -96,9 +97,9 @@ class GreedySearch(Search):
         count: int,
         rng: np.random.Generator,
     ) -> list[Element]:
-        """Return what to try next: so many pieces or modules, and all measures not tried yet.
+        """Return `count` candidate pieces or modules, and all untried measures.
 
-        A measure takes no blast of its own.
+        A measure needs no blast.
         """
         catalogue = placement.catalogue
         free = [catalogue.element(int(action)) for action in np.flatnonzero(placement.legal)]
@@ -115,9 +116,9 @@ class GreedySearch(Search):
 
 
 def _still_to_place(placement: Placement) -> int:
-    """Return how many modules or pieces may follow, as far as stock and budget tell; one at least.
+    """Return the number of modules or pieces that stock and budget still allow, at least one.
 
-    Of a catalogue those count that the budget pays for if every item has as large a share of it.
+    With a catalogue, the budget is divided by the mean cost of its items.
     """
     left, budget = placement.stock_left, placement.budget_left
     if placement.catalogue.has_items and budget is not None:
@@ -129,18 +130,17 @@ def _still_to_place(placement: Placement) -> int:
 
 @dataclass(frozen=True)
 class AnnealingSearch(Search):
-    """Accepts every better neighbour, and a worse one the less likely the later and the worse.
+    """Simulated annealing: accepts better neighbours, and worse ones by Metropolis's rule.
 
-    It begins with the best of the layouts that the first few blasts show. The temperature falls
-    geometrically over the blasts for exploring, so that it is as cold at the end of a small budget
-    as of a large one.
+    It starts from the best of some initial layouts. The temperature falls geometrically over the
+    exploring blasts, so that the final temperature does not depend on the budget.
 
     Attributes:
-        initial: Layouts to begin with, beside those that are drawn.
-        draw: Draws the layouts to begin with.
-        starting_share: Share of the exploration that goes into them.
-        hot: Temperature at first, as a share of the impulse that it begins with.
-        cold: Temperature at the end, as the same share.
+        initial: Initial layouts, in addition to random ones.
+        draw: Draws the random initial layouts.
+        starting_share: Share of the exploration spent on random initial layouts.
+        hot: Initial temperature, relative to the load of the initial layout.
+        cold: Final temperature, relative to the same load.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -151,7 +151,7 @@ class AnnealingSearch(Search):
     name: str = "annealing"
 
     def explore(self, session: SearchSession) -> None:
-        """Draw some layouts, and go from the best of them from neighbour to neighbour."""
+        """Draw initial layouts, and anneal from the best of them."""
         scenario, rng = session.problem.scenario, session.rng
         count = int(session.plan.exploring_layouts * self.starting_share)
         starts = [*self.initial, *(self.draw(scenario, rng) for _ in range(max(1, count)))]
@@ -170,13 +170,13 @@ class AnnealingSearch(Search):
 
 
 class Cooling:
-    """The temperature, which falls geometrically over the blasts for exploring that are left.
+    """The temperature, which falls geometrically over the remaining exploring blasts.
 
     Args:
-        session: Knows how many are spent.
-        scale: The load that `hot` and `cold` are shares of.
-        hot: Temperature now.
-        cold: Temperature at the end.
+        session: Counts the blasts.
+        scale: The load to which `hot` and `cold` are relative, in the unit of the objective.
+        hot: Initial temperature, relative to `scale`.
+        cold: Final temperature, relative to `scale`.
     """
 
     def __init__(self, session: SearchSession, scale: float, hot: float, cold: float) -> None:
@@ -185,7 +185,7 @@ class Cooling:
 
     @property
     def share(self) -> float:
-        """Share of the way from hot to cold."""
+        """Share of the cooling that is done, from 0 (hot) to 1 (cold)."""
         return (self._session.exploring_share - self._begun) / max(1.0 - self._begun, 1e-9)
 
     @property
@@ -201,20 +201,20 @@ _MOST_WALKERS: Final = 16
 
 @dataclass(frozen=True)
 class WinnersSearch(Search):
-    """Anneals several layouts side by side; from time to time the best take the worst ones' places.
+    """Anneals several layouts in parallel; at intervals the worst walkers restart from the best.
 
-    Each walker accepts every better neighbour, and a worse one the less likely the later and the
-    worse. Single runs of annealing end in different places; of several the good ones are gone on
-    from. The number of walkers grows with the square root of the layouts that the budget pays for.
+    Each walker accepts better neighbours, and worse ones by Metropolis's rule. Single runs of
+    annealing end in different minima; the exchange continues the good ones. The number of walkers
+    grows with the square root of the layouts that the budget pays for.
 
     Attributes:
-        initial: Layouts to begin with, beside those that are drawn.
-        draw: Draws the layouts to begin with.
-        starting_share: Share of the exploration that goes into them.
-        exchanges: How often walkers are exchanged.
-        exchanged_share: Share of the walkers that go on from the best ones' places then.
-        hot: Temperature at first, as a share of the load that the best walker begins with.
-        cold: Temperature at the end, as the same share.
+        initial: Initial layouts, in addition to random ones.
+        draw: Draws the random initial layouts.
+        starting_share: Share of the exploration spent on initial layouts.
+        exchanges: Number of exchanges.
+        exchanged_share: Share of the walkers that restart from the best ones at an exchange.
+        hot: Initial temperature, relative to the load of the best initial walker.
+        cold: Final temperature, relative to the same load.
     """
 
     initial: tuple[Layout, ...] = ()
@@ -227,7 +227,7 @@ class WinnersSearch(Search):
     name: str = "winners"
 
     def explore(self, session: SearchSession) -> None:
-        """Draw some layouts, and let walkers go from the best of them."""
+        """Draw initial layouts, and let walkers start from the best of them."""
         scenario, rng, plan = session.problem.scenario, session.rng, session.plan
         walkers = round(0.4 * plan.exploring_layouts**0.5)
         walkers = int(np.clip(walkers, _LEAST_WALKERS, _MOST_WALKERS))
@@ -237,7 +237,7 @@ class WinnersSearch(Search):
         self._walk(session, session.ranked(plan.threats)[:walkers])
 
     def _walk(self, session: SearchSession, layouts: list[Layout]) -> None:
-        """Let walkers go from neighbour to neighbour until the session ends it."""
+        """Let walkers move from neighbour to neighbour until the session ends."""
         moves, rng, exchanged = Moves(session.problem.scenario), session.rng, 0
         loads = session.assess(layouts)
         cooling = Cooling(session, float(loads.min()), self.hot, self.cold)
@@ -259,17 +259,17 @@ class WinnersSearch(Search):
 
 @dataclass(frozen=True)
 class ExhaustiveSearch(Search):
-    """Tries every layout under every threat, the empty one among them; nothing is drawn.
+    """Assesses every layout, the empty one included, under every threat; it is deterministic.
 
     Attributes:
-        batch: Layouts that are assessed at a time.
+        batch: Layouts per batch.
     """
 
     batch: int = 64
     name: str = "exhaustive"
 
     def plan(self, problem: LayoutProblem, budget: int) -> Plan:
-        """Let every layout meet every threat.
+        """Plan every threat for every layout.
 
         Raises:
             BlastEnvError: If the budget does not pay for all layouts.
@@ -288,14 +288,14 @@ class ExhaustiveSearch(Search):
         return Plan.thorough(problem, budget)
 
     def explore(self, session: SearchSession) -> None:
-        """Try one batch after the other."""
+        """Assess all layouts in batches."""
         layouts = every_layout(session.problem)
         while batch := list(islice(layouts, self.batch)):
             session.assess(batch)
 
 
 def every_layout(problem: LayoutProblem) -> Iterator[Layout]:
-    """Yield every legal layout, those with few modules or pieces first."""
+    """Yield every legal layout, in ascending number of modules or pieces."""
     places = _placeable(problem)
     for count in range(min(problem.stock, len(places)) + 1):
         for layout in combinations(places, count):
@@ -305,56 +305,55 @@ def every_layout(problem: LayoutProblem) -> Iterator[Layout]:
 
 
 def _placeable(problem: LayoutProblem) -> list[Element]:
-    """Return everything that there is room for in the empty zone."""
+    """Return all elements that fit into the empty zone."""
     empty = Placement.empty(problem.scenario)
     actions = np.flatnonzero(empty.places(empty.usable))
     return [empty.catalogue.element(int(action)) for action in actions]
 
 
 def _count_text(count: int) -> str:
-    """Return a count, of which a few digits are enough when it is large."""
+    """Return a count as text, with three digits from a million on."""
     return f"{count:,}" if count < 1_000_000 else f"{count:.3g}"
 
 
 @dataclass(frozen=True)
 class BestRuleSearch(Search):
-    """Lets the layouts of all rules meet the threats, and takes the best: a careful engineer.
+    """Simulates the layouts of all rules and takes the best, as a careful engineer would.
 
-    Of as many rules as the budget pays for; there are at most nine. Against a hidden charge each
-    meets all threats if the budget lasts.
+    The budget limits the rules, of which there are at most nine, and then the threats per layout.
     """
 
     name: str = "best_rule"
 
     def plan(self, problem: LayoutProblem, budget: int) -> Plan:
-        """Let each layout meet as many threats as the budget pays for."""
+        """Plan as many threats per layout as the budget pays for, at least one."""
         layouts = len(_layouts(problem))
         return Plan(max(1, min(len(problem.threats), budget // layouts)), budget)
 
     def explore(self, session: SearchSession) -> None:
-        """Try all of them."""
+        """Assess the layouts of all rules."""
         session.assess(_layouts(session.problem))
 
 
 @dataclass(frozen=True)
 class FromRulesSearch:
-    """Lets another search begin with the layouts of all rules.
+    """Starts a search from the layouts of all rules.
 
     Attributes:
-        method: The other search.
+        method: The search.
     """
 
     method: AnnealingSearch | GeneticSearch | WinnersSearch
 
     @property
     def name(self) -> str:
-        """Name of the other one, and that it begins with the rules."""
+        """Name of the search with the suffix `_from_rules`."""
         return f"{self.method.name}_from_rules"
 
     def propose(
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return what the other search finds."""
+        """Return the result of the search."""
         method = replace(self.method, initial=_layouts(problem))
         return replace(method.propose(problem, budget, seed, report), method=self.name)
 
@@ -365,5 +364,5 @@ GENETIC_FROM_RULES: Final = FromRulesSearch(GeneticSearch())
 
 
 def _layouts(problem: LayoutProblem) -> tuple[Layout, ...]:
-    """Return the rules' layouts, each once."""
+    """Return the distinct layouts of the rules."""
     return tuple(dict.fromkeys(layouts_by_rule(problem.scenario, problem.told).values()))

@@ -1,4 +1,4 @@
-"""Small changes of layouts, every one of them legal."""
+"""Small changes of layouts; every result is legal."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from blast_env.geometry import Element, Layout, Piece
 from blast_env.scenario import Catalogue, Placement, Scenario
 
 Draw = Callable[[Scenario, np.random.Generator], Layout]
-"""Draws a legal layout to begin with."""
+"""Draws a legal initial layout."""
 
 _LEAST_WALL: Final = 2
 
 
 def legal_part(scenario: Scenario, layout: Iterable[Element]) -> Placement:
-    """Return the placement of a layout, in its order, leaving out what may not stand.
+    """Return the placement of a layout, in its order, without its illegal elements.
 
     Args:
         scenario: The scenario.
-        layout: Modules or pieces, also of cells that do not exist.
+        layout: Modules or pieces; those on cells outside the zone are illegal.
     """
     placement = Placement.empty(scenario)
     for element in layout:
@@ -34,11 +34,11 @@ def legal_part(scenario: Scenario, layout: Iterable[Element]) -> Placement:
 
 
 def random_walls(scenario: Scenario, rng: np.random.Generator) -> Layout:
-    """Return a layout of straight walls: where, in which direction and how long is random.
+    """Return a layout of straight walls of random position, direction and length.
 
-    It knows nothing of charge and structures, only that what stands in the way of a blast is a
-    wall rather than lone modules. A wall ends where nothing may be placed; there are as many walls
-    as the stock lasts for. With a catalogue each wall is of one item, drawn at random, in line.
+    The layout is independent of the charge and the structures; walls obstruct a blast better than
+    isolated modules. A wall ends at the first illegal cell, and walls are added until the stock is
+    used up. With a catalogue, each wall consists of one item, drawn at random, in line.
     """
     placement = Placement.empty(scenario)
     grow = _with_pieces if placement.catalogue.has_items else _with_modules
@@ -72,7 +72,7 @@ def _with_pieces(placement: Placement, rng: np.random.Generator) -> Placement:
 
 
 def _as_far_as_legal(placement: Placement, wall: Iterable[Element]) -> Placement:
-    """Place the elements of a wall up to the first that may not stand."""
+    """Place the elements of a wall up to the first illegal one."""
     for element in wall:
         if not _is_legal(placement, element):
             break
@@ -81,7 +81,7 @@ def _as_far_as_legal(placement: Placement, wall: Iterable[Element]) -> Placement
 
 
 def _is_legal(placement: Placement, element: Element) -> bool:
-    """Whether an element may be placed, also one outside of the zone."""
+    """Return whether an element may be placed; one outside the zone may not."""
     rows, columns = placement.usable.shape
     row, column = element[:2]
     if not (0 <= row < rows and 0 <= column < columns):
@@ -90,7 +90,7 @@ def _is_legal(placement: Placement, element: Element) -> bool:
 
 
 def random_part(scenario: Scenario, rng: np.random.Generator) -> Layout:
-    """Return the first few modules of random walls, any number as likely, down to none."""
+    """Return the first modules of random walls, their number uniform from none to all."""
     layout = random_walls(scenario, rng)
     return layout[: int(rng.integers(len(layout) + 1))]
 
@@ -101,12 +101,13 @@ class Moves:
 
     Attributes:
         scenario: The scenario.
-        reach_cells: Standard deviation of the way that a module, a piece or a wall is moved.
-        far_share: Share of the moves in which a module or piece goes anywhere.
-        wall_share: Share of the moves in which all that hangs together with one of them moves.
-        count_share: Share of the moves that add a module or piece, or take one away.
-        item_share: With a catalogue, share of the moves that put other items, or the same one
-            turned, in the place of a piece: as many as stock and budget allow.
+        reach_cells: Standard deviation of the displacement of a module, a piece or a wall, in
+            cells.
+        far_share: Share of the moves that relocate a module or piece to a random place.
+        wall_share: Share of the moves that displace a connected group of modules or pieces.
+        count_share: Share of the moves that add or remove a module or piece.
+        item_share: With a catalogue, share of the moves that replace a piece by up to three
+            others (or the same one rotated), as stock and budget allow.
     """
 
     scenario: Scenario
@@ -117,14 +118,19 @@ class Moves:
     item_share: float = 0.2
 
     def near_best(self, best: Sequence[Layout], rng: np.random.Generator) -> Layout:
-        """Return one of some layouts, the first ones more often, one or two moves on; sorted."""
+        """Return a sorted neighbour, one or two moves from a layout drawn in favour of the first.
+
+        Args:
+            best: Layouts, the best first; the probability falls exponentially with the rank.
+            rng: Draws the layout and the moves.
+        """
         layout = best[min(int(rng.exponential(1.0)), len(best) - 1)]
         for _ in range(1 + int(rng.random() < 0.4)):
             layout = self.neighbour(layout, rng)
         return tuple(sorted(layout))
 
     def neighbour(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Return a layout that differs a little; all conditions of the build zone hold."""
+        """Return a slightly different layout that satisfies all conditions of the zone."""
         if not layout:
             return self._added(layout, rng)
         kind = rng.random()
@@ -139,7 +145,7 @@ class Moves:
         return self._moved(layout, rng)
 
     def _added(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Add something beside what stands; if nothing may be added, move something."""
+        """Add an element near an existing one, or move one if none may be added."""
         placement = Placement(self.scenario, layout)
         if placement.is_full:
             return self._moved(layout, rng) if layout else layout
@@ -151,7 +157,7 @@ class Moves:
         return _without(layout, int(rng.integers(len(layout))))
 
     def _moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Move one a little way, from where it is or to beside another one; it stays what it is."""
+        """Move an element near its present place or near another element; its item is kept."""
         index = int(rng.integers(len(layout)))
         rest = Placement(self.scenario, _without(layout, index))
         to_another = len(layout) > 1 and rng.random() < 0.5
@@ -159,14 +165,14 @@ class Moves:
         return rest.place(self._near(rest, beside, rng, layout[index], like=layout[index])).layout
 
     def _swapped(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Take one away and put something anywhere."""
+        """Remove an element and place another one at random."""
         rest = Placement(self.scenario, _without(layout, int(rng.integers(len(layout)))))
         return rest.place(random_element(rest, rng)).layout
 
     def _exchanged(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Take a piece away, perhaps another one too, and put others there.
+        """Replace one or two pieces by up to three others near the first.
 
-        One dear piece can so become several cheap ones, and a long low wall a short high one.
+        An expensive piece can become several cheap ones, and a long low wall a short high one.
         """
         index = int(rng.integers(len(layout)))
         there, rest = layout[index], _without(layout, index)
@@ -180,7 +186,7 @@ class Moves:
         return placement.layout
 
     def _wall_moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
-        """Move what hangs together with one of them, or all, by the same way."""
+        """Displace a connected group, or the whole layout, by one random vector."""
         wall = self._connected(layout, _any_of(layout, rng))
         if rng.random() < 0.3:
             wall = set(layout)
@@ -188,7 +194,7 @@ class Moves:
         moved = [_shifted(each, up, right) for each in layout if each in wall]
         stay = [each for each in layout if each not in wall]
         placement = legal_part(self.scenario, [*stay, *moved])
-        # What cannot go along is put beside what could.
+        # Elements that cannot be displaced are placed near those that can.
         while len(placement.layout) < len(layout) and not placement.is_full:
             if not placement.layout:
                 return layout
@@ -204,9 +210,14 @@ class Moves:
         but: Element | None = None,
         like: Element | None = None,
     ) -> Element:
-        """Return something that can be placed near an element; something besides `but` should be.
+        """Return a legal element near another, drawn with Gaussian weights of its distance.
 
-        It is not `but`, unless nothing else is possible; of the item of `like`, if that is.
+        Args:
+            placement: The placement; at least one element may be added.
+            beside: The element to place it near.
+            rng: Draws it.
+            but: Excluded element, unless no other is legal.
+            like: Preferred item; a random one if none of it may be placed, or with `None`.
         """
         legal, catalogue = placement.legal, placement.catalogue
         if catalogue.has_items:
@@ -226,7 +237,7 @@ class Moves:
         return catalogue.element_at(int(numbers[index]), int(rows[index]), int(columns[index]))
 
     def _connected(self, layout: Layout, start: Element) -> set[Element]:
-        """Return what hangs together with one element, corners included."""
+        """Return the elements connected with one element, by edges or corners."""
         catalogue = self.scenario.zone.catalogue
         found, todo, left = {start}, [start], set(layout) - {start}
         while todo and left:
@@ -241,7 +252,10 @@ class Moves:
 
 
 def _of_one_item(placement: Placement, rng: np.random.Generator, like: Element | None) -> BoolArray:
-    """Return where pieces of one item may be placed: of one that is wanted, or of a random one."""
+    """Return the legal places (variants, rows, columns) of one item.
+
+    It is the item of `like`, or a random one if that has no legal place or `like` is `None`.
+    """
     items = np.array([each.item for each in placement.catalogue.variants])
     possible = np.unique(items[placement.legal.any(axis=(1, 2))]).tolist()
     wanted = None if like is None else placement.catalogue.variant(like).item
@@ -253,9 +267,9 @@ def _of_one_item(placement: Placement, rng: np.random.Generator, like: Element |
 def _gaps(
     catalogue: Catalogue, places: Sequence[NDArray[np.int64]] | NDArray[np.int64], beside: Element
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return how many rows and columns lie between places and an element; 1 if they touch.
+    """Return the distances in rows and columns between places and an element; 1 if they touch.
 
-    Places are numbers of variants, rows and columns of their lower left cells.
+    Places are the numbers of the variants, and the rows and columns of their lower left cells.
     """
     numbers, rows, columns = places
     sizes = np.array([(each.rows, each.columns) for each in catalogue.variants])[numbers]
@@ -268,7 +282,7 @@ def _gaps(
 
 
 def _shifted(element: Element, up: int, right: int) -> Element:
-    """Return an element so many cells further up and to the right."""
+    """Return an element displaced by a number of cells upwards and to the right."""
     row, column = element[0] + up, element[1] + right
     return element._replace(row=row, column=column) if isinstance(element, Piece) else (row, column)
 

@@ -1,4 +1,4 @@
-"""What pymoo's algorithms need to work on layouts: crossover, mutation, repair, and the loop.
+"""Operators of pymoo's algorithms for layouts: crossover, mutation, repair, and the main loop.
 
 Needs the extra `search`.
 """
@@ -30,7 +30,7 @@ __all__ = ["GA", "NSGA2", "LayoutRepair", "MoveMutation", "SpatialCrossover", "e
 
 
 def individual(scenario: Scenario, layout: Layout) -> BoolArray:
-    """Return a layout as an individual: what is placed, by the number of its action (actions,)."""
+    """Return a layout as an individual (actions,): True for the action of each element."""
     catalogue = scenario.zone.catalogue
     actions = np.zeros(catalogue.finish, dtype=bool)
     actions[[catalogue.action(element) for element in layout]] = True
@@ -44,20 +44,20 @@ def layout_of(scenario: Scenario, actions: BoolArray) -> Layout:
 
 
 _MIXED_SHARE: Final = 0.3
-"""Share of the crossed pairs that are mixed and not cut."""
+"""Share of the crossed pairs whose modules are mixed; the others are cut along a line."""
 
 
 class SpatialCrossover(Crossover):
-    """Children with the modules of one parent on one side and the other's on the other side.
+    """Crossover of layouts along a line: each side of a child comes from another parent.
 
-    What works in a layout is a group of modules near each other, which a cut along a line in a
-    random direction mostly leaves whole. In some of the pairs a child draws its modules from those
-    of both parents instead, so that two walls in one place can become one. A child has as many
-    modules as one of its parents, unless two fall on one cell.
+    Groups of adjacent modules protect, and a cut along a line in a random direction mostly
+    preserves them. In some pairs a child draws its modules from those of both parents instead, so
+    that two walls in one place can become one. A child has as many modules as one of its parents,
+    unless modules of both coincide.
 
     Args:
         scenario: The scenario.
-        prob: Share of the pairs that are crossed at all.
+        prob: Share of the pairs that are crossed.
     """
 
     def __init__(self, scenario: Scenario, prob: float) -> None:
@@ -77,7 +77,7 @@ class SpatialCrossover(Crossover):
 
 
 def cut(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
-    """Return what comes first in one layout and last in another in some direction."""
+    """Return the first elements of one layout and the last of another, in a random direction."""
     angle = rng.uniform(0.0, 2.0 * pi)
 
     def along(cell: Element) -> float:
@@ -96,11 +96,11 @@ def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
 
 
 class MoveMutation(Mutation):
-    """A few moves of the neighbourhood that annealing uses too.
+    """Mutation by one or more moves of the neighbourhood that annealing uses too.
 
     Args:
         moves: The neighbourhood.
-        more: How likely each further move is after the first.
+        more: Probability of each further move after the first.
     """
 
     def __init__(self, moves: Moves, more: float) -> None:
@@ -122,7 +122,7 @@ class MoveMutation(Mutation):
 
 
 class LayoutRepair(Repair):
-    """Leaves out modules or pieces of a child, at random, until all conditions hold.
+    """Removes random modules or pieces of a child until all conditions hold.
 
     Args:
         scenario: The scenario.
@@ -140,7 +140,7 @@ class LayoutRepair(Repair):
 
 
 def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> Layout:
-    """Return as much of a layout as may stand: what is left out is chosen at random."""
+    """Return a legal part of a layout; the elements to drop are chosen at random."""
     stock = scenario.zone.stock
     if len(layout) > stock:
         kept = rng.choice(len(layout), size=stock, replace=False)
@@ -153,19 +153,19 @@ def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> La
 
 
 Objectives = Callable[[list[Layout]], NDArray[np.float64]]
-"""Returns what is minimised for each of the layouts (layouts, objectives)."""
+"""Returns the values to minimise (layouts, objectives)."""
 
 
 def operators(
     moves: Moves, first: Sequence[Layout], crossed_share: float, more_moves: float
 ) -> dict[str, Any]:
-    """Return pymoo's arguments for how layouts are crossed, changed and repaired.
+    """Return pymoo's arguments for sampling, crossover, mutation and repair of layouts.
 
     Args:
         moves: The neighbourhood that mutation draws from.
-        first: The layouts of the first population; what is there twice is left out.
+        first: The layouts of the first population; pymoo drops duplicates.
         crossed_share: Share of the pairs of parents that are crossed.
-        more_moves: How likely a child is changed by each further move after the first.
+        more_moves: Probability of each further move of a child after the first.
     """
     scenario = moves.scenario
     return {
@@ -178,12 +178,12 @@ def operators(
 
 
 def evolve(session: SearchSession, algorithm: Any, objectives: Objectives) -> None:
-    """Let an algorithm go on until the session ends it or it finds no new layouts.
+    """Run an algorithm until the session ends it or it finds no new layouts.
 
     Args:
-        session: Ends it by `SearchEndedError`; its seed decides everything that is drawn.
+        session: Ends the run by `SearchEndedError`; its seed determines all random draws.
         algorithm: One of pymoo's genetic algorithms.
-        objectives: Asks the session.
+        objectives: Returns the objectives of layouts, by way of the session.
     """
     scenario = session.problem.scenario
     count = objectives([]).shape[1]

@@ -1,4 +1,4 @@
-"""What a proposer is asked, and what it answers: a rule, a search, or something that has learnt."""
+"""The contract of proposers (rules, searches and trained agents): problem, progress and result."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -24,17 +24,17 @@ if TYPE_CHECKING:  # takes a third of a second to import
 
 @dataclass(frozen=True, eq=False)
 class LayoutProblem:
-    """A case to search a layout for, and what runs its blasts.
+    """A case to search a layout for, and the evaluator that runs its blasts.
 
     Attributes:
-        evaluator: Runs the blasts and remembers them.
-        case: What layouts meet, and how that becomes one number. A search may look at the first
-            few threats alone, so different charges should come first.
-        processes: Worker processes; they change nothing but the time.
-        meter: Counts the blasts that are asked for; `None` counts none.
+        evaluator: Runs the blasts and caches their loads.
+        case: The scenario and the threats, and how their loads combine into one number. A search
+            may use only the first few threats, so different charges should come first.
+        processes: Worker processes; results do not depend on their number.
+        meter: Counts the blasts requested; `None` counts none.
 
     Raises:
-        BlastEnvError: If a threat is there twice, the scenario has no build zone, or `processes` is
+        BlastEnvError: If a threat is repeated, the scenario has no build zone, or `processes` is
             below 1.
     """
 
@@ -56,50 +56,50 @@ class LayoutProblem:
 
     @property
     def threats(self) -> tuple[Threat, ...]:
-        """What layouts meet."""
+        """The threats of the case."""
         return self.case.threats
 
     @property
     def stock(self) -> int:
-        """Most modules or pieces that a layout may have."""
+        """Largest number of modules or pieces in a layout."""
         return self.scenario.zone.stock
 
     def price(self, layout: Layout) -> float:
-        """Return what a layout takes: its modules or, with a catalogue, what its pieces cost."""
+        """Return the number of modules of a layout or, with a catalogue, the cost of its pieces."""
         return self.cost(layout) if self.scenario.zone.items else len(layout)
 
     def cost(self, layout: Layout) -> float:
-        """Return what a legal layout costs, in the unit of the zone's budget."""
+        """Return the cost of a legal layout, in the unit of the zone's budget."""
         return Placement(self.scenario, layout).cost
 
     @property
     def told(self) -> AnyCharge | None:
-        """The charge if it is known: the same one in all threats."""
+        """The charge if it is known, that is, the same in all threats; otherwise `None`."""
         known = set(self.case.charges)
         return known.pop() if len(known) == 1 else None
 
     def metered(self, budget: int) -> "LayoutProblem":
-        """Return the same problem, which pays for so many blasts and no more.
+        """Return the same problem with a budget of blasts.
 
-        The loads without a barrier, `unprotected`, are free.
+        The loads without a barrier, `unprotected`, are not charged to the budget.
         """
         return replace(self, meter=BlastMeter(budget))
 
     @property
     def blasts_run(self) -> int:
-        """Blasts that were asked for or, where those are more, simulated past the meter.
+        """Blasts requested from the meter, or blasts simulated by the evaluator if those are more.
 
-        Without those of `unprotected`. The evaluator has to be a fresh one that forgets nothing.
+        Those of `unprotected` are excluded. The evaluator must be new and keep all loads.
         """
         free = len(self.threats) if "unprotected" in vars(self) else 0
         asked = 0 if self.meter is None else self.meter.blasts
         return max(asked, self.evaluator.blasts - free)
 
     def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
-        """Return the load that counts in each blast, in the unit of the scenario's objective.
+        """Return the load of each blast, in the unit of the scenario's objective.
 
         Raises:
-            BudgetError: If the problem is metered, and its budget does not pay for them.
+            BudgetError: If the problem is metered and the blasts exceed its budget.
             LayoutError: If a layout does not fit the build zone.
         """
         if self.meter is not None:
@@ -111,7 +111,7 @@ class LayoutProblem:
         return [each.load(self.scenario.objective) for each in loads]
 
     def load(self, layout: Sequence[Element]) -> float:
-        """Return the load with a layout over all threats, in that unit.
+        """Return the load of a layout over all threats, in the unit of the objective.
 
         Raises:
             BudgetError: As for `loads`.
@@ -122,7 +122,9 @@ class LayoutProblem:
 
     @cached_property
     def unprotected(self) -> tuple[float, ...]:
-        """The load without a barrier, in that unit, one a threat; it counts in no search's budget.
+        """The load without a barrier, one per threat, in the unit of the objective.
+
+        These blasts are not charged to any budget.
 
         Raises:
             BlastEnvError: If nothing arrives: there is nothing to reduce.
@@ -132,21 +134,21 @@ class LayoutProblem:
         return tuple(bare)
 
     def reduction(self, candidate: "Candidate") -> float:
-        """Return by which share a layout lowers the load under the threats that it has met."""
+        """Return the relative reduction of the load, under the threats of the candidate."""
         bare = self.case.counted(self.unprotected[: candidate.threats])
         return reductions(candidate.load, bare).item()
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A layout and what the search knew of it.
+    """A layout with its load and cost, at one point of a search.
 
     Attributes:
-        blasts: Blasts that the search had spent by then.
+        blasts: Blasts spent by the search up to this point.
         layout: Its cells or pieces, sorted.
-        load: What the scenario's objective counts over the threats that it had met, in its unit.
-        threats: How many threats that were, counted from the first.
-        cost: What its modules or pieces cost, in the unit of the zone's budget.
+        load: Value of the scenario's objective under the first `threats` threats, in its unit.
+        threats: Number of threats under which the layout was assessed, counted from the first.
+        cost: Cost of its modules or pieces, in the unit of the zone's budget.
     """
 
     blasts: int
@@ -158,13 +160,13 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a proposer has come.
+    """The progress of a proposer.
 
     Attributes:
         blasts: Blasts spent.
-        budget: Most that it may spend; 0 for one that spends none.
-        best: The best layout so far by blasts; `None` before the first.
-        guessed: Of a proposer that spends none, the share of its work that is done.
+        budget: Largest number of blasts; 0 for a proposer that spends none.
+        best: The best simulated layout so far; `None` before the first.
+        guessed: Estimated share of the work that is done, for a proposer that spends no blasts.
     """
 
     blasts: int
@@ -174,36 +176,36 @@ class Progress:
 
     @property
     def share(self) -> float:
-        """Share of the work that is done, about."""
+        """Approximate share of the work that is done."""
         return self.blasts / self.budget if self.budget else self.guessed
 
 
 Report = Callable[[Progress], None]
-"""Is told after every batch of blasts how far a proposer has come."""
+"""Called with the progress of a proposer after every batch of blasts."""
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a proposer proposes, and how it came to that.
+    """A proposed layout, with an account of the search that found it.
 
     Attributes:
         layout: The layout, its cells sorted; empty if a search ended before it had one.
         method: Name of the proposer.
-        by: What has proposed it where a proposer asks others, in words.
-        gain: Share of what counts that it is expected to take off, by what has proposed it; `None`
-            where that expects nothing.
-        load: Its load over the threats that it has met, in the unit of the scenario's objective;
-            `None` without a blast. A search chose it by these blasts: on others it is somewhat
-            more.
-        threats: How many threats it has met.
-        blasts: Blasts spent: distinct pairs of layout and threat that were asked for, whatever a
-            cache knew of them.
-        budget: Most that might have been spent.
-        seed: What decided everything that was drawn.
-        history: The best layout each time that it changed.
-        interrupted: Whether it was ended from outside (Ctrl-C) before it was through.
-        front: The layouts of which none has both less load and fewer modules (or, with a
-            catalogue, a lower cost), by that number; only of methods that search for it.
+        by: Description of the source of the layout, for a proposer that consults others.
+        gain: Relative reduction of the load that the proposer predicts; `None` without a
+            prediction.
+        load: Its load under the first `threats` threats, in the unit of the scenario's objective;
+            `None` without a blast. A search selected the layout on these blasts, so that its load
+            on other blasts is somewhat larger.
+        threats: Number of threats under which the layout was assessed.
+        blasts: Blasts spent: distinct pairs of layout and threat that were requested, whether
+            cached or not.
+        budget: Largest number of blasts.
+        seed: Seed of all random draws.
+        history: The best layout each time it changed.
+        interrupted: Whether Ctrl-C ended the search early.
+        front: The Pareto front of load and number of modules (or, with a catalogue, cost), in
+            ascending order of the latter; only of methods that search for it.
     """
 
     layout: Layout
@@ -221,29 +223,29 @@ class SearchResult:
 
     @property
     def expectation(self) -> str:
-        """The gain that is expected, in words; empty where none is known."""
+        """The predicted gain as text; empty without a prediction."""
         return "" if self.gain is None else f"expected to take off {100.0 * self.gain:.1f} %"
 
     def best_at(self, blasts: int) -> Candidate | None:
-        """Return the best layout after so many blasts, or `None` if there was none yet.
+        """Return the best layout after a number of blasts, or `None` if there was none yet.
 
-        A search plans for its whole budget. What it has after part of it is less than what a
-        search with that budget finds.
+        A search plans for its whole budget. Its best layout after part of the budget is worse than
+        that of a search with the smaller budget.
         """
         by_then = [each for each in self.history if each.blasts <= blasts]
         return by_then[-1] if by_then else None
 
     def history_table(self) -> "pd.DataFrame":
-        """Return one row each time that the best layout changed."""
+        """Return one row per change of the best layout."""
         return _table(self.history)
 
     def front_table(self) -> "pd.DataFrame":
-        """Return one row a layout of the front."""
+        """Return one row per layout of the front."""
         return _table(self.front)
 
 
 def _table(candidates: tuple[Candidate, ...]) -> "pd.DataFrame":
-    # Here, because it takes a third of a second to import.
+    # Imported here because the import takes a third of a second.
     import pandas as pd
 
     rows = [
@@ -258,7 +260,7 @@ def _table(candidates: tuple[Candidate, ...]) -> "pd.DataFrame":
 
 
 class Proposer(Protocol):
-    """Proposes a layout for a case: a rule, a search, or something that has learnt."""
+    """Proposes a layout for a case: a rule, a search or a trained agent."""
 
     @property
     def name(self) -> str:
@@ -269,51 +271,52 @@ class Proposer(Protocol):
     ) -> SearchResult:
         """Return a layout, for instance as `SearchResult(layout)`.
 
-        The same arguments give the same layout. Ctrl-C ends a search: the best so far is returned.
+        The same arguments give the same layout. Ctrl-C ends a search, which returns its best
+        layout so far.
 
         Args:
-            problem: What is minimised. `problem.load` and `problem.loads` run blasts.
-            budget: Most blasts that may be spent; see `SearchResult.blasts`.
-            seed: Decides everything that is drawn.
-            report: Is told how far it has come.
+            problem: The problem to minimise. `problem.load` and `problem.loads` run blasts.
+            budget: Largest number of blasts; see `SearchResult.blasts`.
+            seed: Seed of all random draws.
+            report: Called with the progress.
 
         Raises:
-            BlastEnvError: If it cannot do anything with the budget or the site.
+            BlastEnvError: If the proposer is not applicable to the budget or the site.
         """
 
 
 class LayoutAgent(Protocol):
-    """Proposes a layout for a site, at once: no blast is simulated."""
+    """Proposes a layout for a site without simulating a blast."""
 
     def propose(self, scenario: Scenario, charge: AnyCharge | None = None, /) -> Layout:
-        """Return a layout that keeps every condition of the build zone; always the same one.
+        """Return a layout that satisfies all conditions of the build zone; it is deterministic.
 
         Args:
             scenario: The scenario; it has a build zone.
-            charge: Where the charge is, if that is known; otherwise the layout is for all the
-                places where the scenario may have one.
+            charge: The charge, if it is known; otherwise the layout is for all charges of the
+                scenario.
         """
 
 
 class SamplingAgent(LayoutAgent, Protocol):
-    """Proposes a layout, and draws others."""
+    """Proposes a layout, and samples others."""
 
     def sample(
         self, scenario: Scenario, charge: AnyCharge | None = None, count: int = 8, seed: int = 0, /
     ) -> Sequence[Layout]:
-        """Return layouts that it draws; some may be equal."""
+        """Return `count` random layouts; some may be equal."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A layout that was proposed, and what that took: what a league keeps.
+    """A proposed layout with the time and blasts spent on it, as a league stores it.
 
     Attributes:
         layout: Its cells or pieces.
-        seconds: Time until the layout was there.
-        blasts: Blasts spent on it, of the engine that judges.
-        other_blasts: Blasts of another engine spent on it, for a method's own purposes.
-        cpu_s: Processor time that it took, of this process.
+        seconds: Wall time of the proposal, in s.
+        blasts: Blasts spent on it, of the judging engine.
+        other_blasts: Blasts spent on it, of other engines that the method uses.
+        cpu_s: Processor time of this process, in s.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -326,7 +329,7 @@ class Proposal:
 
 
 def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
-    """Return a layout that takes no blast, and how long it took."""
+    """Return a layout that needs no blast, with the time of its computation."""
     began_s, began_cpu_s = perf_counter(), process_time()
     layout = propose()
     seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s

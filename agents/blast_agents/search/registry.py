@@ -1,6 +1,6 @@
-"""The proposers that come with the package, by name: a new one is a file and a line here.
+"""The proposers of the package, by name: a new one is a file and a line here.
 
-`blast-env search`, `propose` and `league`, the page and the studies list what is here.
+`blast-env search`, `propose` and `league`, the page and the studies list these proposers.
 """
 
 import re
@@ -17,31 +17,31 @@ from blast_env.geometry import Layout
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 
 Rule = Callable[[AnyScenario, AnyCharge | None], Layout]
-"""Gives a layout for a charge, without a blast; `None`: the charge is not known."""
+"""Returns a layout for a charge without a blast; `None` for an unknown charge."""
 
 DEFAULT_BUDGET: Final = 200
-"""Blasts of a search."""
+"""Default budget of a search, in blasts."""
 
 
 class ProposerKind(Enum):
-    """What a proposer is."""
+    """Kinds of proposers."""
 
     RULE = "rule"
     """Follows from the site alone: neither blasts nor training."""
     SEARCH = "search"
-    """Spends blasts on the very case."""
+    """Spends blasts on the case itself."""
     LEARNT = "learnt"
-    """Goes by what blasts on other cases have taught it."""
+    """Was trained on blasts of other cases."""
 
 
 class Need(Enum):
-    """What a site must have for a proposer to be of use there."""
+    """Properties that a proposer may require of a site."""
 
     CATALOGUE = "catalogue (build_zone.items)"
     VEHICLE = "vehicle (a source of kind 'vehicle')"
 
     def is_met(self, scenario: Scenario) -> bool:
-        """Whether a scenario has it."""
+        """Return whether a scenario has the property."""
         if self is Need.CATALOGUE:
             return bool(scenario.zone.items)
         return bool(scenario.vehicles)
@@ -49,15 +49,15 @@ class Need(Enum):
 
 @dataclass(frozen=True)
 class ProposerRow:
-    """A proposer, and what must be known of it before it is imported.
+    """The description of a proposer, available before its import.
 
     Attributes:
-        place: "module:name", as text: only what is used is imported. A rule is a function
-            (`Rule`); else it is a `Proposer`, or its class.
-        title: What people call it.
-        kind: What it is.
-        needs: What a site must have for it. Lists of what suits a site leave it out elsewhere.
-        budget: Blasts unless told otherwise.
+        place: "module:name", as text, so that only the proposers in use are imported. For a rule,
+            a function (`Rule`); otherwise a `Proposer` or its class.
+        title: Name for readers.
+        kind: Kind of the proposer.
+        needs: Properties that it requires of a site. Lists for other sites omit it.
+        budget: Default budget, in blasts.
     """
 
     place: str
@@ -67,12 +67,12 @@ class ProposerRow:
     budget: int = DEFAULT_BUDGET
 
     def suits(self, scenario: Scenario) -> bool:
-        """Whether a scenario has what it needs."""
+        """Return whether a scenario has all required properties."""
         return all(need.is_met(scenario) for need in self.needs)
 
 
 def _rules(module: str, *titles: str, needs: Collection[Need] = ()) -> Mapping[str, ProposerRow]:
-    """Return the rows of rules whose functions have the words of their titles for a name."""
+    """Return the rows of rules whose functions are named after their titles."""
     names = {re.sub(r" (the|a)(?= )", "", title).replace(" ", "_"): title for title in titles}
     return {
         name: ProposerRow(f"{module}:{name}", title, ProposerKind.RULE, needs, budget=0)
@@ -134,8 +134,8 @@ def proposers(*kinds: ProposerKind, suiting: Iterable[Scenario] = ()) -> Mapping
     """Return the proposers by name.
 
     Args:
-        kinds: Only those of these kinds; of all unless given.
-        suiting: Only those that suit all of these scenarios.
+        kinds: Restricts the list to these kinds; all kinds by default.
+        suiting: Restricts the list to proposers that suit all of these scenarios.
     """
     scenarios = tuple(suiting)
     return {
@@ -146,10 +146,10 @@ def proposers(*kinds: ProposerKind, suiting: Iterable[Scenario] = ()) -> Mapping
 
 
 def proposer_row(name: str) -> ProposerRow:
-    """Return what is known of a proposer.
+    """Return the description of a proposer.
 
     Raises:
-        UnknownNameError: If there is none of that name; the message has the nearest one.
+        UnknownNameError: If no proposer has that name; the message suggests the nearest one.
     """
     if name not in _TABLE:
         raise UnknownNameError("search method", name, _TABLE)
@@ -157,10 +157,10 @@ def proposer_row(name: str) -> ProposerRow:
 
 
 def check_suits(name: str, scenario: Scenario) -> None:
-    """Refuse a proposer for a site that lacks what it needs.
+    """Check that a site has the properties that a proposer requires.
 
     Raises:
-        BlastEnvError: If something is missing.
+        BlastEnvError: If a property is missing.
         UnknownNameError: As for `proposer_row`.
     """
     for need in proposer_row(name).needs:
@@ -173,11 +173,11 @@ def find_proposer(name: str, initial: tuple[Layout, ...] = ()) -> Proposer:
 
     Args:
         name: One of `proposers()`.
-        initial: Layouts that a search begins with, beside those that it draws.
+        initial: Initial layouts of a search, in addition to random ones.
 
     Raises:
-        UnknownNameError: If there is none of that name; the message has the nearest one.
-        BlastEnvError: If there are layouts to begin with, but it begins with none.
+        UnknownNameError: If no proposer has that name; the message suggests the nearest one.
+        BlastEnvError: If `initial` is not empty and the proposer takes no initial layouts.
     """
     row = proposer_row(name)
     if row.kind is ProposerKind.RULE:
@@ -201,11 +201,11 @@ def _begins_with_layouts(proposer: Any) -> bool:
 
 @dataclass(frozen=True)
 class RuleProposer:
-    """Proposes the layout of a rule; no blast is simulated.
+    """Proposes the layout of a rule without simulating a blast.
 
     Attributes:
         name: Name of the rule.
-        rule: Gives the layout.
+        rule: Function that returns the layout.
     """
 
     name: str
@@ -218,26 +218,27 @@ class RuleProposer:
         seed: int = 0,
         report: Report | None = None,  # noqa: ARG002
     ) -> SearchResult:
-        """Return the rule's layout; budget and seed change nothing.
+        """Return the rule's layout, which is independent of budget and seed.
 
         Raises:
-            BlastEnvError: If there is no such layout, as where there is no line of sight.
+            BlastEnvError: If the rule has no layout for the site, for example without a line of
+                sight.
         """
         layout = tuple(sorted(self.rule(problem.scenario, problem.told)))
         return SearchResult(layout, self.name, budget=budget, seed=seed)
 
 
 def layouts_by_rule(scenario: AnyScenario, charge: AnyCharge | None = None) -> dict[str, Layout]:
-    """Return the layout of every rule that has one for a scenario, by title; no blast is run.
+    """Return the layout of each applicable rule, by title, without simulating a blast.
 
     Args:
         scenario: The scenario; it has a build zone.
-        charge: Where the charge is, if that is known.
+        charge: The charge, if it is known.
     """
     found, layouts = find_scenario(scenario), {}
     for row in proposers(ProposerKind.RULE, suiting=[found]).values():
         try:
             layouts[row.title] = tuple(sorted(load_plugin(row.place)(found, charge)))
-        except BlastEnvError:  # as of a wall with no line of sight for it: there is no such layout
+        except BlastEnvError:  # the rule has no layout, for example a wall without a line of sight
             continue
     return layouts

@@ -1,4 +1,4 @@
-"""The driver of all searches: the plan for a budget, and the account of what blasts have shown."""
+"""The driver of all searches: the plan for a budget, and the account of blasts and layouts."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -16,25 +16,25 @@ from blast_env.scenario.placement import met_by_blasts
 from blast_env.values import generator
 
 LAYOUTS_PER_REALISATION: Final = 500
-"""A known charge is met with one fan and air more for so many layouts that the budget pays for."""
+"""Layouts that the budget pays for, per realisation (fan and air) of a known charge."""
 
 CHARGES_PER_ROOT_BLAST: Final = 0.3
-"""Of a hidden charge's places a layout meets so many times the square root of the budget."""
+"""Threats per layout with a hidden charge, over the square root of the budget in blasts."""
 
 CONFIRMED_LAYOUTS: Final = 32
-"""Layouts of which the blasts that are held back can pay for all threats."""
+"""Number of layouts whose blasts under all threats bound the reserve."""
 
 MOST_CONFIRMING_SHARE: Final = 0.2
-"""Largest share of the budget that is held back to let the best layouts meet more threats."""
+"""Largest share of the budget held in reserve to assess the best layouts under more threats."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How a search divides its blasts.
+    """Division of the blasts of a search.
 
     Attributes:
-        threats: How many threats a layout meets while the search explores.
-        exploring_blasts: How many blasts it spends on exploring.
+        threats: Number of threats per layout during exploration.
+        exploring_blasts: Number of blasts for exploration.
     """
 
     threats: int
@@ -42,18 +42,18 @@ class Plan:
 
     @property
     def exploring_layouts(self) -> int:
-        """How many layouts it can try, at least one."""
+        """Number of layouts that exploration can assess, at least one."""
         return max(1, self.exploring_blasts // self.threats)
 
     @classmethod
     def of(cls, problem: LayoutProblem, budget: int) -> "Plan":
         """Return the plan for a budget.
 
-        A layout's impulse differs little from one fan and air to the next, less than layouts do
-        from each other: against a known charge it pays to try many layouts under one threat each,
-        and to find out the lucky ones among the best at the end. It differs much from one place of
-        the charge to the next: what stands well against one may do nothing against the others, so
-        that against a hidden charge layouts meet several places from the start.
+        The load of a layout varies less between realisations of fan and air than between layouts.
+        Against a known charge, exploration therefore assesses many layouts under few threats, and
+        the reserve identifies the lucky ones among the best. The load varies strongly with the
+        place of the charge. Against a hidden charge, each layout is therefore assessed for several
+        places from the start.
         """
         most = len(problem.threats)
         if len({threat.charge for threat in problem.threats}) == 1:
@@ -68,35 +68,35 @@ class Plan:
 
     @classmethod
     def thorough(cls, problem: LayoutProblem, budget: int) -> "Plan":
-        """Return the plan by which every layout meets every threat at once."""
+        """Return the plan that assesses every layout under all threats at once."""
         return cls(len(problem.threats), budget)
 
 
 _MOST_REPEATS: Final = 300
-"""Questions in a row without a new blast after which there is nothing new to be found."""
+"""Successive assessments without a new blast after which the search ends."""
 
 
 class SearchEndedError(Exception):
-    """The blasts that a search may spend are spent, or it finds nothing new to spend them on."""
+    """The blasts of a search are spent, or it finds no new layouts to spend them on."""
 
 
 class SearchSession:
-    """Lets a method ask what layouts are worth, within its budget.
+    """Assesses layouts for a method within a budget of blasts.
 
-    A layout meets the threats in their order: first some of them, later perhaps more, never one
-    twice. Of two layouts the one that has met more threats counts as the better known one and
-    goes before; with as many threats, the one with less load.
+    A layout is assessed under the threats in their order: first some of them, later perhaps more,
+    each once. A layout assessed under more threats is known better and ranks first; with equal
+    numbers of threats, the one with the lower load does.
 
     Args:
-        problem: What is minimised.
-        budget: Most blasts that may be spent.
-        plan: How many threats a layout meets at first, and what is held back for the others.
-        report: Is told after every batch how far the search has come.
-        seed: Decides everything that is drawn.
+        problem: The problem to minimise.
+        budget: Largest number of blasts.
+        plan: Number of threats per layout at first, and the reserve for the others.
+        report: Called with the progress after every batch.
+        seed: Seed of all random draws.
 
     Attributes:
-        rng: Draws it.
-        blasts: Blasts spent: distinct pairs of layout and threat that were asked for.
+        rng: The random generator.
+        blasts: Blasts spent: distinct pairs of layout and threat that were requested.
 
     Raises:
         BlastEnvError: If the budget is below 1.
@@ -132,23 +132,23 @@ class SearchSession:
 
     @property
     def exploring_left(self) -> int:
-        """How many of the blasts for exploring are left."""
+        """Number of exploring blasts that are left."""
         return max(0, self._limit - self.blasts)
 
     @property
     def exploring_share(self) -> float:
-        """Share of the blasts for exploring that is spent."""
+        """Share of the exploring blasts that is spent."""
         return self.blasts / self._limit
 
     def run(self, explore: Callable[[], None], choose: Callable[[], None]) -> bool:
-        """Explore until the blasts for it are spent, then let the best meet more threats.
+        """Explore until the exploring blasts are spent, then spend the reserve on the best layouts.
 
         Args:
-            explore: Asks `assess` until it is through or `SearchEndedError` comes.
-            choose: Does the same with what was held back.
+            explore: Calls `assess` until it is done or `SearchEndedError` is raised.
+            choose: Does the same with the reserve.
 
         Returns:
-            Whether it was interrupted.
+            Whether Ctrl-C interrupted the search.
         """
         try:
             self._until_ended(explore)
@@ -159,15 +159,15 @@ class SearchSession:
         return False
 
     def assess(self, layouts: Sequence[Layout], threats: int | None = None) -> FloatArray:
-        """Return the load with layouts under the first threats, in the objective's unit (layouts,).
+        """Return the load of layouts under the first threats, in the objective's unit (layouts,).
 
         Args:
             layouts: Legal layouts.
-            threats: How many threats; what the plan says for exploring unless given.
+            threats: Number of threats; the plan's number for exploration by default.
 
         Raises:
-            SearchEndedError: If there are not enough blasts left for all of them; the first ones,
-                as many as can be paid for, are assessed all the same.
+            SearchEndedError: If too few blasts are left for all of them, after the affordable ones
+                were assessed, or if too many assessments in a row needed no new blast.
         """
         count = self.plan.threats if threats is None else threats
         keys = [tuple(sorted(layout)) for layout in layouts]
@@ -179,9 +179,9 @@ class SearchSession:
         return np.array([self._load(key, count) for key in keys])
 
     def confirm_best(self) -> None:
-        """Let the best layouts meet more threats, fewer and fewer of them (successive halving).
+        """Assess fewer and fewer of the best layouts under more threats (successive halving).
 
-        A layout that was lucky under the first threats is found out before it is chosen.
+        This identifies layouts that were lucky under the first threats.
         """
         count, most = self.plan.threats, len(self.problem.threats)
         candidates = self.ranked(count)
@@ -195,9 +195,9 @@ class SearchSession:
             count = more
 
     def confirm_front(self) -> None:
-        """Let the front meet more threats, and with it, as far as they go, the fronts behind it.
+        """Assess the front under more threats and, as far as blasts last, the next fronts.
 
-        All threats, if what is left pays for it; else as many as it does.
+        All threats are used if the remaining blasts suffice, otherwise as many as they pay for.
         """
         met, most = self.plan.threats, len(self.problem.threats)
         left, rest = self._budget - self.blasts, self.ranked(met)
@@ -212,21 +212,21 @@ class SearchSession:
         self.assess(confirmed, more)
 
     def ranked(self, threats: int) -> list[Layout]:
-        """Return the layouts that have met so many threats, least load first."""
+        """Return the layouts assessed under at least so many threats, least load first."""
         met = [key for key, values in self._known.items() if len(values) >= threats]
         return sorted(met, key=lambda key: self._load(key, threats))
 
     def front(self) -> tuple[Candidate, ...]:
-        """Return the layouts of which none has both less load and a lower price.
+        """Return the Pareto front of load and price, in ascending order of price.
 
-        Among those that have met as many threats as any has, by price: the number of modules or,
-        with a catalogue, the cost.
+        It contains only layouts assessed under the largest number of threats. The price is the
+        number of modules or, with a catalogue, the cost.
         """
         most = max(map(len, self._known.values()), default=0)
         return tuple(self._candidate(key, most) for key in self._front_of(self.ranked(most), most))
 
     def result(self, method: str, interrupted: bool, has_front: bool = False) -> SearchResult:
-        """Return what was found, with the front if there is to be one."""
+        """Return the result of the search, with the front if `has_front`."""
         best = self.best
         return SearchResult(
             layout=() if best is None else best.layout,
@@ -242,9 +242,9 @@ class SearchSession:
         )
 
     def _front_of(self, ranked: Sequence[Layout], threats: int) -> list[Layout]:
-        """Return the front of layouts that come with the least load first, by price."""
+        """Return the front of layouts ranked by load, in ascending order of price."""
         front: list[Layout] = []
-        # Stable: of the same price, the least load first.
+        # Stable: among equal prices, the least load first.
         for key in sorted(ranked, key=self.problem.price):
             load = self._load(key, threats)
             if not front or load < self._load(front[-1], threats):
@@ -258,7 +258,7 @@ class SearchSession:
             self._repeats = 0
 
     def _affordable(self, layouts: Sequence[Layout], threats: int) -> list[Layout]:
-        """Return the first layouts, as many as can meet so many threats with what is left."""
+        """Return the first layouts, as many as the remaining blasts pay for under `threats`."""
         asked, affordable = set[tuple[Layout, int]](), list[Layout]()
         for key in layouts:
             asked |= self._new_blasts([key], threats)
@@ -268,9 +268,9 @@ class SearchSession:
         return affordable
 
     def _new_blasts(self, layouts: Sequence[Layout], threats: int) -> set[tuple[Layout, int]]:
-        """Return the blasts that layouts have not met yet: what stands, and the threat's number.
+        """Return the new blasts of layouts, as pairs of structures and the threat's number.
 
-        Measures that harden facades need none of their own.
+        Measures that harden facades need no blasts.
         """
         return {
             (met_by_blasts(key), number)
@@ -279,7 +279,7 @@ class SearchSession:
         } - self._met
 
     def _simulate(self, layouts: Sequence[Layout], threats: int) -> None:
-        """Let layouts meet the threats up to a count that they have not met yet."""
+        """Simulate layouts under those of the first threats that are new to them."""
         pairs = [
             (key, threat)
             for key in layouts
@@ -299,17 +299,17 @@ class SearchSession:
             self._report(Progress(self.blasts, self._budget, self.best))
 
     def _consider(self, key: Layout) -> None:
-        """Make a layout the best one if it is."""
+        """Record a layout as the best one if it ranks before the present best."""
         threats = len(self._known[key])
         candidate = self._candidate(key, threats)
         best = self.best
         if best is None or (-threats, candidate.load) < (-best.threats, best.load):
             if best is not None and best.blasts == self.blasts:
-                self._history.pop()  # one entry a batch
+                self._history.pop()  # one entry per batch
             self._history.append(candidate)
 
     def _candidate(self, key: Layout, threats: int) -> Candidate:
-        """Return what is known of a layout now."""
+        """Return a layout with its present load and number of threats."""
         load = self._load(key, threats)
         return Candidate(self.blasts, key, load, threats, self.problem.cost(key))
 
@@ -319,9 +319,9 @@ class SearchSession:
 
 @dataclass(frozen=True)
 class Search(ABC):
-    """A search: it says what gets a blast next, and `SearchSession` keeps the account.
+    """A search: it selects the layouts to simulate, and `SearchSession` keeps the account.
 
-    Derive a dataclass that has a name and explores; `blast_agents.search.registry` lists it.
+    Derive a dataclass with a name and `explore`, and list it in `blast_agents.search.registry`.
     """
 
     @property
@@ -331,31 +331,31 @@ class Search(ABC):
 
     @abstractmethod
     def explore(self, session: SearchSession) -> None:
-        """Let `session.assess` layouts until the search is through.
+        """Call `session.assess` until the search is done.
 
-        The session ends it by `SearchEndedError` when the blasts for exploring are spent. What is
-        drawn, `session.rng` draws.
+        The session raises `SearchEndedError` when the exploring blasts are spent. All random draws
+        use `session.rng`.
         """
 
     def choose(self, session: SearchSession) -> None:
-        """Spend what was held back: the best layouts meet more threats."""
+        """Spend the reserve: assess the best layouts under more threats."""
         session.confirm_best()
 
     def phases(self, session: SearchSession) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Return how a session is explored, and how the choice is made then."""
+        """Return the functions that explore a session and make the final choice."""
         return partial(self.explore, session), partial(self.choose, session)
 
     def plan(self, problem: LayoutProblem, budget: int) -> Plan:
-        """Return how the blasts are divided."""
+        """Return the division of the blasts."""
         return Plan.of(problem, budget)
 
     has_front: ClassVar[bool] = False
-    """Whether the result has the front of load and price."""
+    """Whether the result includes the front of load and price."""
 
     def propose(
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the best layout that was found; see `Proposer`."""
+        """Return the best layout found; see `Proposer`."""
         session = SearchSession(problem, budget, self.plan(problem, budget), report, seed)
         interrupted = session.run(*self.phases(session))
         return session.result(self.name, interrupted, self.has_front)
