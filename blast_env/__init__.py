@@ -2,7 +2,7 @@
 
 Two kinds of model behind one interface: the particle model of the paper, in plan, and gas dynamics,
 in three dimensions with real heights. `import blast_env` registers the environments with Gymnasium
-and imports nothing heavier; each name below is imported when it is asked for.
+and imports nothing heavier; each name below is imported on first access.
 """
 
 from collections.abc import Mapping
@@ -85,7 +85,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Import a public name when it is asked for."""
+    """Import a public name on first access."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value: object = getattr(import_module(_PLACES[name]), name)

@@ -1,6 +1,6 @@
-"""How fast blasts and the environment are on this machine: what `blast-env bench` measures.
+"""Speed of blasts and of the environment on this machine, as `blast-env bench` measures it.
 
-Processor times are of one core, whatever else runs beside; times by the clock need idle cores.
+Processor times are of one core and do not depend on other processes; wall times need idle cores.
 """
 
 import os
@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # Numba takes half a second to import
 ENV_ID: Final = "BlastBarrier-v0"
 
 _LOT_S: Final = 3.0
-"""How long one process is to have work: shorter lots measure how processes begin."""
+"""Least work per process, in seconds of processor time: shorter lots measure the start-up."""
 
 _SHORTEST_M: Final = 20.0
 _PACKAGES: Final = ("numpy", "numba", "pymunk")
@@ -42,16 +42,16 @@ _PACKAGES: Final = ("numpy", "numba", "pymunk")
 
 @dataclass(frozen=True)
 class BlastCost:
-    """What one blast costs, from scenario to result.
+    """The cost of one blast, from scenario to result.
 
     Attributes:
         scenario: Name of the scenario.
         engine: Name of the engine.
-        simulated_s: Time until the end of the blast.
-        steps: Steps, or events, of the engine.
-        cpu_s: Processor time of a blast, median over the seeds.
-        cell_updates: Cells times steps, of engines that have cells.
-        memory_mb: Peak memory of a fresh process that runs one; None: not measured.
+        simulated_s: Simulated time at the end of the blast.
+        steps: Number of steps, or events, of the engine.
+        cpu_s: Processor time per blast, median over the seeds.
+        cell_updates: Cells times steps; None for engines without cells.
+        memory_mb: Peak memory of a fresh process that runs one blast; None if not measured.
     """
 
     scenario: str
@@ -70,10 +70,10 @@ def blast_cost(scenario: Scenario, engine: str, repeats: int, *, memory: bool = 
         scenario: The scenario.
         engine: Name of the engine.
         repeats: Number of blasts; their seeds are 0 and up.
-        memory: Whether to measure the memory, too, in a process of its own.
+        memory: Whether to measure the peak memory, too, in a separate process.
     """
     run = partial(simulate, scenario, engine=engine)
-    result: Any = run(seed=0)  # compiles what is not on disk yet
+    result: Any = run(seed=0)  # compiles code that is not on disk yet
     times_s = []
     for seed in range(repeats):
         began = process_time()
@@ -104,7 +104,7 @@ def _peak_memory_mb(scenario: Scenario, engine: str) -> float:
 def own_memory_mb() -> float:
     """Return the peak memory, MB, of this process."""
     try:
-        # Linux hands the maximum of getrusage on from the process that started this one.
+        # On Linux, the maximum of getrusage is inherited from the parent process.
         status = Path("/proc/self/status").read_text(encoding="utf-8")
         return 1024.0 * int(status.split("VmHWM:")[1].split()[0]) / 1e6
     except (OSError, IndexError):
@@ -115,10 +115,11 @@ def own_memory_mb() -> float:
 
 
 def street(length_m: float) -> Scenario:
-    """Return a street between an office and a school, on which the cost of large sites is measured.
+    """Return a street between an office and a school, for measuring the cost of large sites.
 
     At 100 m: an L-shaped office of four storeys, 25 m from a van of 500 kg at the kerb, and a
-    school behind a wall of its own. Other lengths have all of it in proportion, in whole modules.
+    school behind a perimeter wall. Other lengths scale all of it, rounded to whole modules; the
+    charge scales with the cube of the length.
 
     Args:
         length_m: Length of the site; at least 20 m.
@@ -177,14 +178,14 @@ def street(length_m: float) -> Scenario:
 
 @dataclass(frozen=True)
 class SiteCost:
-    """What a blast by gas dynamics on a site costs, without a barrier, and what was told before.
+    """The cost of a blast by gas dynamics without a barrier, and its estimate before the run.
 
     Attributes:
         site: Name of the scenario.
-        cells: How its cells grow.
-        told: What was told before it began.
-        steps: Steps.
-        cell_updates: Cells moved on; a step counts as two.
+        cells: Growth of its cells; see `GasSettings`.
+        told: Estimate of the cost before the run.
+        steps: Number of steps.
+        cell_updates: Cell updates; a step counts as two.
         cpu_s: Processor time, from scenario to loads.
         memory_mb: Peak memory of the process.
     """
@@ -199,13 +200,13 @@ class SiteCost:
 
 
 def site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
-    """Run a blast on a site, in a process of its own."""
+    """Run a blast on a site, in a separate process."""
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(_site_cost, (scenario, engine))
 
 
 def _site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
-    engine.blast(street(_SHORTEST_M)).run()  # compiles what is not on disk yet
+    engine.blast(street(_SHORTEST_M)).run()  # compiles code that is not on disk yet
     began = process_time()
     result = engine.blast(scenario).run()
     cpu_s = process_time() - began
@@ -222,12 +223,12 @@ def _site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
 
 @dataclass(frozen=True)
 class Crowd:
-    """The same blasts in one process and in several at once, by the clock.
+    """Rates of the same blasts in one process and in several at once, by wall time.
 
     Attributes:
-        processes: How many.
-        alone_per_s: Blasts a second of one process.
-        together_per_s: Blasts a second of all.
+        processes: Number of processes.
+        alone_per_s: Blasts per second of one process.
+        together_per_s: Blasts per second of all processes together.
     """
 
     processes: int
@@ -236,7 +237,7 @@ class Crowd:
 
     @property
     def ratio(self) -> float:
-        """How many times the blasts of one process they run."""
+        """The rate of all processes as a multiple of that of one."""
         return self.together_per_s / self.alone_per_s
 
 
@@ -246,13 +247,13 @@ def crowd(scenario: Scenario, engine: str, cpu_s: float, processes: int) -> Crow
     Args:
         scenario: The scenario.
         engine: Name of the engine.
-        cpu_s: About how long one blast takes.
-        processes: How many.
+        cpu_s: Approximate processor time of one blast.
+        processes: Number of processes at once.
     """
     lot = max(2, ceil(_LOT_S / cpu_s))
     rates = []
     for count in (1, processes):
-        run_all(partial(_blasts, scenario, engine, 1), range(count), processes)  # all is loaded
+        run_all(partial(_blasts, scenario, engine, 1), range(count), processes)  # load the code
         began = perf_counter()
         run_all(partial(_blasts, scenario, engine, lot), range(count), processes)
         rates.append(count * lot / (perf_counter() - began))
@@ -266,15 +267,15 @@ def _blasts(scenario: Scenario, engine: str, count: int, first_seed: int) -> Non
 
 @dataclass(frozen=True)
 class EnvironmentCost:
-    """What an episode of random legal placements costs; medians of processor times.
+    """The cost of an episode of random legal placements; medians of processor times.
 
     Attributes:
         engine: Name of the engine.
-        episode_s: The whole episode.
-        blast_s: Its last step, with the blasts and the reward.
-        steps: Steps of an episode.
-        vector_steps_per_s: Steps a second, by the clock, of all environments in processes.
-        environments: How many those are.
+        episode_s: Time of the whole episode.
+        blast_s: Time of its last step, with the blasts and the reward.
+        steps: Number of steps per episode.
+        vector_steps_per_s: Steps per second, by wall time, of all environments of the vector.
+        environments: Number of environments in the vector, each in its process.
     """
 
     engine: str
@@ -286,7 +287,7 @@ class EnvironmentCost:
 
     @property
     def placing_s(self) -> float:
-        """`reset`, masks, observations and placements of an episode: all but its last step."""
+        """Time of `reset`, masks, observations and placements: all but the last step."""
         return self.episode_s - self.blast_s
 
 
@@ -298,8 +299,8 @@ def environment_cost(
     Args:
         scenario: The scenario; it needs a build zone, and a calibration where the engine does.
         engine: Name of the engine.
-        episodes: Episodes that are timed; one more comes before them.
-        environments: Processes of the vector.
+        episodes: Number of timed episodes, after one to warm up.
+        environments: Number of processes of the vector.
 
     Raises:
         BlastEnvError: If the environment cannot be made of the scenario.
@@ -323,7 +324,7 @@ def environment_cost(
 def _episode(
     env: gym.Env[Any, Any], rng: np.random.Generator, seed: int
 ) -> tuple[float, float, int]:
-    """Return the time of an episode, that of its last step, and its steps."""
+    """Return the processor times of an episode and of its last step, and its number of steps."""
     began, steps, ended = process_time(), 0, False
     _, info = env.reset(seed=seed)
     last_s = began
@@ -337,7 +338,7 @@ def _episode(
 
 
 def random_action(mask: FloatArray | NDArray[Any], rng: np.random.Generator) -> int:
-    """Return a random legal placement; the last action, which finishes, if there is none."""
+    """Return a random legal placement, or the last action, which finishes, if there is none."""
     free = np.flatnonzero(mask[:-1])
     return int(rng.choice(free)) if len(free) else len(mask) - 1
 
@@ -357,7 +358,7 @@ def _vector_steps_per_s(scenario: Scenario, engine: str, episodes: int, count: i
 
 
 def _play(envs: AsyncVectorEnv, rng: np.random.Generator, episodes: int) -> int:
-    """Return the steps of all until each environment has ended so many episodes."""
+    """Return the steps of all environments until each has ended the given number of episodes."""
     ended, steps = np.zeros(envs.num_envs, dtype=np.int64), 0
     while ended.min() < episodes:
         masks: Sequence[NDArray[Any]] = envs.call("action_masks")
@@ -368,7 +369,7 @@ def _play(envs: AsyncVectorEnv, rng: np.random.Generator, episodes: int) -> int:
 
 
 def hardware() -> str:
-    """Return the processor, the number of cores and the versions that decide the speed."""
+    """Return the processor, the number of cores and the versions on which the speed depends."""
     packages = ", ".join(f"{name} {version(name)}" for name in _PACKAGES)
     return f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}, {packages}"
 

@@ -1,4 +1,4 @@
-"""What comes with the package, by name; nothing heavy is imported to know it."""
+"""Names of the bundled scenarios and generated sites; importing this module is cheap."""
 
 from pathlib import Path
 from typing import Final
@@ -6,16 +6,16 @@ from typing import Final
 SCENARIO_SUFFIX: Final = ".toml"
 
 SITES: Final = "sites"
-"""Name of the generated sites to train on, where an environment asks for a scenario."""
+"""Name of the generated sites for training, in the place of an environment's scenario."""
 
 ITEM_SITES: Final = "item_sites"
-"""Name of the generated sites with heights, catalogues and vehicles, in the same place."""
+"""Name of the generated sites with heights, catalogues and vehicles."""
 
 LARGE_SITES: Final = "large_sites"
-"""Name of such sites of real size, in the same place."""
+"""Name of such sites of real size."""
 
 REAL_SIZE: Final = frozenset({"street_front", "government_forecourt", "campus", "car_park"})
-"""Bundled scenarios of 90 to 120 m: tracks and studies take them only where they are named."""
+"""Bundled scenarios of 90 to 120 m; tracks and studies use them only by name."""
 
 
 def bundled_scenarios() -> tuple[str, ...]:

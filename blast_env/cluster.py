@@ -1,8 +1,7 @@
-"""Work on other machines: a joblib backend that hands it to a Dask cluster.
+"""Work on other machines: a joblib backend for a Dask cluster.
 
-Not joblib's own backend for Dask: that one waits for ever for work whose worker was killed too
-often or whose scheduler has gone, and keeps no more under way than the workers that are there at
-the start can do.
+It replaces joblib's Dask backend, which waits for ever for work whose worker was killed too often
+or whose scheduler has gone, and submits no more work than the workers present at the start can do.
 """
 
 import asyncio
@@ -30,18 +29,18 @@ if TYPE_CHECKING:
 
 _CONNECT_S: Final = 10.0
 _UNDER_WAY: Final = 500
-"""Pieces of work that the scheduler has at least, so that workers that come later find some."""
+"""Least number of submitted pieces of work, so that workers that join later find some."""
 _OWN: Final = ("blast_env", "blast_agents")
 _OTHERS: Final = ("numba", "numpy", "pymoo", "pymunk", "scipy")
-"""The packages that the bits of a result may depend on."""
+"""Packages on which the bits of a result may depend."""
 
 
 class ClusterSize(NamedTuple):
-    """What a cluster has at the moment; more may come.
+    """The present size of a cluster, which may grow.
 
     Attributes:
-        workers: Worker processes.
-        threads: Their threads, each of which does one piece of work at a time.
+        workers: Number of worker processes.
+        threads: Number of their threads; each does one piece of work at a time.
     """
 
     workers: int
@@ -50,22 +49,23 @@ class ClusterSize(NamedTuple):
 
 @contextmanager
 def on_cluster(address: str | Path) -> Iterator[ClusterSize]:
-    """Let the workers of a Dask cluster do in this block what `blast_env.runner` is given.
+    """Run the work of `blast_env.runner` in this block on the workers of a Dask cluster.
 
-    Results are those of this machine, and they are kept here, as soon as they are there. A worker
-    that dies costs what it was doing: that is done again by another. Workers must have the code
-    and the versions that this process has; work is refused by one that has not.
+    Results equal those of this machine and are kept here as soon as they arrive. The work of a
+    worker that dies is done again by another. Workers must have the code and the versions of this
+    process; a worker with others refuses the work.
 
     Args:
-        address: Of the scheduler, e.g. `"tcp://login1:8786"`, or the path of its scheduler file.
+        address: Address of the scheduler, e.g. `"tcp://login1:8786"`, or path of its scheduler
+            file.
 
     Yields:
-        How large the cluster is.
+        The size of the cluster.
 
     Raises:
         MissingExtraError: If the extra `cluster` is not installed.
-        BlastEnvError: If no scheduler answers. In the block, out of the runner: if the connection
-            is lost, or the same piece of work has killed worker after worker.
+        BlastEnvError: If no scheduler answers. In the block, from the runner: if the connection
+            is lost, or the same piece of work has killed several workers in turn.
     """
     client = _connect(str(address))
     try:
@@ -82,7 +82,7 @@ def _connect(address: str) -> "Client":
 
     scheduler = address_of(address)
     try:
-        # A client that finds nobody leaves a thread behind: so first see whether one answers.
+        # A client that finds no scheduler leaves a thread behind, so try a connection first.
         with ThreadPoolExecutor(1) as pool:  # in a notebook this thread has an event loop already
             pool.submit(asyncio.run, _knock(scheduler)).result()
         return Client(scheduler, timeout=_CONNECT_S, set_as_default=False, name="blast-env")
@@ -92,7 +92,7 @@ def _connect(address: str) -> "Client":
 
 @dataclass(frozen=True)
 class _SchedulerFile:
-    """What is read of a scheduler file, which says much more."""
+    """The only part of a scheduler file that is read."""
 
     address: str
 
@@ -123,24 +123,24 @@ async def _knock(address: str) -> None:
 
 
 class _Done(NamedTuple):
-    """A piece of work that has come to its end, and what is to be told of it."""
+    """A finished piece of work, and the callback for its outcome."""
 
     future: "Future"
     tell: Callable[["_Outcome"], None]
 
 
 class _Outcome(NamedTuple):
-    """What a piece of work has returned, or why it has not."""
+    """The result of a piece of work, or its error."""
 
     result: Any = None
     error: BaseException | None = None
 
 
 class ClusterBackend(ParallelBackendBase):
-    """Hands each piece of work to the scheduler by itself; fetches results as many as there are.
+    """Submits each piece of work separately; fetches all finished results together.
 
     Args:
-        client: Connected to the scheduler.
+        client: A client connected to the scheduler.
     """
 
     supports_retrieve_callback = True
@@ -153,21 +153,21 @@ class ClusterBackend(ParallelBackendBase):
         self._under_way: set[Future] = set()
 
     def effective_n_jobs(self, n_jobs: int | None) -> int:  # noqa: ARG002
-        """Return how many pieces of work are kept under way, whatever number is asked for."""
+        """Return the number of pieces of work to keep submitted; `n_jobs` does not change it."""
         threads: int = sum(self._client.ncores().values())
         return max(2 * threads, _UNDER_WAY)
 
     def start_call(self) -> None:
-        """Begin to fetch results, in a thread that ends with `stop_call`."""
+        """Start a thread that fetches results until `stop_call`."""
         self._done = SimpleQueue()
         Thread(target=self._fetch, args=(self._done,), daemon=True).start()
 
     def stop_call(self) -> None:
-        """Fetch no more."""
+        """Stop fetching results."""
         self._done.put(None)
 
     def submit(self, func: Callable[[], Any], callback: Callable[[_Outcome], None]) -> "Future":
-        """Hand over a piece of work, and have `callback` called with what comes of it."""
+        """Submit a piece of work; `callback` is called with its outcome."""
         future = self._client.submit(_do, func, _origin(), pure=False)
         self._under_way.add(future)
         done = self._done
@@ -175,22 +175,22 @@ class ClusterBackend(ParallelBackendBase):
         return future
 
     def retrieve_result_callback(self, outcome: _Outcome) -> Any:
-        """Return the result of a piece of work, or raise what it raised."""
+        """Return the result of a piece of work, or raise its error."""
         if outcome.error is not None:
             raise _told(outcome.error)
         return outcome.result
 
     def abort_everything(self, ensure_ready: bool = True) -> None:  # noqa: ARG002
-        """Let go of what has not begun; workers end the piece that they are at."""
+        """Cancel all work that has not begun; workers finish their present piece."""
         under_way, self._under_way = self._under_way, set()
         self._client.cancel(list(under_way))
 
     def get_nested_backend(self) -> tuple[ParallelBackendBase, None]:
-        """Return what a piece of work shares its own work out with: nobody."""
+        """Return a sequential backend: a piece of work does not distribute its parts."""
         return SequentialBackend(nesting_level=1), None
 
     def _fetch(self, queue: "SimpleQueue[_Done | None]") -> None:
-        """Fetch results until there is nothing more to come: all that are there in one go."""
+        """Fetch results, all that are ready at a time, until `stop_call` ends the queue."""
         is_over = False
         while not is_over:
             taken = [queue.get()]
@@ -207,7 +207,7 @@ class ClusterBackend(ParallelBackendBase):
         if all(future.status == "finished" for future in futures):
             try:
                 return [_Outcome(result) for result in self._client.gather(futures)]
-            except Exception:  # one has gone meanwhile: which, they say each for itself
+            except Exception:  # one was lost meanwhile; each is fetched separately below
                 pass
         return [_outcome(future) for future in futures]
 
@@ -220,7 +220,7 @@ def _outcome(future: "Future") -> _Outcome:
 
 
 def _told(error: BaseException) -> BaseException:
-    """Return an error of the cluster as one that says what happened; any other as it is."""
+    """Return an error of the cluster as a `BlastEnvError` with the cause; any other unchanged."""
     from distributed import KilledWorker
     from distributed.comm import CommClosedError
 
@@ -241,7 +241,7 @@ def _told(error: BaseException) -> BaseException:
 
 
 def _do(work: Callable[[], Any], origin: str) -> Any:
-    """Do a piece of work on a worker that would do it as the process that asks for it."""
+    """Do a piece of work, on a worker with the code and versions of the submitting process."""
     if _origin() != origin:
         raise BlastEnvError(
             f"cluster: a worker has {_origin()}, must have what asks for the work: {origin}"
@@ -251,7 +251,7 @@ def _do(work: Callable[[], Any], origin: str) -> Any:
 
 @cache
 def _origin() -> str:
-    """Return the code and the versions that the result of a piece of work depends on."""
+    """Return the code digests and versions on which the result of a piece of work depends."""
     specs = (find_spec(name) for name in _OWN)
     folders = (Path(spec.origin).parent for spec in specs if spec is not None and spec.origin)
     known = versions(packages=_OTHERS)

@@ -16,26 +16,26 @@ from pydantic import TypeAdapter, ValidationError
 from blast_env.errors import BlastEnvError, key_path, shortened, value_text
 
 MAX_BYTES: Final = 1_000_000
-"""Larger files are refused: they are something else that was named by mistake."""
+"""Larger files are refused: their name was probably given by mistake."""
 
 MAX_DEPTH: Final = 50
-"""Brackets within each other, and parts of a dotted key. Parsers take time that grows with the
-square of it, or fail in ways of their own."""
+"""Most nested brackets, and parts of a dotted key. The time of parsers grows with the square of
+the depth, or they fail with obscure errors."""
 
 MOST_DEEP_PARTS: Final = 10_000
-"""Third and further parts of all dotted keys together: each may make a table of its own."""
+"""Most third and further parts of all dotted keys together: each may create a table."""
 
 MAX_DIGITS: Final = 1000
-"""Digits of an integer."""
+"""Most digits of an integer."""
 
 MOST_CLAUSES: Final = 10
-"""Problems that one message names; the others are counted."""
+"""Most problems that one message names; the others are counted."""
 
 _GROUPED: Final = re.compile(r"[+-]?[0-9]+(_[0-9]+)+(\.[0-9_]*)?")
-"""A number that Python reads and nobody else does."""
+"""A number with underscores, which only Python reads."""
 
 _SHOWN: Final = 60
-"""Characters of a text from a file in a message."""
+"""Most characters of a text from a file in a message."""
 
 T = TypeVar("T")
 
@@ -44,8 +44,8 @@ class DocumentError(BlastEnvError):
     """A text that cannot be read.
 
     Args:
-        place: Where, e.g. `line 3, column 5`; empty if the whole text is meant.
-        message: What is wrong.
+        place: The place, e.g. `line 3, column 5`; empty for the whole text.
+        message: The fault.
 
     Attributes:
         place: As given.
@@ -65,10 +65,10 @@ def read_text(path: Path, most_bytes: int = MAX_BYTES) -> str:
 
     Args:
         path: The file.
-        most_bytes: Most that it may have.
+        most_bytes: Largest size of the file.
 
     Raises:
-        DocumentError: If it cannot be read; the message says why, without the name of the file.
+        DocumentError: If it cannot be read; the message has the reason, not the file's name.
     """
     try:
         if path.is_dir():
@@ -100,11 +100,11 @@ _TOML_TOKEN: Final = re.compile(
       | (?P<other>[^\#"'A-Za-z0-9_.\[\]{}\ \t-]++ | .)""",
     re.VERBOSE | re.DOTALL,
 )
-"""A text without its end is a token, too: to look for its end again and again takes for ever."""
+"""A text without an end is a token, too: searching for the end from each quote takes for ever."""
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return what the text of a TOML file holds.
+    """Return the content of a TOML file from its text.
 
     Raises:
         DocumentError: If it is not TOML, or nested too deeply.
@@ -117,7 +117,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def _check_toml_depth(text: str) -> None:
-    """Refuse what takes the parser for ever: deep brackets, and keys of many parts."""
+    """Refuse deep brackets and keys of many parts, for which the parser takes for ever."""
     depth, parts, deep_parts, after_dot = 0, 0, 0, False
     for token in _TOML_TOKEN.finditer(text):
         kind = token.lastgroup
@@ -146,7 +146,7 @@ def _check_toml_depth(text: str) -> None:
 def _toml_error(message: str, text: str) -> DocumentError:
     match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.S)
     if match is None:
-        # The only error without a place: an integer that Python refuses to read.
+        # The only error without a place: an integer too long for Python to read.
         digits = re.search(r"[0-9_]{1000,}", text)
         number = text.count("\n", 0, digits.start() if digits else len(text)) + 1
         return DocumentError(
@@ -163,11 +163,11 @@ _JSON_TOKEN: Final = re.compile(r'"(?:[^"\\]|\\.)*+"?|([\[{])|([\]}])', re.DOTAL
 
 
 def parse_json(text: str) -> Any:
-    """Return what the text of a JSON file holds.
+    """Return the content of a JSON file from its text.
 
     Raises:
-        DocumentError: If it is not JSON, nested too deeply, has a key twice in one object (one of
-            them would be lost), an integer that is too long, or a number that is none.
+        DocumentError: If it is not JSON, is nested too deeply, has a key twice in one object (one
+            of them would be lost), an integer that is too long, or a constant such as NaN.
     """
     depth = 0
     for token in _JSON_TOKEN.finditer(text):
@@ -195,7 +195,7 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _integer(digits: str) -> int:
-    """Read an integer, refusing one so long that Python would refuse it without saying where."""
+    """Read an integer; refuse one so long that Python would refuse it without a place."""
     if len(digits) > MAX_DIGITS:
         shown = shortened(digits, _SHOWN)
         raise DocumentError("", f"{shown} has {len(digits)} digits, which is too large")
@@ -212,13 +212,13 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def checked_as(kind: type[T], content: Any) -> T:
-    """Return the content of a JSON or TOML file as what it must be.
+    """Return the content of a JSON or TOML file as an object of a type.
 
     Nothing is converted: neither texts nor truth values are numbers, nor is 1.0 an integer.
 
     Args:
-        kind: The type: a model, a dataclass, or anything else that pydantic knows.
-        content: What a file holds.
+        kind: The type: a model, a dataclass, or any other type that pydantic knows.
+        content: The parsed content of a file.
 
     Raises:
         DocumentError: If it is anything else; the message has key, value and bound.
@@ -242,7 +242,7 @@ def _checked(kind: type[T], check: Callable[[TypeAdapter[Any]], Any]) -> T:
 
 
 def described(error: ValidationError) -> str:
-    """Return what is wrong with values, a clause each: where, what it is, and the bound."""
+    """Return one clause per fault: the key, its value and the bound."""
     details = error.errors(include_url=False)
     clauses = []
     for each in details[:MOST_CLAUSES]:
@@ -258,13 +258,13 @@ def described(error: ValidationError) -> str:
 
 
 def parse_json_lines(text: str, kind: type[T]) -> Iterator[T]:
-    """Yield what each line of a text holds, JSON each.
+    """Yield the content of each line of a text, one JSON document per line.
 
-    A last line without its end is left out: it is one that was being written.
+    A last line without an end is left out: writing it was interrupted.
 
     Args:
         text: The text.
-        kind: What each line must be; see `checked_as`.
+        kind: The type of each line; see `checked_as`.
 
     Raises:
         DocumentError: If a line is anything else; its place is the line.
@@ -281,11 +281,11 @@ def parse_csv(text: str, kind: type[T]) -> Iterator[T]:
 
     Args:
         text: The text; its last line has an end.
-        kind: What a row must be, by the names of the columns; cells are texts, read as numbers
-            where a number must be.
+        kind: The type of a row, by the names of the columns; cells are texts, read as numbers
+            where the type has numbers.
 
     Raises:
-        DocumentError: If it is no table, was cut within a line, or a row is anything else; the
+        DocumentError: If it is no table, was cut within a line, or a row is not of the type; the
             place is the line.
     """
     if not text:

@@ -1,4 +1,4 @@
-"""The errors that a user can cause, each with a message that says what to change; their words."""
+"""Errors that a user can cause, whose messages name the remedy; formatting of values in them."""
 
 import math
 import re
@@ -10,7 +10,7 @@ from typing import Final
 
 
 class BlastEnvError(ValueError):
-    """Base class: something that the user gave is not usable."""
+    """Base class: an input of the user is not usable."""
 
 
 class LayoutError(BlastEnvError):
@@ -18,14 +18,14 @@ class LayoutError(BlastEnvError):
 
 
 class MissingExtraError(BlastEnvError):
-    """Something needs a package of an optional extra that is not installed."""
+    """A function needs a package of an optional extra that is not installed."""
 
 
 class UnknownNameError(BlastEnvError):
     """A name (preset, engine, structure, bundled scenario) that does not exist.
 
     Args:
-        kind: What was named, e.g. `"preset"`.
+        kind: Kind of the named thing, e.g. `"preset"`.
         name: The name given.
         known: The names that exist.
     """
@@ -44,8 +44,8 @@ class UnknownNameError(BlastEnvError):
 class UnknownArgumentError(BlastEnvError, TypeError):
     """A keyword argument that does not exist.
 
-    A `TypeError` with Python's own words, which other libraries look for, and made from a message
-    alone, as Gymnasium makes it anew; `of` names the nearest argument in it.
+    It is a `TypeError` with the wording of Python, which other libraries look for. A message alone
+    constructs it, because Gymnasium raises it anew; `of` adds the nearest argument.
     """
 
     @classmethod
@@ -53,7 +53,7 @@ class UnknownArgumentError(BlastEnvError, TypeError):
         """Return the error.
 
         Args:
-            function: Name of what was called.
+            function: Name of the function called.
             name: The argument given.
             known: The arguments that exist.
         """
@@ -70,10 +70,10 @@ def import_extra(extra: str, what: str) -> Iterator[None]:
 
     Args:
         extra: Name of the extra, or names with commas.
-        what: What cannot be had without it, e.g. `"genetic search"`.
+        what: The feature that needs it, e.g. `"genetic search"`.
 
     Raises:
-        MissingExtraError: If a package is not installed; the message says how to get it.
+        MissingExtraError: If a package is not installed; the message has the command to install it.
     """
     try:
         yield
@@ -95,7 +95,7 @@ def suggestion(name: object, known: Iterable[str]) -> str:
 
 
 MAX_TEXT: Final = 60
-"""Characters after which a value or a key is cut."""
+"""Most characters of a value or a key; longer ones are shortened."""
 
 
 def shortened(text: str, length: int = MAX_TEXT) -> str:
@@ -107,7 +107,7 @@ KeyParts = tuple[str | int, ...]
 
 
 def key_path(parts: Sequence[str | int]) -> str:
-    """Return keys and indices as they would be read aloud: `structures[1].rows`."""
+    """Return keys and indices as one path: `structures[1].rows`."""
     text = ""
     for part in parts:
         if isinstance(part, int):
@@ -119,13 +119,13 @@ def key_path(parts: Sequence[str | int]) -> str:
 
 
 def value_text(value: object) -> str:
-    """Return a value as a file would have it, shortened."""
+    """Return a value as in a file, shortened."""
     if isinstance(value, str):
         return _quoted(value)
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int):
-        # Python refuses to write out integers of more than some thousand digits.
+        # Python refuses to print integers of more than a few thousand digits.
         digits = value.bit_length() * math.log10(2.0)
         return f"an integer of about {digits:.0f} digits" if digits > MAX_TEXT else f"{value}"
     if isinstance(value, float):
@@ -136,7 +136,7 @@ def value_text(value: object) -> str:
 
 
 def type_word(value: object) -> str:
-    """Return a value and its type: `'ten' (a string)`; only the type for what has parts."""
+    """Return a value and its type: `'ten' (a string)`; only the type of containers."""
     if isinstance(value, Mapping):
         return "a table"
     if isinstance(value, list | tuple):

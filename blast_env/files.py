@@ -1,4 +1,4 @@
-"""Files that are either complete or not there, and a folder that keeps results by their keys."""
+"""Files that are either complete or absent, and a folder that stores results by their keys."""
 
 import errno
 import json
@@ -21,10 +21,10 @@ T = TypeVar("T")
 
 
 def make_folder(folder: str | Path) -> None:
-    """Make a folder, and those above it, unless it is there.
+    """Make a folder and its parents, unless it exists.
 
     Raises:
-        BlastEnvError: If something else is there, or it cannot be made.
+        BlastEnvError: If the path is not a folder, or it cannot be made.
     """
     try:
         path_of(folder).mkdir(parents=True, exist_ok=True)
@@ -34,7 +34,7 @@ def make_folder(folder: str | Path) -> None:
 
 @contextmanager
 def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]:
-    """Give a temporary file to write to, which becomes `target` when the block ends well.
+    """Provide a temporary file that becomes `target` when the block ends without an error.
 
     The temporary file is empty, lies in the folder of `target` and has its suffix. If the block
     raises anything, `KeyboardInterrupt` included, it is deleted and `target` stays as it was. An
@@ -43,8 +43,8 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
 
     Args:
         target: The file to write.
-        durable: Whether file and folder are on the device, not only on their way to it, when this
-            returns: no loss of power takes the file back or cuts it. Costs some milliseconds.
+        durable: Whether to wait until file and folder are on the device, so that a loss of power
+            neither removes nor cuts the file. Costs some milliseconds.
 
     Yields:
         The path to write to.
@@ -58,10 +58,10 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
         raise BlastEnvError(f"{target}: is a folder, must be a file")
     if not os.path.isdir(path.parent):
         raise BlastEnvError(f"{target}: there is no folder {str(path.parent)!r} to write it to")
-    # Short, because a name that is nearly too long must not become too long here.
+    # A short name: that of `target` may already have the greatest length.
     temporary = path.parent / f".{secrets.token_hex(8)}{path.suffix}"
     try:
-        # Not tempfile: its files are private to the user, whatever the umask says.
+        # Not tempfile: its files are private to the user and ignore the umask.
         temporary.open("xb").close()
         yield temporary
         if os.path.exists(path):
@@ -74,13 +74,13 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
     except OSError as error:
         raise _cannot_write(target, error, temporary) from error
     finally:
-        with suppress(OSError):  # of a device that fails altogether
+        with suppress(OSError):  # a failing device
             temporary.unlink(missing_ok=True)
 
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Give a folder for files that nobody keeps; it goes when the block ends.
+    """Provide a temporary folder, which is deleted when the block ends.
 
     Raises:
         BlastEnvError: If it cannot be made, or if the block raises `OSError`: the device is full,
@@ -94,19 +94,19 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def is_temporary(name: str) -> bool:
-    """Return whether a file of this name is one that a killed `write_atomically` has left."""
+    """Return whether a name is that of a temporary file of `write_atomically`."""
     return re.fullmatch(r"\.[0-9a-f]{16}(\..*)?", name) is not None
 
 
 _NO_SYNC: Final = (errno.EINVAL, errno.ENOTSUP, errno.EACCES, errno.EPERM)
-"""What systems say that sync no folders, or none that may not be read."""
+"""Errors of systems that sync no folders, or none without the permission to read them."""
 
 
 def sync(path: Path) -> None:
     """Wait until a file, or the names in a folder, are on the device.
 
     Raises:
-        OSError: If they cannot be put there; folders that the system does not sync are excused.
+        OSError: If that fails; folders that the system cannot sync are ignored.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY)
@@ -122,7 +122,7 @@ def sync(path: Path) -> None:
 def _cannot_write(
     target: str | Path, error: OSError, temporary: Path | None = None
 ) -> BlastEnvError:
-    """Return the error that says why `target` cannot be written."""
+    """Return an error with the reason why `target` cannot be written."""
     reason = error.strerror or str(error) or type(error).__name__
     if error.filename not in (None, str(target), str(temporary)):
         reason += f": {str(error.filename)!r}"
@@ -130,12 +130,12 @@ def _cannot_write(
 
 
 _CHECKSUM_BYTES: Final = 32
-_KEPT_SHARE: Final = 0.9  # when something has to go, so that not every addition tidies up
+_KEPT_SHARE: Final = 0.9  # of the bound, after deleting: not every addition tidies up again
 _UNSEEN_SHARE: Final = 1.0 / 32.0
 
 
 class _Entry(NamedTuple):
-    """A file of a store: when it was last used, its size in bytes, and where it is."""
+    """A file of a store: time of its last use, size in bytes, and path."""
 
     used_ns: int
     size: int
@@ -143,24 +143,24 @@ class _Entry(NamedTuple):
 
 
 class FolderStore:
-    """Keeps contents in files of a folder, each found again by all that it depends on, its key.
+    """Stores contents in files of a folder, by a key: everything on which a content depends.
 
-    One file a content, written beside its place and renamed, named by the hash of the key and
-    with key and checksum inside: nothing is ever half there, no process waits for another, damage
-    stays in one file, and network folders will do; a database would need locks, and a connection
-    that neither pickles nor survives a fork. A file that was damaged, or is not what its name
-    says, is deleted and counts as not there.
+    Each content has one file, written under a temporary name and renamed. Its name is the hash of
+    the key; key and checksum are inside. So no file is ever incomplete, no process waits for
+    another, damage is limited to one file, and network folders suffice. A database would need
+    locks, and a connection that neither pickles nor survives a fork. A damaged file, or one whose
+    key does not match its name, is deleted and counts as absent.
 
-    Any number of processes may use one folder at once. It can be pickled; the copy uses the same
-    folder.
+    Any number of processes may use one folder at once. The store can be pickled; the copy uses the
+    same folder.
 
     Args:
         folder: The folder; it is made if need be.
         suffix: Files with this suffix belong to the store; it touches no others.
-        most_bytes: Most that the files take together; what was not asked for longest goes first.
-            Each process looks after every 32nd part of it that it has written, so several may
-            exceed it by as much for a moment. Without it, nothing ever goes.
-        durable: Whether a loss of power leaves what was kept before; see `write_atomically`.
+        most_bytes: Largest total size of the files; the least recently used are deleted first.
+            Each process checks it whenever it has written a 32nd part of it, so several processes
+            may briefly exceed it by that much each. Without it, nothing is ever deleted.
+        durable: Whether stored contents survive a loss of power; see `write_atomically`.
 
     Attributes:
         folder: The folder, as an absolute path.
@@ -187,11 +187,11 @@ class FolderStore:
         self.most_bytes = most_bytes
         self.durable = durable
         self.damaged = 0
-        self._unseen_bytes = most_bytes or 0  # nobody has looked yet
+        self._unseen_bytes = most_bytes or 0  # the size is not known yet
         make_folder(self.folder)
 
     def get(self, key: str) -> bytes | None:
-        """Return the content of a key, or `None` if it is not there in one piece."""
+        """Return the content of a key, or `None` if it is absent or damaged."""
         path = self._path(key)
         try:
             stored = path.read_bytes()
@@ -206,12 +206,12 @@ class FolderStore:
         return content
 
     def read(self, key: str, decode: Callable[[bytes], T]) -> T | None:
-        """Return what the content of a key says, or `None` if it is not there in one piece.
+        """Return the decoded content of a key, or `None` if it is absent or damaged.
 
         Args:
             key: The key.
-            decode: Says it; `ValueError` is for content that is what was written, as the checksum
-                shows, and yet something else: it counts as damaged.
+            decode: Decodes the content. It raises `ValueError` for content that passes the
+                checksum but is not valid; such content counts as damaged.
         """
         content = self.get(key)
         try:
@@ -221,7 +221,7 @@ class FolderStore:
             return None
 
     def put(self, key: str, content: bytes) -> None:
-        """Keep the content of a key; the ones that were asked for longest ago may have to go.
+        """Store the content of a key; the least recently used ones may be deleted for it.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -236,11 +236,11 @@ class FolderStore:
             self._unseen_bytes = 0
             try:
                 self._tidy_up(self.most_bytes)
-            except OSError as error:  # a folder that may not be listed
+            except OSError as error:  # no permission to list the folder
                 raise _cannot_write(self.folder, error) from error
 
     def items(self) -> Iterator[tuple[str, bytes]]:
-        """Yield keys and contents in the order of the files' names; damaged ones are left out."""
+        """Yield keys and contents in the order of the files' names, without damaged ones."""
         for path in sorted(entry.path for entry in self._finished()):
             try:
                 stored = Path(path).read_bytes()
@@ -252,9 +252,9 @@ class FolderStore:
                 yield key, content
 
     def discard(self, key: str) -> None:
-        """Count the content of a key as damaged, and delete it if that is allowed."""
+        """Count the content of a key as damaged, and delete it if permitted."""
         self.damaged += 1
-        with suppress(OSError):  # a folder that may only be read
+        with suppress(OSError):  # a read-only folder
             self._path(key).unlink(missing_ok=True)
 
     def __len__(self) -> int:
@@ -264,7 +264,7 @@ class FolderStore:
         return self.folder / f"{sha256(key.encode()).hexdigest()}{self.suffix}"
 
     def _entries(self) -> Iterator[_Entry]:
-        """Yield the files, those that a killed process left unfinished among them."""
+        """Yield the files, including unfinished ones of killed processes."""
         with os.scandir(self.folder) as listed:
             for item in listed:
                 if item.name.endswith(self.suffix):
@@ -277,11 +277,11 @@ class FolderStore:
                     yield _Entry(status.st_mtime_ns, status.st_size, item.path)
 
     def _finished(self) -> Iterator[_Entry]:
-        """Yield the files that have their name: a killed process may leave a content twice."""
+        """Yield the files without temporary ones, in which a content may occur a second time."""
         return (entry for entry in self._entries() if not is_temporary(Path(entry.path).name))
 
     def _tidy_up(self, most_bytes: int) -> None:
-        """Delete files until the rest is small enough, if all together are too large."""
+        """Delete the least recently used files, if all together exceed the bound."""
         entries = sorted(self._entries())
         size = sum(entry.size for entry in entries)
         if size <= most_bytes:
@@ -291,13 +291,13 @@ class FolderStore:
                 return
             try:
                 Path(entry.path).unlink(missing_ok=True)
-            except PermissionError:  # of somebody else, in a folder like /tmp
+            except PermissionError:  # another user's file in a shared folder
                 continue
             size -= entry.size
 
 
 def _packed(content: bytes, key: str) -> bytes:
-    """Return what a file holds: checksum, a line with the key, the content."""
+    """Return the bytes of a file: checksum, a line with the key, the content."""
     body = json.dumps(key).encode() + b"\n" + content
     return sha256(body).digest() + body
 

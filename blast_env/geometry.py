@@ -1,4 +1,4 @@
-"""Axis-parallel rectangles, the only plane figure that sites are made of; cells of a grid."""
+"""Axis-parallel rectangles, the only plane figures of sites; cells, pieces and layouts."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,7 +14,7 @@ Cell = tuple[int, int]
 
 
 class Piece(NamedTuple):
-    """An item of a build zone's catalogue that was set down.
+    """A placed item of a build zone's catalogue.
 
     Attributes:
         row: Row of its lower left cell.
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
 
 
 class Measure(Piece):
-    """What hardens parts of facades, or takes a structure away: a piece that covers no cell.
+    """A piece that covers no cell: it hardens parts of facades or removes a structure.
 
     Its row and column are 0. It is equal to the plain tuple.
     """
@@ -39,18 +39,18 @@ class Measure(Piece):
 
     @classmethod
     def named(cls, item: str) -> "Measure":
-        """Return the measure of a name."""
+        """Return the measure with a name."""
         return cls(0, 0, item)
 
 
 class Removal(Measure):
-    """A measure that takes structures away: other than what hardens, it changes loads."""
+    """A measure that removes structures; unlike hardening, it changes loads."""
 
     __slots__ = ()
 
 
 Element = Cell | Piece
-"""What a layout consists of: single modules, or pieces where the build zone has a catalogue."""
+"""An element of a layout: a single module, or a piece if the build zone has a catalogue."""
 
 
 class Rectangle(NamedTuple):
@@ -68,7 +68,7 @@ class Rectangle(NamedTuple):
 
     @classmethod
     def around(cls, rectangles: "Sequence[Rectangle]") -> "Rectangle":
-        """Return the smallest rectangle that contains all of at least one."""
+        """Return the smallest rectangle that contains all the given ones, at least one."""
         left, bottom, right, top = zip(*rectangles, strict=True)
         return cls(min(left), min(bottom), max(right), max(top))
 
@@ -94,7 +94,7 @@ class Rectangle(NamedTuple):
         return Rectangle(*(factor * value for value in self))
 
     def contains(self, other: "Rectangle", tolerance: float = 1e-9) -> bool:
-        """Whether `other` lies inside, its sides touching allowed."""
+        """Whether `other` lies inside; sides may touch."""
         return (
             other.left >= self.left - tolerance
             and other.bottom >= self.bottom - tolerance
@@ -103,7 +103,7 @@ class Rectangle(NamedTuple):
         )
 
     def overlaps(self, other: "Rectangle", tolerance: float = 1e-9) -> bool:
-        """Whether the interiors meet; rectangles that only touch do not overlap."""
+        """Whether the interiors intersect; rectangles that only touch do not overlap."""
         return (
             self.left < other.right - tolerance
             and other.left < self.right - tolerance
@@ -116,12 +116,12 @@ class Rectangle(NamedTuple):
         return bool(self.meets_segments(start, np.array(end[0]), np.array(end[1])))
 
     def meets_segments(self, start: tuple[float, float], x: FloatArray, y: FloatArray) -> BoolArray:
-        """Return which segments from `start` have a point in the open rectangle; of any shape.
+        """Return a mask of the segments that have a point in the open rectangle.
 
         Args:
-            start: Where all of them begin.
-            x: Of their ends, of any shape.
-            y: Of their ends, of the same shape.
+            start: The common start of the segments.
+            x: x of their ends, of any shape.
+            y: y of their ends, of the same shape.
         """
         enter, leave = np.zeros(x.shape), np.ones(x.shape)
         bounds = ((self.left, self.right, x), (self.bottom, self.top, y))
@@ -141,9 +141,9 @@ Place = tuple[float, float]
 """x and y."""
 
 Side = tuple[Place, Place]
-"""From where to where a part of an outline runs."""
+"""Start and end of a part of an outline."""
 
-_DIGITS = 9  # of a coordinate: what is beyond is rounding
+_DIGITS = 9  # of a coordinate; further digits are rounding errors
 
 
 def open_sides(rectangles: Sequence[Rectangle]) -> list[list[Side]]:
@@ -171,7 +171,7 @@ def _open_sides(own: Rectangle, all_of_them: Sequence[Rectangle]) -> Iterator[Si
 
 
 def _gaps(low: float, high: float, taken: Iterable[Place]) -> Iterator[Place]:
-    """Yield what intervals leave of one, the lowest first."""
+    """Yield the parts of an interval that no other covers, the lowest first."""
     for begin, end in sorted(taken):
         if begin > low:
             yield low, min(begin, high)
@@ -225,15 +225,16 @@ def _turn(way: Place, here: Place, there: Place) -> float:
 
 
 def stacked_runs(cells: BoolArray) -> IntArray:
-    """Return rectangles that together are cells, none over another.
+    """Return disjoint rectangles that together cover the cells exactly.
 
-    Rows are cut into runs, and equal runs above each other are one rectangle.
+    Rows are cut into runs, and equal runs above each other become one rectangle.
 
     Args:
         cells: The cells (rows, columns).
 
     Returns:
-        Lowest row, leftmost column, rows and columns of each (rectangles, 4), by row and column.
+        Lowest row, leftmost column, number of rows and number of columns of each rectangle
+        (rectangles, 4), ordered by row and column.
     """
     framed = np.zeros((cells.shape[0], cells.shape[1] + 2), dtype=np.int8)
     framed[:, 1:-1] = cells
@@ -251,11 +252,11 @@ def stacked_runs(cells: BoolArray) -> IntArray:
 
 
 Layout = tuple[Element, ...]
-"""The modules, or the pieces, in the order of their placing."""
+"""The modules, or the pieces, in the order of placement."""
 
 
 def standing(layout: "Iterable[Element]") -> "Layout":
-    """Return what of a layout stands on the ground: all but its measures."""
+    """Return the elements of a layout that stand on the ground: all but its measures."""
     return tuple(element for element in layout if not isinstance(element, Measure))
 
 
@@ -265,12 +266,12 @@ def layout_text(layout: Iterable[Element]) -> str:
 
 
 def layout_counts(layout: Iterable[Element], kind: str = "", of: int | None = None) -> str:
-    """Return what a layout consists of: `1 module`, `3 of 9 pieces (2 wall, 1 post), new glass`.
+    """Return a layout in counts: `1 module`, `3 of 9 pieces (2 wall, 1 post), new glass`.
 
     Args:
         layout: Modules or pieces, and measures.
-        kind: What kind of them, before the word: `barrier`.
-        of: How many there are in stock.
+        kind: Adjective before the word, such as `barrier`.
+        of: Number in stock.
     """
     elements = tuple(layout)
     measures = [each.item for each in elements if isinstance(each, Measure)]
@@ -286,7 +287,7 @@ def layout_counts(layout: Iterable[Element], kind: str = "", of: int | None = No
 
 
 def layout_words(layout: "Layout") -> str:
-    """Return what a layout has, also if that is nothing."""
+    """Return a layout in counts, `nothing` for an empty one."""
     return layout_counts(layout) if layout else "nothing"
 
 

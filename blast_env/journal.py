@@ -1,4 +1,4 @@
-"""Results of long work, one JSON object a line: what was interrupted goes on from there."""
+"""Results of long work, one JSON object per line, from which interrupted work resumes."""
 
 import json
 import os
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 MOST_BYTES: Final = 100_000_000
-"""Most that a file may have: some hundred thousand results."""
+"""Largest size of a file: some hundred thousand results."""
 
 Result = TypeVar("Result", bound="DataclassInstance")
 
@@ -24,8 +24,8 @@ class Journal(Generic[Result]):
     """A file of results.
 
     Attributes:
-        path: The file; it need not be there.
-        kind: A dataclass that pydantic can check: what a line is.
+        path: The file; it need not exist.
+        kind: The dataclass of a line, which pydantic can check.
     """
 
     path: Path
@@ -34,10 +34,10 @@ class Journal(Generic[Result]):
     def read(self) -> list[Result]:
         """Return the results; none if there is no such file.
 
-        A last line that was cut short is left out: what it was about is done again.
+        A last line that was cut short is left out, so that its work is done again.
 
         Raises:
-            BlastEnvError: If a line is anything else; the message has file, line, key and bound.
+            BlastEnvError: If a line is not of this kind; the message has file, line, key and bound.
         """
         if not self.path.exists():
             return []

@@ -1,6 +1,6 @@
-"""Texts of a picture, and where they stand so that none covers another.
+"""Labels of a picture, and their placement without overlap.
 
-Places are in any units, y upwards: metres of a drawing, pixels of a frame.
+Positions are in any units, y upwards: metres of a drawing, pixels of a frame.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,7 +12,7 @@ from blast_env.geometry import Rectangle
 from blast_env.plan import Feature, FeatureKind, Kinds
 
 Point = tuple[float, float]
-_NOTHING: Final = 1e-6  # of a place: what may be covered by rounding
+_NOTHING: Final = 1e-6  # share of an area that rounding may cover
 
 
 @dataclass(frozen=True)
@@ -20,8 +20,8 @@ class Label:
     """A text of a picture.
 
     Attributes:
-        text: The text, perhaps in lines.
-        feature: What it belongs to.
+        text: The text, of one or more lines.
+        feature: The labelled feature.
     """
 
     text: str
@@ -29,9 +29,9 @@ class Label:
 
 
 def labels_of(features: Iterable[Feature]) -> tuple[Label, ...]:
-    """Return the texts of features, those of the lowest first.
+    """Return the labels of features, in the order of the features.
 
-    Things of a kind in one place share a text, in lines; what they have in common is there once.
+    Features of one kind and one bounding box share a label, with a line per distinct text.
     """
     shared: dict[tuple[FeatureKind, Rectangle], list[Feature]] = {}
     for feature in features:
@@ -45,12 +45,12 @@ def labels_of(features: Iterable[Feature]) -> tuple[Label, ...]:
 
 @dataclass(frozen=True)
 class Settled:
-    """A label where it stands.
+    """A label and its position.
 
     Attributes:
         label: The label.
-        place: What its text fills.
-        leader: A line from what it belongs to, where that is far off.
+        place: Rectangle of its text.
+        leader: A line from its feature to the text, if the two are far apart.
     """
 
     label: Label
@@ -69,20 +69,23 @@ def settled_labels(
     far: float,
     others: Iterable[Rectangle] = (),
 ) -> list[Settled]:
-    """Return where labels stand, each as near to its own as the others and what is taken let it.
+    """Place each label as near to its feature as occupied space allows.
 
-    Where nothing is free, it is the place that covers least.
+    If there is no free position, a label takes the one that covers least.
 
     Args:
-        features: What is on the site; no label covers what stands, and signs.
+        features: The features on the site; labels avoid structures, barriers and signs.
         labels: The labels, the most important first.
         sizes: Width and height of each label.
-        box: Gives what a feature takes in the picture.
-        room: Gives where inside of a feature its label may stand, if anywhere.
-        within: Where all are to be.
-        gap: Between a label and its own.
-        far: From where on a label has a leader.
-        others: What else should not be covered.
+        box: Returns the rectangle of a feature in the picture.
+        room: Returns the rectangle inside a feature that its label may use, or None.
+        within: Rectangle for all labels.
+        gap: Distance between a label and its feature.
+        far: Distance beyond which a label has a leader.
+        others: Further rectangles to avoid.
+
+    Returns:
+        The labels in the given order.
     """
     solid = [
         box(each)
@@ -102,12 +105,12 @@ def settled_labels(
     return found
 
 
-_RINGS: Final = 12  # around a thing, each half a text higher than the one before
+_RINGS: Final = 12  # around a feature, each farther off by half the height of the text
 _DIRECTIONS: Final = 24
 
 
 def _leader(own: Rectangle, place: Rectangle, far: float) -> tuple[Point, Point] | None:
-    """Return the shortest line from a thing to its text, if that is far off."""
+    """Return a line from a feature to its text, if it is longer than `far`."""
     ends = [
         (
             min(max(other.centre[0], box.left), box.right),
@@ -122,11 +125,11 @@ def _leader(own: Rectangle, place: Rectangle, far: float) -> tuple[Point, Point]
 def best_place(
     places: Iterable[tuple[Rectangle, Sequence[Rectangle]]], within: Rectangle
 ) -> Rectangle:
-    """Return the first place that covers nothing, or else the one that covers least.
+    """Return the first rectangle that covers nothing, or else the one that covers least.
 
     Args:
-        places: The places, each with what it should not cover, the best one first.
-        within: Where it is to be.
+        places: The candidates, the best first, each with the rectangles to avoid.
+        within: Rectangle for the result; area outside of it counts as covering.
     """
     best, least = None, inf
     for place, taken in places:
@@ -141,7 +144,7 @@ def best_place(
 
 
 def _places_around(own: Rectangle, size: tuple[float, float], gap: float) -> Iterator[Rectangle]:
-    """Yield places beside a thing, nearer ones first: above, below, beside, then all around."""
+    """Yield positions around a feature, nearer ones first: above, below, beside, then in rings."""
     (x, y), (width, height) = own.centre, size
     across = (own.right - own.left + width) / 2.0 + gap
     along = (own.top - own.bottom + height) / 2.0 + gap
@@ -150,7 +153,7 @@ def _places_around(own: Rectangle, size: tuple[float, float], gap: float) -> Ite
     for ring in range(_RINGS):
         for step in range(_DIRECTIONS):
             angle = 2.0 * pi * step / _DIRECTIONS
-            # Along a rectangle, so that texts slide along the sides of their own.
+            # Along a rectangle, so that texts slide along the sides of their feature.
             right, up = (min(max(sqrt(2.0) * part, -1.0), 1.0) for part in (sin(angle), cos(angle)))
             off = 0.5 * ring * height
             yield _centred((x + right * (across + off), y + up * (along + off)), size)

@@ -1,7 +1,7 @@
-"""Fields of a dataclass that are options of the command line: each says what it is, once.
+"""Fields of a dataclass that are options of the command line, each described once.
 
-A dataclass that is an argument in Python can be one of the command line, too: the commands read its
-fields. Nothing here knows how they do that (`blast_env.cli.command`).
+A dataclass that is an argument in Python can also be one on the command line: commands read its
+fields. `blast_env.cli.command` does that; this module does not depend on it.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 FOLDER: Final[tuple[str, ...]] = ()
-"""Says of an option that a folder is written there."""
+"""Value of `writes` for an option that names a folder to write."""
 
 TEXT: Final = "option"
 """Key of the text in the metadata of a field."""
@@ -17,13 +17,14 @@ TEXT: Final = "option"
 
 @dataclass(frozen=True)
 class OptionText:
-    """What the command line needs to know of a field beside its name, type and default.
+    """Description of a field for the command line, beside its name, type and default.
 
     Attributes:
-        help: What it says of itself.
-        is_argument: Whether it stands without a name on the command line.
-        flag: What one writes there, where the field's name does not say it.
-        writes: Suffixes of the file that is written there; `FOLDER`; None if nothing is.
+        help: Help text.
+        is_argument: Whether it is a positional argument.
+        flag: Name of the option, if not derived from the field's name.
+        writes: Suffixes of the file that it names for writing; `FOLDER` for a folder; None if
+            nothing is written.
         panel: Heading under which help shows it; None for the first.
         settings: Bounds (`min`, `max`), `metavar`, and `show_default` for a default in words.
     """
@@ -48,18 +49,18 @@ def option(
     """Return a field that is an option; see `OptionText`.
 
     Args:
-        default: Its default; `...` where it must be given.
-        help: What it says of itself.
-        flag: What one writes on the command line; `--cell` of a field `cell_m` unless given.
-        writes: Suffixes of the file that is written there; `FOLDER` for a folder.
-        panel: Heading under which help shows it, unless it is the first.
+        default: Its default; `...` for a required option.
+        help: Help text.
+        flag: Name of the option; by default `--cell` for a field `cell_m`.
+        writes: Suffixes of the file that it names for writing; `FOLDER` for a folder.
+        panel: Heading under which help shows it; None for the first.
         settings: Bounds, `metavar`, `show_default`.
     """
     return _field(default, OptionText(help, False, flag, writes, panel, settings))
 
 
 def argument(help: str, *, default: Any = ...) -> Any:  # noqa: A002
-    """Return a field that stands without a name on the command line; see `option`."""
+    """Return a field that is a positional argument; see `option`."""
     return _field(default, OptionText(help, is_argument=True))
 
 

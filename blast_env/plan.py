@@ -1,8 +1,8 @@
-"""What is on a site, as one list that every picture, drawing and map shows.
+"""The features of a site, as one list for all pictures, drawings and maps.
 
-A kind of thing says once what legends call it and how it looks. The back ends (matplotlib,
-the page's SVG, DXF and GeoJSON) draw any kind by its geometry and its look; none of them has a list
-of its own. So a new condition of the build zone is one more feature in `zone_features`.
+A kind of feature defines its name in legends and its look once. The back ends (matplotlib,
+the page's SVG, DXF and GeoJSON) draw any kind by its geometry and its look; none of them lists the
+kinds again. So a new condition of the build zone is one more feature in `zone_features`.
 
 Coordinates are local: x to the right and y upwards from the lower left corner of the site.
 """
@@ -61,16 +61,17 @@ _ITEMS: Final[tuple[Colour, ...]] = (
     *((0, 114, 178), (230, 159, 0), (204, 121, 167), (86, 180, 233)),
     *((240, 228, 66), (140, 86, 41), (107, 79, 168), (250, 168, 140)),
 )
-"""Okabe and Ito's without the red of charges and the green of what is protected, and others."""
+"""Colours of Okabe and Ito without the red of charges and the green of protected structures, and
+three others."""
 
-_DARKER: Final = 0.6  # a ninth item has the colour of the first one, darker
-_DIGITS: Final = 9  # of a metre: what is beyond is rounding
+_DARKER: Final = 0.6  # factor for a ninth item, which has the colour of the first one, darker
+_DIGITS: Final = 9  # decimals of a metre; further digits are rounding errors
 _WAY_PLACES: Final = (0.5, 0.75, 0.25, 0.875, 0.125)
 
 
 @dataclass(frozen=True)
 class Look:
-    """How things of a kind look.
+    """The look of features of a kind.
 
     Attributes:
         line: Colour of outlines, lines and signs; without one, areas have no outline.
@@ -78,12 +79,12 @@ class Look:
         dashed: Whether lines are dashed.
         arrows: Whether a line has an arrow at both ends.
         fill: Colour of an area; without one, it is open.
-        opacity: How much of what is below the fill hides, 0 to 1.
+        opacity: Opacity of the fill, 0 to 1.
         hatched: Whether an area is filled with slanted lines.
-        sign: What marks a single place.
+        sign: Marker of a single point.
         drawn_dashed: Whether drawings, which have no fills, show it with dashes: a condition
-            rather than a thing.
-        cad_colour: Its colour in drawings, of AutoCAD's index.
+            rather than an object.
+        cad_colour: Its colour in drawings, from AutoCAD's colour index.
     """
 
     line: Colour | None = None
@@ -100,14 +101,14 @@ class Look:
 
 @dataclass(frozen=True)
 class FeatureKind:
-    """What a feature is.
+    """A kind of feature.
 
     Attributes:
-        name: Layers of drawings are named after it, and maps have it in `kind`.
-        words: What legends call it.
-        level: What has a higher one lies on top.
-        look: How it looks.
-        named: Where drawings have its name: inside it, explained by a letter beside it, or nowhere.
+        name: Name of its layer in drawings and of its `kind` in maps.
+        words: Name in legends.
+        level: Order of drawing; kinds of a higher level lie on top.
+        look: Its look.
+        named: Place of its name in drawings: inside it, explained by a letter beside it, or none.
     """
 
     name: str
@@ -118,7 +119,7 @@ class FeatureKind:
 
 
 class Kinds:
-    """The kinds of features that there are."""
+    """All kinds of features."""
 
     SITE: Final = FeatureKind(
         "site", "site border", 1.0, Look(BORDER, 1.8, fill=SITE, cad_colour=8), named=""
@@ -215,10 +216,10 @@ class Kinds:
 
 
 STANDING: Final = (Kinds.TERRACE, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.BARRIER)
-"""What stands on the ground and has a height."""
+"""Kinds that stand on the ground and have a height."""
 
 _ON_LEVELS: Final = (Kinds.COST_AREA, Kinds.KEEP_OUT, Kinds.BUILD_ZONE)
-"""What lies on the ground, or on terraces."""
+"""Kinds that lie on the ground or on terraces."""
 
 SITE_KINDS: Final = tuple(each for each in vars(Kinds).values() if isinstance(each, FeatureKind))
 """All kinds, the lowest first."""
@@ -227,24 +228,25 @@ FREE_CELL: Final = FeatureKind("free_cell", "free cell", 1.12, Look(fill=(214, 2
 NO_CELL: Final = FeatureKind(
     "no_cell", "cell not available", 1.1, Look(fill=(226, 228, 232), hatched=True)
 )
-"""What pictures show while a layout is made; maps and drawings know nothing of cells."""
+"""Kinds of cells, shown in pictures of a layout in progress only, not in maps and drawings."""
 
 
 @dataclass(frozen=True)
 class Feature:
-    """One thing on the site.
+    """One feature of the site.
 
     Attributes:
-        kind: What it is.
-        places_m: One place of a point, two of a line, more of an area: its corners,
-            counterclockwise, those of a rectangle from the lower left one.
+        kind: Its kind.
+        places_m: (x, y) of a point, of the two ends of a line, or of the corners of an area,
+            counterclockwise, for a rectangle from the lower left one.
         name: For people: a structure's name, the reason of a keep-out, a module's identifier.
-        properties: What else there is to say; plain values, units in the keys.
-        words: What legends call it, where that is more than its kind.
-        label: What pictures write beside it.
-        fill: The colour of its area, where things of its kind differ.
+        properties: Further properties; plain values, units in the keys.
+        words: Name in legends, if it differs from that of its kind.
+        label: Text beside it in pictures.
+        fill: The colour of its area, if it differs from that of its kind.
         is_raised: Whether there is air below it.
-        part_of: What it is a rectangle of, where it is drawn without lines between the parts.
+        part_of: Identifier of the area of which it is one rectangle; such parts are drawn without
+            lines between them.
     """
 
     kind: FeatureKind
@@ -259,13 +261,13 @@ class Feature:
 
     @property
     def look(self) -> Look:
-        """How it looks: as its kind does, with dashes if there is air below it."""
+        """Its look: that of its kind, with dashes if there is air below it."""
         look = self.kind.look
         return replace(look, dashed=True, drawn_dashed=True) if self.is_raised else look
 
     @property
     def title(self) -> str:
-        """What legends call it."""
+        """Its name in legends."""
         return self.words or self.kind.words
 
     @property
@@ -281,12 +283,12 @@ class Feature:
 
     @property
     def above_ground_m(self) -> float:
-        """How high above the ground a place is."""
+        """Height of a point above the ground, m; 0 if not given."""
         return self._metres("above_ground_m")
 
     @property
     def base_m(self) -> float:
-        """How high it begins above the ground."""
+        """Height of its base above the ground, m; 0 if not given."""
         return self._metres("base_m")
 
     def _metres(self, key: str) -> float:
@@ -298,12 +300,12 @@ class Feature:
 def site_features(
     scenario: Scenario, layout: Sequence[Element] = (), charge: Charge | None = None
 ) -> tuple[Feature, ...]:
-    """Return everything that a scenario and a layout put on the site, the lowest first.
+    """Return the features of a scenario with a layout, the lowest first.
 
     Args:
         scenario: The scenario.
-        layout: What stands on the build zone; it must fit there.
-        charge: The charge, where it is known.
+        layout: The layout of the build zone; it must fit there.
+        charge: The charge, if known.
     """
     zone, there = scenario.build_zone, scenario.structures_with(layout)
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
@@ -330,22 +332,22 @@ def site_features(
 def blast_features(
     scenario: Scenario, layout: Sequence[Element], charge: Charge
 ) -> tuple[Feature, ...]:
-    """Return what is on the site of a blast: its charge alone, not where others may be."""
+    """Return the features of a site with one charge, without the possible places of charges."""
     return without(site_features(scenario, layout, charge), Kinds.CHARGE_PLACE)
 
 
 def in_order(features: Iterable[Feature]) -> tuple[Feature, ...]:
-    """Return features so that what lies on top comes last."""
+    """Return features in the order of drawing: the topmost last."""
     return tuple(sorted(features, key=lambda each: each.kind.level))
 
 
 def without(features: Iterable[Feature], *kinds: FeatureKind) -> tuple[Feature, ...]:
-    """Return the features that are of other kinds."""
+    """Return the features of all but the given kinds."""
     return tuple(each for each in features if each.kind not in kinds)
 
 
 def outlines_of(areas: Iterable[Feature]) -> Iterator[tuple[PointM, ...]]:
-    """Yield the outlines of areas of one look; parts of one thing have theirs together."""
+    """Yield the outlines of areas of one look; the parts of one area have a common outline."""
     wholes: dict[str, list[Rectangle]] = {}
     for area in areas:
         if area.part_of:
@@ -404,7 +406,7 @@ def zone_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Fe
 
     Args:
         zone: The build zone.
-        structures_m: What stands on the site; the access way is drawn where nothing does.
+        structures_m: Rectangles of the structures, which the drawn access way avoids.
     """
     conditions: dict[str, str | float] = {"stock": zone.stock, "clearance_m": zone.clearance_m}
     if zone.items:
@@ -428,7 +430,8 @@ def zone_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Fe
 def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterator[Feature]:
     """Yield the access way of a zone and its gate.
 
-    Where the way runs is left open; its arrow is where no structure stands, or through the gate.
+    A scenario does not fix the course of the way; its arrow avoids structures, or runs through the
+    gate.
     """
     way = zone.access_way
     if way is None:
@@ -450,14 +453,14 @@ def _way_features(zone: BuildZone, structures_m: Sequence[Rectangle]) -> Iterato
 
 
 def cell_features(zone: BuildZone, cells: BoolArray) -> Iterator[Feature]:
-    """Yield where something may be placed and where not; `cells` (rows, columns) are where."""
+    """Yield areas of free and of other cells; `cells` (rows, columns) is true for free ones."""
     for kind, chosen in ((NO_CELL, ~cells), (FREE_CELL, cells)):
         for each in rectangles_of(chosen, zone.corner_m):
             yield area_feature(kind, each, kind.words)
 
 
 def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:
-    """Return the colour of each item of a catalogue, and of single modules under no name."""
+    """Return the colour of each item of a catalogue; single modules have the name `""`."""
     names = [""] if zone is None or not zone.items else [item.name for item in zone.items]
     colours: dict[str, Colour] = {}
     for number, name in enumerate(names):
@@ -468,7 +471,7 @@ def item_colours(zone: BuildZone | None) -> Mapping[str, Colour]:
 
 
 def item_words(zone: BuildZone, layout: Sequence[Element]) -> Mapping[str, str]:
-    """Return what legends call each item: with its height, and how many of the stock stand."""
+    """Return the name of each item in legends, with its height and the placed part of the stock."""
     placed = Counter(each.item if isinstance(each, Piece) else "" for each in layout)
     heights = {item.name: f"{item.height_m:g} m" for item in zone.items}
     stocks = {item.name: item.stock for item in zone.items}
@@ -484,7 +487,7 @@ def item_words(zone: BuildZone, layout: Sequence[Element]) -> Mapping[str, str]:
 def barrier_features(scenario: Scenario, layout: Sequence[Element]) -> Iterator[Feature]:
     """Yield the modules of a layout, or its pieces as wholes, with the names of the tables.
 
-    What stands on a terrace has the height of its top above the ground, and its `base_m`.
+    Heights are those of the top above the ground; barriers on a terrace have a `base_m`, too.
     """
     zone = scenario.zone
     colours, words = item_colours(zone), item_words(zone, layout)
@@ -516,7 +519,7 @@ def barrier_features(scenario: Scenario, layout: Sequence[Element]) -> Iterator[
 def _ends_of(
     scenario: Scenario, rectangle_m: Rectangle, height_m: float | None
 ) -> dict[str, float]:
-    """Return where a barrier ends above the ground and, on a terrace, where it begins."""
+    """Return the top of a barrier above the ground, m, and its base if it is on a terrace."""
     base_m = ground_below_m(scenario.structures, rectangle_m)
     top = {} if height_m is None else {"height_m": base_m + height_m}
     return {**top, "base_m": base_m} if base_m else top
@@ -526,7 +529,7 @@ def _ends_of(
 
 
 def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
-    """Yield the structures; of a building in several parts the largest one has the label."""
+    """Yield the structures; the largest part of a building in several parts has the label."""
     structures = tuple(structures)
     for name, parts in buildings_of(structures).items():
         largest = max(parts, key=lambda each: each.rows * each.columns)
@@ -550,7 +553,7 @@ def _structure_feature(kind: FeatureKind, structure: AnyStructure) -> Feature:
 
 
 def _said_of(structure: AnyStructure) -> dict[str, str | float]:
-    """Return what there is to say of a structure beside its name."""
+    """Return the properties of a structure, without those that are None or a base of 0."""
     said = {
         "weight": structure.weight,
         "height_m": structure.height_m,
@@ -561,7 +564,7 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float]:
 
 
 def source_features(sources: Iterable[AnySource]) -> Iterator[Feature]:
-    """Yield where charges may be: points, lines or areas, or the entries of vehicles."""
+    """Yield the possible places of charges: points, lines or areas, or the entries of vehicles."""
     for number, source in enumerate(sources, start=1):
         yield from _places_of(source, number)
 
@@ -588,18 +591,18 @@ def _places_of(source: AnySource, number: int) -> Iterator[Feature]:
         label = ""  # once for all entries
 
 
-# Vehicles: what follows from a layout rather than from the scenario.
+# Vehicles: their features follow from a layout, not from the scenario alone.
 
 
 def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tuple[Feature, ...]:
-    """Return the ground that vehicles reach, their worst places, and the stand-off that is left.
+    """Return the ground that vehicles reach, their worst places and ways, and the stand-offs.
 
-    The stand-off is the line from the vehicle's worst place to the nearest wall that counts, with
-    its length in metres.
+    A stand-off is a line from a vehicle's worst place to the nearest wall that counts, with its
+    length in metres.
 
     Args:
-        scenario: The scenario; without a vehicle there is nothing.
-        layout: What stands on the build zone.
+        scenario: The scenario; without a vehicle there are no features.
+        layout: The layout of the build zone.
     """
     found: list[Feature] = []
     for source in scenario.vehicles:
@@ -619,11 +622,11 @@ def vehicle_features(scenario: Scenario, layout: Sequence[Element] = ()) -> tupl
 
 
 def _way_of_vehicle(way: Sequence[WayPoint], through: Sequence[Impact]) -> Iterator[Feature]:
-    """Yield the straight parts of a vehicle's way, with its speed at the entry and what it breaks.
+    """Yield the straight parts of a vehicle's way, its speed at the entry, and its impacts.
 
     Args:
         way: Its places and speeds.
-        through: What it breaks through.
+        through: The pieces that it breaks through, with its speed at each.
     """
     if len(way) < 2:
         return
@@ -647,7 +650,7 @@ def _way_of_vehicle(way: Sequence[WayPoint], through: Sequence[Impact]) -> Itera
 
 
 def stand_off_text(scenario: Scenario, layout: Sequence[Element]) -> str:
-    """Return how near vehicles come with a layout and without, in words; empty without any."""
+    """Return the least stand-off with a layout and without, as text; empty without vehicles."""
     if not scenario.vehicles:
         return ""
     with_layout, bare = (
@@ -662,10 +665,10 @@ def stand_off_text(scenario: Scenario, layout: Sequence[Element]) -> str:
 def rectangles_of(
     squares: BoolArray, corner_m: PointM = (0.0, 0.0), side_m: float = MODULE_SIDE_M
 ) -> list[Rectangle]:
-    """Return few rectangles that cover squares of a grid, and nothing else.
+    """Return few rectangles that together cover the given squares of a grid exactly.
 
     Args:
-        squares: Which squares (rows, columns), the lowest row first.
+        squares: Mask of the squares (rows, columns), the lowest row first.
         corner_m: Lower left corner of the grid.
         side_m: Side of a square.
     """
@@ -682,5 +685,5 @@ def rectangles_of(
 
 
 def rounded_m(x_m: float, y_m: float) -> PointM:
-    """Return a place without what is but rounding."""
+    """Return a place, in metres, without rounding errors."""
     return round(x_m, _DIGITS), round(y_m, _DIGITS)

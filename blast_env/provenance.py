@@ -1,4 +1,4 @@
-"""Where a result comes from: the versions that made it, the code, and the command."""
+"""The origin of a result: versions, code and command."""
 
 import platform
 import sys
@@ -35,14 +35,14 @@ def package_version() -> str:
 
 
 def versions(engine: str | None = None, packages: Sequence[str] = ("numpy",)) -> dict[str, str]:
-    """Return the versions that a result depends on, for its record.
+    """Return the versions on which a result depends, for its record.
 
     Args:
-        engine: Version of the engine, where one engine made the result.
-        packages: Further distributions; one that is missing is `"not installed"`.
+        engine: Version of the engine, if one engine made the result.
+        packages: Further distributions; a missing one is `"not installed"`.
 
     Returns:
-        `blast_env`, `engine` if there is one, `python`, and the packages by their names.
+        Versions of `blast_env`, `engine` if given, `python`, and the packages, by their names.
     """
     own = {"blast_env": package_version()}
     if engine is not None:
@@ -60,8 +60,8 @@ def code_digest(folder: Path, left_out: Collection[str] = ()) -> str:
     """Return 16 hexadecimal digits of a hash of all Python files in a folder.
 
     Args:
-        folder: The folder; those below it count too.
-        left_out: Names of files and folders directly in it that do not.
+        folder: The folder; its subfolders count too.
+        left_out: Names of files and folders directly in it that do not count.
     """
     digest = sha256()
     for path in sorted(folder.rglob("*.py")):
@@ -73,9 +73,9 @@ def code_digest(folder: Path, left_out: Collection[str] = ()) -> str:
 
 @cache
 def code_version() -> str:
-    """Return the version of the package, with a digest of the code that loads depend on.
+    """Return the version of the package, with a digest of the code on which loads depend.
 
-    The digest, because whoever changes the model does not change the version at once.
+    The model may change between releases, so the version alone does not identify it.
     """
     digest = code_digest(Path(__file__).resolve().parent, _NO_INFLUENCE)
     return f"{package_version()}+{digest}"

@@ -1,7 +1,7 @@
-"""Reading what others wrote, in a process of its own that has limits and can be ended.
+"""Reading of untrusted files, in a separate process that has limits and can be ended.
 
-A file that was made on purpose can keep a parser busy for hours, or ask for all memory. Readers
-count before they build; this is for what they do not foresee.
+A malicious file can keep a parser busy for hours, or exhaust the memory. Readers check sizes
+first; this module guards against the cases that they do not foresee.
 """
 
 import os
@@ -23,12 +23,12 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class ReadingLimits:
-    """What reading something may take.
+    """Limits of a process that reads a file.
 
     Attributes:
-        processor_s: Processor time of all threads; where the system limits it, not on Windows.
-        memory_bytes: Memory beyond that of the libraries; where the system limits it, on Linux.
-        wall_s: Time on the clock, everywhere. It is longer, because a computer may be busy.
+        processor_s: Processor time of all threads; not limited on Windows.
+        memory_bytes: Memory beyond that of the libraries; limited on Linux only.
+        wall_s: Wall time, on all systems; longer, because a computer may be busy.
     """
 
     processor_s: int = 6
@@ -39,24 +39,24 @@ class ReadingLimits:
 LIMITS: Final = ReadingLimits()
 
 _WITHIN: Final = "BLAST_ENV_READING"
-"""Set in processes that read: what they read in turn counts to their own limits."""
+"""Set in reading processes: a nested `read_apart` counts towards their limits."""
 
 
 class ReadingError(BlastEnvError):
-    """Reading something took more than it may, or ended its process."""
+    """Reading a file exceeded a limit, or ended its process."""
 
 
 class Reading(Generic[Found]):
-    """A function at work on what others wrote, in a process of its own.
+    """A function that reads an untrusted file in a separate process.
 
-    Its process starts at once, and gets its work when `result` waits for it. As a context manager
-    it is ended with the block, whatever happens.
+    The process starts at once, and receives its work in `result`. A context manager ends it with
+    the block, also after an error.
 
     Args:
-        what: What is read, for errors: the name of the file.
-        function: What reads it. It, its arguments and its result pickle.
+        what: Name of the file, for errors.
+        function: The reader. It, its arguments and its result must pickle.
         arguments: Its arguments.
-        limits: What it may take.
+        limits: Limits of the process.
     """
 
     def __init__(
@@ -79,11 +79,11 @@ class Reading(Generic[Found]):
         )
 
     def result(self) -> Found:
-        """Wait, and return what the function returned.
+        """Wait for the function, and return its result.
 
         Raises:
-            ReadingError: If it took more than it may, or its process was ended.
-            BaseException: What the function raised.
+            ReadingError: If it exceeded a limit, or its process was ended.
+            BaseException: Any error of the function.
         """
         try:
             answer, _ = self._process.communicate(self._message, self._limits.wall_s)
@@ -102,7 +102,7 @@ class Reading(Generic[Found]):
         return found  # type: ignore[no-any-return]
 
     def end(self) -> None:
-        """End the process, if it is still at work; another thread may do so."""
+        """End the process if it still runs; safe to call from another thread."""
         with suppress(OSError):
             self._process.kill()
         self._process.wait()
@@ -118,7 +118,7 @@ class Reading(Generic[Found]):
                     pipe.close()
 
     def _died(self) -> ReadingError:
-        """Return the error of a process that has ended without an answer."""
+        """Return the error for a process that ended without an answer."""
         code = self._process.returncode
         if -code == getattr(signal, "SIGXCPU", None):
             return self._exceeded(f"{self._limits.processor_s} s of processor time")
@@ -142,13 +142,13 @@ def read_apart(
     *arguments: Any,
     limits: ReadingLimits = LIMITS,
 ) -> Found:
-    """Return what a function returns, called in a process of its own; see `Reading`.
+    """Return the result of a function, called in a separate process; see `Reading`.
 
-    In such a process it is called there: it is limited already, and ends with it.
+    Within such a process the function is called directly: it is subject to its limits.
 
     Raises:
-        ReadingError: If it took more than it may, or its process was ended.
-        BaseException: What the function raised.
+        ReadingError: If it exceeded a limit, or its process was ended.
+        BaseException: Any error of the function.
     """
     if _WITHIN in os.environ:
         return function(*arguments)
@@ -157,9 +157,9 @@ def read_apart(
 
 
 def serve() -> None:
-    """Do in this process what standard input says, and answer on standard output."""
+    """Run the pickled function from standard input, and answer on standard output."""
     with os.fdopen(os.dup(1), "wb") as answers:
-        os.dup2(2, 1)  # what a library prints is no answer
+        os.dup2(2, 1)  # keep the output of libraries out of the answer
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
         limits = pickle.load(sys.stdin.buffer)
         function, arguments = pickle.load(sys.stdin.buffer)
@@ -168,19 +168,19 @@ def serve() -> None:
 
 
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
-    """Return what came of a call: its result or its error."""
+    """Call a function, and return its pickled result or error."""
     try:
         return pickle.dumps((function(*arguments), None))
     except Exception as error:
         if isinstance(error, MemoryError) or "bad_alloc" in str(error):
             return pickle.dumps((None, MemoryError()))
-        if not isinstance(error, BlastEnvError):  # a fault of ours
+        if not isinstance(error, BlastEnvError):  # a fault of the program
             error.add_note("".join(traceback.format_exception(error)))
         return pickle.dumps((None, error))
 
 
 def _limit(limits: ReadingLimits) -> None:
-    """Limit this process, beyond what its libraries have taken already."""
+    """Limit this process, in addition to the time and memory that its libraries took."""
     try:
         import resource
     except ImportError:  # Windows

@@ -1,4 +1,4 @@
-"""Many independent pieces of work, several at a time: here, or on a cluster (`on_cluster`)."""
+"""Independent pieces of work in parallel, on this machine or on a cluster (`on_cluster`)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
@@ -13,7 +13,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 Tell = Callable[[float], None]
-"""Told which share of some work is done."""
+"""A callback for the finished share of some work, 0 to 1."""
 
 
 def run_all(
@@ -22,18 +22,18 @@ def run_all(
     workers: int = 1,
     progress: Tell | None = None,
 ) -> list[Result]:
-    """Return the results of all items in their order; processes do the work.
+    """Return the results of all items in their order, computed in parallel processes.
 
-    The number of workers changes nothing but the time. When an item raises, what has not begun is
-    left out; of several errors the first in the order of the items counts. Where joblib has been
-    told of another backend (`joblib.parallel_config`, `on_cluster`), that one does the work, with
-    as many workers as it was told.
+    Results do not depend on the number of workers. When an item raises, items that have not begun
+    are left out; of several errors the first in the order of the items is raised. If joblib has
+    another backend (`joblib.parallel_config`, `on_cluster`), that one does the work, with its
+    number of workers if that is larger.
 
     Args:
         function: Does one item; it and the items must pickle.
-        items: The work; a single item is done here.
-        workers: How many items are under way at the same time; a single one does them here.
-        progress: Called with the share of the items that is done.
+        items: The work; a single item is done in this process.
+        workers: Number of items in progress at the same time; 1 for this process alone.
+        progress: Called with the finished share of the items.
 
     Raises:
         BlastEnvError: If `workers` is not a whole number of at least 1, or a worker process was
@@ -56,9 +56,9 @@ def as_completed(
     items: Sequence[Item],
     workers: int = 1,
 ) -> Iterator[tuple[int, Result]]:
-    """Yield (index, result) of each item as soon as it is there, so that it can be kept at once.
+    """Yield (index, result) of each item as soon as it is finished, so that it can be saved.
 
-    Processes do it; arguments and errors are those of `run_all`.
+    Arguments and errors are those of `run_all`.
     """
     check_workers("workers", workers)
     count = _processes(workers, len(items))
@@ -69,7 +69,7 @@ def as_completed(
 
 
 def workers_told() -> int:
-    """Return with how many workers joblib was told to work (`on_cluster`); 1 if it was not."""
+    """Return the number of workers set for joblib (`on_cluster`), by default 1."""
     return int(joblib.effective_n_jobs(None))
 
 
@@ -78,15 +78,13 @@ def share_of(progress: Tell, done: int, whole: int, part: int = 1) -> Tell: ...
 @overload
 def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None: ...
 def share_of(progress: Tell | None, done: int, whole: int, part: int = 1) -> Tell | None:
-    """Return a function that reports the share of a part as a share of the whole.
-
-    So much of the whole is done before the part.
+    """Return a callback that converts the share of a part to a share of the whole.
 
     Args:
-        progress: Takes the share of the whole.
-        done: How much of the whole comes before the part.
-        whole: How much there is in all.
-        part: How much the part is.
+        progress: Callback for the share of the whole.
+        done: Amount of the whole before the part.
+        whole: Total amount.
+        part: Amount of the part.
     """
     if progress is None:
         return None
@@ -105,7 +103,7 @@ def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tupl
 
 
 def _processes(workers: int, items: int) -> int:
-    """Return how many processes do the work; 1 if it is done here."""
+    """Return the number of processes for the work; 1 for this process alone."""
     return max(min(max(workers, workers_told()), items), 1)
 
 

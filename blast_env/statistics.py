@@ -11,7 +11,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 
 CVAR_LEVEL: Final = 0.8
-"""The mean of the worst 20 % of the threats, unless another level is given."""
+"""Default level of the conditional value at risk: the mean of the worst 20 % of the threats."""
 
 
 class Estimate(NamedTuple):
@@ -19,7 +19,7 @@ class Estimate(NamedTuple):
 
     Attributes:
         value: The estimate.
-        low: Lower end; NaN with a single threat, which says nothing about the others.
+        low: Lower end; NaN with a single threat, which has no spread.
         high: Upper end; NaN with a single threat.
     """
 
@@ -36,7 +36,7 @@ def mean_estimate(values: FloatArray) -> Estimate:
     """Return the mean over threats, with Student's t interval.
 
     Args:
-        values: One value a threat (threats,), at least one.
+        values: One value per threat (threats,), at least one.
     """
     mean = float(values.mean())
     half_width = _half_width(values - mean)
@@ -46,14 +46,14 @@ def mean_estimate(values: FloatArray) -> Estimate:
 def stratified_estimate(groups: Sequence[tuple[float, Sequence[float]]]) -> Estimate:
     """Return the sum of weighted means of groups, with Student's t interval within the groups.
 
-    The groups are given, and only what is in them was drawn: the interval says how the sum would
-    change with other values of the same groups.
+    The groups are fixed and only their values are drawn, so the interval covers other draws of
+    values from the same groups.
 
     Args:
-        groups: Of each group its weight and its values, at least one.
+        groups: Weight and values of each group, at least one value per group.
 
     Returns:
-        Without an interval (NaN) if no group has two values.
+        The estimate, without an interval (NaN) if no group has two values.
     """
     arrays = [(weight, np.asarray(values, dtype=np.float64)) for weight, values in groups]
     value = float(sum(weight * values.mean() for weight, values in arrays))
@@ -69,11 +69,11 @@ def stratified_estimate(groups: Sequence[tuple[float, Sequence[float]]]) -> Esti
 
 
 def reductions(impulse: FloatArray | float, unprotected: FloatArray | float) -> NDArray[np.float64]:
-    """Return 1 - impulse / unprotected, elementwise; NaN where nothing arrives without a barrier.
+    """Return 1 - impulse / unprotected, elementwise; NaN if there is no load without a barrier.
 
     Args:
-        impulse: With the barrier, any shape.
-        unprotected: Without it, the same shape.
+        impulse: Impulse with the barrier, any shape.
+        unprotected: Impulse without it, the same shape.
     """
     with_barrier, without = np.asarray(impulse, float), np.asarray(unprotected, float)
     left: FloatArray = np.full(without.shape, np.nan)
@@ -84,21 +84,21 @@ def reductions(impulse: FloatArray | float, unprotected: FloatArray | float) -> 
 def reduction_estimate(impulse: FloatArray, unprotected: FloatArray) -> Estimate:
     """Return 1 - mean(impulse) / mean(unprotected), with its 95 % confidence interval.
 
-    The ratio of the means, not the mean of the ratios: it is the share of the expected impulse
-    that is gone, and a threat that does little without a barrier counts little. In a mean of
-    ratios it could outweigh all others, and a threat that does nothing would have no ratio.
+    The ratio of the means, not the mean of the ratios: it is the avoided share of the expected
+    impulse, and a threat with a small load without a barrier has a small weight. In a mean of
+    ratios such a threat could outweigh all others, and one without a load would have no ratio.
 
     The interval is the delta method's for a ratio of paired means: the spread of
-    impulse - ratio * unprotected over the threats, with Student's t. Only that spread counts, so
-    what both sides of a pair have in common drops out, and a layout that changes nothing gets the
-    interval (0, 0). No reduction is above 1, and so is no interval.
+    impulse - ratio * unprotected over the threats, with Student's t. Variation common to both
+    sides of a pair cancels, and a layout without an effect gets the interval (0, 0). The upper end
+    is at most 1, as any reduction is.
 
     Args:
-        impulse: With the barrier, one value a threat (threats,).
-        unprotected: Without it, for the same threats (threats,).
+        impulse: Impulse with the barrier, one value per threat (threats,).
+        unprotected: Impulse without it, for the same threats (threats,).
 
     Returns:
-        All NaN if nothing arrives without a barrier.
+        The estimate; all NaN if there is no load without a barrier.
     """
     mean = float(unprotected.mean())
     if not mean > 0.0:
@@ -112,12 +112,12 @@ def reduction_estimate(impulse: FloatArray, unprotected: FloatArray) -> Estimate
 def conditional_value_at_risk(values: FloatArray, level: float) -> float:
     """Return the mean of the worst share 1 - level of the values (CVaR).
 
-    Where that share is no whole number of values, the last one counts in part (Rockafellar and
-    Uryasev's definition): with 16 values and the level 0.8, the three largest and a fifth of the
-    fourth. Level 0 is the mean; from 1 - 1 / count on it is the largest value.
+    If that share is not a whole number of values, the last one counts in part (definition of
+    Rockafellar and Uryasev): with 16 values and the level 0.8, the three largest and a fifth of the
+    fourth. Level 0 gives the mean, levels from 1 - 1 / count the largest value.
 
     Args:
-        values: One value a threat (threats,), at least one.
+        values: One value per threat (threats,), at least one.
         level: At least 0 and below 1.
 
     Raises:
@@ -148,15 +148,15 @@ def _half_width(deviation: FloatArray) -> float:
 
 
 class Risk(Protocol):
-    """Turns the loads of several threats into the one that counts."""
+    """Reduces the loads of several threats to one."""
 
     def __call__(self, loads: NDArray[np.float64]) -> float:
-        """Return the load that counts; `loads` has one value a threat (n,), n >= 1."""
+        """Return one load; `loads` has one value per threat (n,), n >= 1."""
 
 
 @dataclass(frozen=True)
 class MeanRisk:
-    """All threats count alike."""
+    """All threats have equal weights."""
 
     def __call__(self, loads: NDArray[np.float64]) -> float:
         """Return the mean."""
@@ -177,7 +177,7 @@ class ConditionalValueAtRisk:
     """Only the worst threats count; see `conditional_value_at_risk`.
 
     Attributes:
-        level: At least 0 (the mean of all) and below 1 (in the limit, the worst one alone).
+        level: At least 0 (the mean of all) and below 1 (the worst one alone, in the limit).
 
     Raises:
         BlastEnvError: If the level is out of bounds.

@@ -1,4 +1,4 @@
-"""Tables: columns with unit and meaning in one place; as Markdown, and as CSV files."""
+"""Tables: columns with unit and meaning; output as Markdown and as CSV files."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # takes a third of a second to import
 
 
 _FORMULA_MARKS: Final = ("=", "+", "-", "@", "\t", "\r")
-"""First characters of texts that spreadsheets take for formulas when they open a CSV file."""
+"""First characters of texts in a CSV file that spreadsheets read as formulas."""
 
 
 class Column(NamedTuple):
@@ -21,9 +21,9 @@ class Column(NamedTuple):
 
     Attributes:
         name: Name in the data frame.
-        unit: Unit; empty for counts, names and pure numbers. "sim" stands for the simulation's
-            own units: mass units, and 4 length units to the metre.
-        meaning: What it is.
+        unit: Unit; empty for counts, names and pure numbers. "sim" stands for the units of the
+            simulation: mass units, and 4 length units per metre.
+        meaning: Its meaning, in words.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Column(NamedTuple):
 
 
 def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> "pd.DataFrame":
-    """Return rows, each by the names of the columns, as a data frame in the columns' order.
+    """Return a data frame of rows, given by the names of the columns, in the columns' order.
 
     Raises:
         KeyError: If a row lacks a column.
@@ -44,7 +44,7 @@ def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) ->
 
 
 def table_records(table: "pd.DataFrame") -> list[dict[str, Any]]:
-    """Return the rows of a table as what JSON knows; NaN is `None`."""
+    """Return the rows of a table as dictionaries for JSON; NaN becomes `None`."""
     return [
         {str(name): number_or_none(value) for name, value in row.items()}
         for row in table.to_dict("records")
@@ -52,20 +52,20 @@ def table_records(table: "pd.DataFrame") -> list[dict[str, Any]]:
 
 
 def number_or_none(value: Any) -> Any:
-    """Return the value, or `None` for a number that does not exist."""
+    """Return the value, or `None` for NaN."""
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def texts(values: Any) -> Any:
-    """Return values as a column of text. With other types, the stubs of pandas take mypy long."""
+    """Return values as a column of text; a separate function keeps mypy fast with pandas' stubs."""
     import pandas as pd
 
     return pd.array(values, dtype="str")
 
 
 def as_types(table: "pd.DataFrame", types: Mapping[str, str]) -> "pd.DataFrame":
-    """Return a table with some columns of other types, by their names."""
-    wanted: Any = types  # the stubs of pandas take mypy seconds for each dict that is written out
+    """Return a table with the types of some columns changed, by their names."""
+    wanted: Any = types  # with the stubs of pandas, mypy takes seconds for each literal dict
     converted: pd.DataFrame = table.astype(wanted)
     return converted
 
@@ -73,12 +73,12 @@ def as_types(table: "pd.DataFrame", types: Mapping[str, str]) -> "pd.DataFrame":
 def markdown_table(
     headers: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: bool = False
 ) -> str:
-    """Return a Markdown table; bars in the cells are escaped, columns of numbers end alike.
+    """Return a Markdown table; vertical bars in cells are escaped.
 
     Args:
-        headers: Of the columns.
+        headers: Headers of the columns.
         rows: The cells.
-        numbers: Whether all columns but the first are of numbers.
+        numbers: Whether all columns but the first hold numbers, which are aligned right.
     """
     lines = [headers, *rows]
     cells = [[str(cell).replace("|", r"\|") for cell in line] for line in lines]
@@ -88,9 +88,9 @@ def markdown_table(
 
 
 def cell_text(value: Any) -> Any:
-    """Return the value of a cell of a CSV file; a text that a spreadsheet would calculate gets a '.
+    """Return the value of a CSV cell; a text that spreadsheets read as a formula gets a leading '.
 
-    Numbers stay as they are, as texts too.
+    Numbers stay unchanged, also as texts.
     """
     is_formula = isinstance(value, str) and value.startswith(_FORMULA_MARKS)
     return f"'{value}" if is_formula and not is_plain_number(value) else value
@@ -102,7 +102,7 @@ def write_csv(table: "pd.DataFrame", path: str | Path, float_format: str | None 
     Args:
         table: The table.
         path: The file.
-        float_format: How to write numbers, such as "%.6g"; None: with all their digits.
+        float_format: Format of numbers, such as "%.6g"; None for all digits.
 
     Returns:
         The path.

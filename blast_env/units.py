@@ -1,8 +1,8 @@
 """Conversion between metres and the simulation's dimensionless units.
 
 The paper's scaling ratio (Martyniuk & Kochkarov, equation 4): one metre is four units.
-Positions, radii and speeds inside a `Scene` are in units and units per second; everything a
-person reads or writes is in metres.
+Positions, radii and speeds in a `Scene` are in units and units per second; all input and output
+is in metres.
 """
 
 from typing import Final

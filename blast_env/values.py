@@ -1,4 +1,4 @@
-"""Plain values that a user gives, numbers and paths, checked where they come in."""
+"""Checks of plain values from the user: numbers and paths."""
 
 import os
 import re
@@ -17,27 +17,28 @@ MOST_SEED: Final = 2**63 - 1
 STEERING: Final = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
-"""Characters that steer a terminal or a page, turn the direction of a line, or are none."""
+"""Characters that control a terminal or a page, reverse the direction of a line, or are
+surrogates."""
 
 _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA: Final = re.compile(r"([+-]?[0-9]+),([0-9]+)")
 _THOUSANDS: Final = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 
 _MOST_PATH: Final = 4096
-"""Characters; no system takes longer ones."""
+"""Most characters of a path; no system takes more."""
 
 
 def whole_number(name: str, value: Any, least: int, most: int) -> int:
     """Return a count as a plain integer.
 
     Args:
-        name: What it is, for the error.
-        value: What was given.
-        least: Lower bound, which is allowed itself.
-        most: Upper bound, which is allowed itself.
+        name: Name of the count, for the error.
+        value: The value given.
+        least: Lower bound, inclusive.
+        most: Upper bound, inclusive.
 
     Raises:
-        BlastEnvError: If it is no integer or out of bounds.
+        BlastEnvError: If it is not an integer or is out of bounds.
     """
     is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not is_integer or not least <= value <= most:
@@ -51,16 +52,16 @@ def checked_seed(value: Any, name: str = "seed") -> int:
     """Return a seed as a plain integer.
 
     Raises:
-        BlastEnvError: If it is no integer, negative or too large.
+        BlastEnvError: If it is not an integer, is negative or is too large.
     """
     return whole_number(name, value, 0, MOST_SEED)
 
 
 def generator(seed: Any) -> np.random.Generator:
-    """Return the random numbers of a seed.
+    """Return the random generator of a seed.
 
     Raises:
-        BlastEnvError: If it is no integer, negative or too large.
+        BlastEnvError: If it is not an integer, is negative or is too large.
     """
     return np.random.default_rng(checked_seed(seed))
 
@@ -69,7 +70,7 @@ def finite_number(name: str, value: Any) -> float:
     """Return a number as a plain float.
 
     Raises:
-        BlastEnvError: If it is no number, or one that is not finite as a float.
+        BlastEnvError: If it is not a number, or is not finite as a float.
     """
     if isinstance(value, bool | str):
         raise BlastEnvError(f"{name} is {value_text(value)}, must be a number")
@@ -104,7 +105,7 @@ def real_number(name: str, value: Any, least: float, most: float) -> float:
     """Return a number as a plain float.
 
     Raises:
-        BlastEnvError: If it is no number or out of bounds.
+        BlastEnvError: If it is not a number or is out of bounds; the bounds are inclusive.
     """
     number = finite_number(name, value)
     if not least <= number <= most:
@@ -113,9 +114,9 @@ def real_number(name: str, value: Any, least: float, most: float) -> float:
 
 
 def is_plain_number(text: str) -> bool:
-    """Whether a text is a number as files and options have it.
+    """Whether a text is a number in the notation of files and options.
 
-    Python reads more: `1_000`, `nan`, `inf`, digits of other scripts, spaces around.
+    Python accepts more: `1_000`, `nan`, `inf`, digits of other scripts, surrounding spaces.
     """
     return _PLAIN.fullmatch(text) is not None
 
@@ -132,15 +133,15 @@ def plain_number(name: str, text: str) -> float:
 
 
 def typed_number(name: str, text: str, unit: str = "") -> float:
-    """Return the number that somebody typed, with a point or a comma before its decimals.
+    """Return the number in a text typed by a user, with a decimal point or a decimal comma.
 
     Args:
         name: The quantity, for the error.
-        text: The text; the unit may stand behind the number.
+        text: The text; the unit may follow the number.
         unit: Its unit, such as `kg TNT`, of which the first word is enough.
 
     Raises:
-        BlastEnvError: If it is no number, has another unit, or a comma that may stand between
+        BlastEnvError: If it is not a number, has another unit, or has a comma that may separate
             thousands.
     """
     number = text.strip()
@@ -164,7 +165,7 @@ def path_of(value: Any) -> Path:
     """Return the path of a file or folder.
 
     Raises:
-        BlastEnvError: If it is no path, or has a character that no name can have.
+        BlastEnvError: If it is not a path, is longer than 4096 characters, or has a null character.
     """
     if not isinstance(value, str | os.PathLike):
         raise BlastEnvError(f"path is {value_text(value)}, must be a path")

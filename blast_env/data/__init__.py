@@ -1,4 +1,4 @@
-"""The gas blasts that studies, searches and trainings ran, as one documented data set."""
+"""The gas blasts of studies, searches and trainings, as one documented data set."""
 
 from blast_env.data.gas_blasts import COLUMNS, TABLES, as_tensors, load, sources
 from blast_env.data.published import PublishedBlasts

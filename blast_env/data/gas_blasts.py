@@ -1,4 +1,4 @@
-"""`load("gas_blasts")`: a row for each structure of each blast, beside it the bare load."""
+"""`load("gas_blasts")`: one row per structure and blast, with the load without a barrier."""
 
 from collections.abc import Sequence
 from hashlib import sha256
@@ -23,7 +23,7 @@ TABLES: Final = (
     "street_blasts",
     "street_agent_blasts",
 )
-"""The files that the set is made of: where the blasts come from."""
+"""Files of the set, named after the origin of their blasts."""
 
 COLUMNS: Final = (
     Column("table", "", "file that the row is from: bundled sites, generated ones, a street"),
@@ -52,14 +52,14 @@ _LOADS: Final = ("impulse_pa_s", "peak_pa")
 
 
 def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.DataFrame":
-    """Return the gas blasts as one table, a row a structure of a blast; see `COLUMNS`.
+    """Return the gas blasts as one table, with one row per structure and blast; see `COLUMNS`.
 
-    Sites are divided by their hashes: 80 % to train on, 10 % each to choose by and to test on. The
-    sites of test are never in train, whatever is added later.
+    The hash of a site assigns it to a split: 80 % for training, 10 % each for validation and test.
+    Test sites are never in the training split, also when data are added.
 
     Args:
         name: `gas_blasts`: all tables that come with the package.
-        paths: Files of `python -m studies.blast_table` in their place.
+        paths: Files of `python -m studies.blast_table` to read instead.
 
     Raises:
         UnknownNameError: If there is no such set.
@@ -90,7 +90,7 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
 
 
 def split_of(scenario_hash: str) -> str:
-    """Return the part of the set that a site belongs to."""
+    """Return the split of a site: `train`, `validation` or `test`."""
     share = int(sha256(scenario_hash.encode()).hexdigest()[:8], 16) / 2**32
     if share < _TESTED:
         return "test"
@@ -106,15 +106,17 @@ def sources() -> tuple[Path, ...]:
 
 
 def as_tensors(rows: "pd.DataFrame") -> tuple[Any, Any]:
-    """Return loads over loads without a barrier, and what they depend on in numbers, for torch.
+    """Return numeric inputs, and loads relative to those without a barrier, as torch tensors.
 
-    Layouts are lists of any length, so they stay in the table; these are the charge and the bare
-    load.
+    Inputs are the charge and the bare load. Layouts have any length, so they stay in the table.
 
     Returns:
         Inputs (rows, 6): x, y, height of the charge in m, its mass in kg, impulse in Pa s and peak
-        in Pa without a barrier; and outputs (rows, 2): shares of impulse and peak that are left.
+        in Pa without a barrier; and outputs (rows, 2): remaining shares of impulse and peak.
         Rows without a bare load are left out.
+
+    Raises:
+        MissingExtraError: If torch is not installed.
     """
     with import_extra("agents", "tensors"):
         import torch

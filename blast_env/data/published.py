@@ -1,4 +1,4 @@
-"""The published blasts as a cache: what was run once need not be run again."""
+"""The published blasts as a cache, so that they need not be run again."""
 
 import json
 import re
@@ -37,8 +37,8 @@ class PublishedBlasts:
     """The blasts of `load("gas_blasts")` as a cache for gas dynamics with uniform cells of 0.5 m.
 
     Attributes:
-        scenarios: Whose blasts are asked for, by their hashes.
-        behind: A cache for the other blasts; without one they are forgotten.
+        scenarios: Scenarios of the blasts, by their hashes.
+        behind: A cache for other blasts; without one they are not kept.
         rows: Impulse in Pa s and peak in Pa on each structure, by hash, layout and charge.
     """
 
@@ -60,7 +60,7 @@ class PublishedBlasts:
             self.rows[row][structure] = loads[0], loads[1]
 
     def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast that was published, or that the cache behind has."""
+        """Return the loads of a published blast, or those from the cache behind; else `None`."""
         charge = (*key.charge.position_m, key.charge.height_m, key.charge.tnt_kg)
         known = None
         if _CELLS in key.engine and not re.search(_GROWING, key.engine):
@@ -72,10 +72,10 @@ class PublishedBlasts:
             StructureLoad.on(each, *known[each.name], in_range=True) for each in structures
         )
         modules = sum(each.rows * each.columns for each in structures)
-        return BlastLoads(loads, np.zeros(modules))  # the tables know no single modules
+        return BlastLoads(loads, np.zeros(modules))  # the tables have no loads per module
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Hand a blast to the cache behind."""
+        """Add a blast to the cache behind, if there is one."""
         if self.behind is not None:
             self.behind.add(key, loads)
 
