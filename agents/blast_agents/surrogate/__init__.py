@@ -1,4 +1,4 @@
-"""A surrogate of gas dynamics: what a blast would do, told in a millisecond."""
+"""A surrogate of gas dynamics, which predicts the loads of a blast within a millisecond."""
 
 from blast_agents.surrogate.engine import SurrogateEngine
 from blast_agents.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate

@@ -1,4 +1,4 @@
-"""How far guesses are off, as told by the blasts of a search on layouts that are alike."""
+"""Correction of the surrogate's predictions by the blasts of a search on similar layouts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ import numpy as np
 from blast_env.arrays import FloatArray
 
 _OWN_SHARE: Final = 0.05
-"""Of the variance of errors, what a layout does not have in common with any other."""
+"""Variance of the error of a single layout, relative to the shared variance."""
 
 _LEAST_SPREAD: Final = 0.01
-"""Errors of guesses are taken to differ by so much at least."""
+"""Lower bound on the standard deviation of the errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Errors of guesses as a Gaussian process: layouts have the more in common the more they share.
+    """A Gaussian process of the logarithmic errors of predictions.
 
     The covariance of two layouts falls exponentially with the volume that only one of them fills
     (`apart_m3`), in units of the mean volume of a layout.
 
     Attributes:
-        barriers: What each layout with a blast sets down (layouts, pieces, 5).
-        mean: Of the errors.
-        spread: Their standard deviation.
+        barriers: Pieces of each simulated layout (layouts, pieces, 5).
+        mean: Mean of the errors.
+        spread: Standard deviation of the errors.
         length_m3: Volume over which the covariance falls by a factor of e.
         weights: Inverse of the covariance, times the errors less their mean (layouts,).
         inverse: Inverse of the covariance (layouts, layouts).
@@ -40,11 +40,11 @@ class Correction:
 
     @classmethod
     def of(cls, barriers: Sequence[FloatArray], errors: FloatArray) -> "Correction":
-        """Learn from blasts.
+        """Fit the correction to simulated layouts.
 
         Args:
-            barriers: What each layout sets down: `SurrogateSite.barrier`.
-            errors: Logarithm of load by gas dynamics over the load that was guessed (layouts,).
+            barriers: Pieces of each layout, from `SurrogateSite.barrier`.
+            errors: Logarithm of the simulated over the predicted load (layouts,).
         """
         met = stacked(barriers)
         length_m3 = max(float(np.mean(_volume_m3(met))), 1.0)
@@ -56,7 +56,7 @@ class Correction:
         return cls(met, mean, spread, length_m3, inverse @ (errors - mean), inverse)
 
     def expected(self, barriers: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """Return mean and standard deviation of the errors of guesses for layouts (layouts,)."""
+        """Return mean and standard deviation of the error for each layout (layouts,)."""
         alike = np.exp(-_all_apart_m3(stacked(barriers), self.barriers) / self.length_m3)
         known = np.einsum("ln,nm,lm->l", alike, self.inverse, alike)
         left = np.sqrt(np.maximum(1.0 - known, 0.0))
@@ -79,7 +79,7 @@ def apart_m3(one: FloatArray, others: FloatArray) -> FloatArray:
 
 
 def stacked(barriers: Sequence[FloatArray]) -> FloatArray:
-    """Return barriers as one array (barriers, pieces, 5); pieces without a volume fill it up."""
+    """Return barriers as one array (barriers, pieces, 5), padded with pieces of no volume."""
     most = max((len(each) for each in barriers), default=0)
     found = np.zeros((len(barriers), most, 5))
     for own, each in zip(found, barriers, strict=True):
@@ -94,5 +94,5 @@ def _volume_m3(barriers: FloatArray) -> FloatArray:
 
 
 def _all_apart_m3(some: FloatArray, others: FloatArray) -> FloatArray:
-    """Return `apart_m3` of each with each (some, others)."""
+    """Return `apart_m3` of each pair (some, others)."""
     return np.array([apart_m3(each, others) for each in some]).reshape(len(some), len(others))

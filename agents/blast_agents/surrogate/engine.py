@@ -1,4 +1,4 @@
-"""The surrogate in the place of an engine: for training, where blasts are too dear."""
+"""The surrogate as an engine, for training, where simulated blasts are too expensive."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -17,27 +17,27 @@ from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
 
 SURROGATE: Final = "surrogate"
-"""Name of the engine that is none."""
+"""Name of the surrogate as an engine."""
 
 _KEPT_SITES: Final = 64
-"""What no layout changes is remembered for so many sites: some megabytes each."""
+"""Number of cached sites, of some megabytes each."""
 
 _SITE_BYTES: Final = 2**23
-"""Of what is remembered of the pieces on each."""
+"""Bound on the cache of messages per site."""
 
 
 @dataclass(frozen=True)
 class SurrogateEngine(Engine):
-    """Tells the loads on each protected structure by guesses: an engine without a blast.
+    """An engine that predicts the loads on protected structures without simulating a blast.
 
     `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
-    milliseconds. What is trained on it has to be judged by gas dynamics. It tells peaks only where
-    the objective counts them, and knows no structure that is not protected: nothing arrives there.
-    Where the response of facades counts, it is that under triangular loads of the guessed impulse
-    and peak, on all bays of a structure alike (`Guess.loads`).
+    milliseconds. Agents trained on it must be judged by gas dynamics. It predicts peaks only if
+    the objective counts them. Structures that are not protected have zero loads. The response of
+    facades is that to triangular loads of the predicted impulse and peak, equal on all bays of a
+    structure (`Guess.loads`).
 
     Attributes:
-        surrogate: The surrogate; that of the package unless given.
+        surrogate: The surrogate; by default the bundled one.
         digest: Its digest.
     """
 
@@ -67,20 +67,20 @@ class SurrogateEngine(Engine):
         charge: AnyCharge,
         seed: int = 0,  # noqa: ARG002
     ) -> BlastLoads:
-        """Return what the surrogate guesses, a charge and a layout at a time.
+        """Return the predicted loads of one charge and layout.
 
         Args:
             scenario: The scenario.
             layout: A legal layout.
-            charge: What goes off: where it does, or the vehicle that brings it.
-            seed: Changes nothing: guesses have no noise.
+            charge: The charge, or the vehicle that carries it.
+            seed: Ignored: predictions have no noise.
 
         Returns:
-            The loads. Those of a structure's modules are all the same, since only their mean is
-            known.
+            The loads. All modules of a structure have the same load, since only the mean is
+            predicted.
 
         Raises:
-            BlastEnvError: If nothing is protected.
+            BlastEnvError: If no structure is protected.
         """
         site = self._site(scenario)
         guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])
@@ -112,21 +112,21 @@ class SurrogateEngine(Engine):
 
 
 def is_surrogate(name: str) -> bool:
-    """Return whether the name of an engine to train on is that of a surrogate, or of its file."""
+    """Return whether an engine name is `"surrogate"` or a surrogate's file (.json)."""
     return name == SURROGATE or Path(name).suffix == ".json"
 
 
 def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None = None) -> Engine:
-    """Return an engine by its name; beside the usual ones there is `"surrogate"`.
+    """Return an engine by its name, which may be that of a surrogate.
 
     Args:
-        name: The name, or a surrogate's file (.json).
-        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
-        cells: How they grow; as the engine's unless given.
+        name: The name of an engine, or a surrogate's file (.json).
+        cell_m: Side of the cells of gas dynamics; by default the engine's.
+        cells: Rule of their growth; by default the engine's.
 
     Raises:
-        UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If it has no such cells, or the file is no surrogate.
+        UnknownNameError: If no engine has that name.
+        BlastEnvError: If the engine does not support the cells, or the file is not a surrogate.
     """
     if Path(name).suffix == ".json":
         return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m, cells=cells)

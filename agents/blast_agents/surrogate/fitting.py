@@ -1,4 +1,4 @@
-"""Fitting the surrogate to blasts, and telling how far it is off where it was not fitted."""
+"""Fit of the surrogate to blasts, and its errors on samples held out of the fit."""
 
 import json
 from collections.abc import Sequence
@@ -37,22 +37,22 @@ from blast_env.scenario import Scenario
 
 MEMBERS: Final = 5
 _BATCH: Final = 6
-"""Groups of samples that an update is made from."""
+"""Groups of samples per update."""
 
 _GROUP: Final = 24
-"""Most samples of a group, which are all of one case."""
+"""Largest number of samples in a group; a group is of one case."""
 
 _COMMON: Final = 0.2
-"""How much an error counts that all layouts of a case have in common: it ranks none of them."""
+"""Weight of the error common to all layouts of a case, which does not affect their ranking."""
 
 _RATE: Final = 7e-3
 _DECAY: Final = 1e-3
 _MOST_GRADIENT: Final = 1.0
-"""Norm of a step's gradient: a single odd group must not throw a network off."""
+"""Bound on the norm of a gradient, against outliers among the groups."""
 
 _LEAST_SCALE: Final = 1e-3
 _LEAST_CASE: Final = 8
-"""Layouts that a case must have for its rank correlation to count."""
+"""Least number of layouts of a case for its rank correlation."""
 
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
 
@@ -62,9 +62,9 @@ class Loads:
     """One kind of load on the structures of samples: impulses, Pa s, or peaks, Pa.
 
     Attributes:
-        known: Logarithm of Kingery and Bulmash's at all points (points,).
-        target: Logarithm of that by gas dynamics (samples,).
-        power: Of the mean that makes the load of a structure from those at its points.
+        known: Logarithm of Kingery and Bulmash's load at all points (points,).
+        target: Logarithm of the load by gas dynamics (samples,).
+        power: Exponent of the mean over the points of a structure.
     """
 
     known: FloatArray
@@ -77,17 +77,17 @@ class Samples:
     """Loads of structures, with the features of the points on their walls.
 
     Attributes:
-        features: Of all points (points, FEATURES).
-        relations: Where solids stand for them: of each sample all solids, and for each of them all
-            points (rows, RELATIONS).
-        area_m2: Of each point (points,).
-        counts: Points of each sample (samples,).
-        solids: Structures and pieces of each sample (samples,).
+        features: Features of all points (points, FEATURES).
+        relations: Relations of solids to points, ordered by sample, solid and point
+            (rows, RELATIONS).
+        area_m2: Wall area represented by each point (points,).
+        counts: Number of points of each sample (samples,).
+        solids: Number of structures and pieces of each sample (samples,).
         impulse: The impulses.
         peak: The peak overpressures.
-        site: Number of its site (samples,).
-        case: Number of its site, structure and charge (samples,).
-        layout: Number of its site and layout (samples,).
+        site: Index of the site (samples,).
+        case: Index of the combination of site, structure and charge (samples,).
+        layout: Index of the combination of site and layout (samples,).
     """
 
     features: FloatArray
@@ -111,10 +111,10 @@ class Samples:
 
         Args:
             blasts: The table.
-            scenarios: By content hash; rows of others are left out.
+            scenarios: Scenarios by content hash; rows of others are omitted.
 
         Raises:
-            BlastEnvError: If no row is left.
+            BlastEnvError: If no row remains.
         """
         known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
         rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
@@ -178,16 +178,16 @@ def fit(
     members: int = MEMBERS,
     peaks: bool = True,
 ) -> Surrogate:
-    """Fit the networks to some of the samples, two at a time.
+    """Fit the networks to some of the samples, two networks at a time.
 
     Args:
         samples: All samples.
-        chosen: Which of them (samples,).
-        epochs: How often each is met.
-        seed: Of starts and orders.
-        about: What is said of it in its file.
-        members: Networks for each load.
-        peaks: Whether to fit those for peaks, too.
+        chosen: Mask of the samples to use (samples,).
+        epochs: Number of passes over the samples.
+        seed: Seed of initial weights and orders.
+        about: Provenance, for the surrogate's file.
+        members: Number of networks per kind of load.
+        peaks: Whether to fit the networks for peaks, too.
     """
     points = samples.features[np.repeat(chosen, samples.counts)]
     solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
@@ -215,16 +215,16 @@ def fit(
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """How far guesses of one load are off.
+    """Errors of the predictions of one kind of load.
 
     Attributes:
-        rms: Root of the mean square error of the logarithm.
-        within: The same of what it is off beside the mean of its case, which ranks no layout.
-        bias: Its mean.
+        rms: Root mean square error of the logarithm.
+        within: The same after subtraction of the mean error of each case, which ranks no layout.
+        bias: Mean error of the logarithm.
         rank: Rank correlation among the layouts of a case, mean over the cases.
-        lost: By how much the load behind the layout that is guessed to be the best is above that
-            behind the best one, as a share of the largest load of the case; mean over the cases.
-        cases: How many cases have enough layouts for that.
+        lost: Excess of the load of the layout with the best prediction over that of the best
+            layout, relative to the largest load of the case; mean over the cases.
+        cases: Number of cases with enough layouts for `rank` and `lost`.
     """
 
     rms: float
@@ -236,14 +236,14 @@ class Errors:
 
 
 class ErrorsOfBoth(NamedTuple):
-    """How far guesses are off: of impulses, and of peaks."""
+    """Errors of the predictions of impulses and of peaks."""
 
     impulse: Errors
     peak: Errors
 
 
 def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> ErrorsOfBoth:
-    """Compare guesses with gas dynamics on some samples."""
+    """Compare predictions with gas dynamics on some samples."""
     return ErrorsOfBoth(
         load_errors(surrogate, surrogate.impulse, samples, samples.impulse, chosen),
         load_errors(surrogate, surrogate.peak, samples, samples.peak, chosen),
@@ -257,7 +257,7 @@ def load_errors(
     loads: Loads,
     chosen: BoolArray,
 ) -> Errors:
-    """Compare guesses of one load, by those of a surrogate's networks that know it."""
+    """Compare predictions of one kind of load, by `networks` of the surrogate, with `loads`."""
     counts, solids = samples.counts[chosen], samples.solids[chosen]
     points = np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
@@ -278,7 +278,7 @@ def load_errors(
 
 
 def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray) -> Errors:
-    """Compare logarithms of loads (samples,)."""
+    """Compare logarithms of predicted and simulated loads (samples,)."""
     off = guess - target
     ranks, lost, within = [], [], np.zeros_like(off)
     for case in np.unique(cases):
@@ -300,12 +300,12 @@ def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray) -> Errors:
 
 
 def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
-    """Return which samples are held out in each fold; what has one number stays together.
+    """Return the masks of held-out samples for each fold; equal numbers share a fold.
 
     Args:
-        numbers: Of the site or the layout of each sample (samples,).
-        count: How many folds.
-        seed: Of the order.
+        numbers: Index of the site or the layout of each sample (samples,).
+        count: Number of folds.
+        seed: Seed of the order.
     """
     distinct = np.random.default_rng(seed).permutation(np.unique(numbers))
     return [np.isin(numbers, distinct[first::count]) for first in range(count)]
@@ -313,7 +313,7 @@ def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Target:
-    """Loads to fit to.
+    """`Loads` as tensors.
 
     Attributes:
         known: As in `Loads`.
@@ -335,17 +335,17 @@ class _Target:
 
 @dataclass(frozen=True, eq=False)
 class _Tensors:
-    """Samples as networks are given them; see `Samples`.
+    """`Samples` as inputs of the networks.
 
     Attributes:
-        features: Scaled (points, FEATURES).
-        relations: Scaled (rows, RELATIONS).
-        area_m2: Of each point (points,).
-        starts: First point of each sample (samples,).
-        counts: Points of each sample (samples,).
-        first_rows: First row of relations of each sample (samples,).
-        rows: How many it has (samples,).
-        solids: Structures and pieces of each sample (samples,).
+        features: Scaled features (points, FEATURES).
+        relations: Scaled relations (rows, RELATIONS).
+        area_m2: Wall area represented by each point (points,).
+        starts: Index of the first point of each sample (samples,).
+        counts: Number of points of each sample (samples,).
+        first_rows: Index of the first row of relations of each sample (samples,).
+        rows: Number of these rows (samples,).
+        solids: Number of structures and pieces of each sample (samples,).
     """
 
     features: Tensor
@@ -375,7 +375,7 @@ class _Tensors:
     def loss(self, network: "_Network", target: _Target, groups: Sequence[IntArray]) -> Tensor:
         """Return the mean square error of the logarithm on groups of samples, each of one case.
 
-        What a group's errors have in common counts less than by what they differ.
+        The mean error of a group has a smaller weight (`_COMMON`) than the deviations from it.
         """
         errors = self._errors(network, target, np.concatenate(groups))
         parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
@@ -383,7 +383,7 @@ class _Tensors:
         return (errors - common).square().mean() + _COMMON * common.square().mean()
 
     def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
-        """Return by how much the logarithm is off on some samples."""
+        """Return the errors of the logarithm on some samples (samples,)."""
         counts, solids = self.counts[numbers], self.solids[numbers]
         points = torch.from_numpy(_runs_of(self.starts[numbers], counts))
         related = torch.from_numpy(_runs_of(self.first_rows[numbers], self.rows[numbers]))
@@ -400,7 +400,7 @@ class _Tensors:
         owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts))
         logs = target.power * (target.known[points] + over)
         empty = torch.zeros(len(numbers))
-        # As shares of the largest: high powers of pascals are beyond any number.
+        # Relative to the largest: high powers of pascals overflow.
         largest = torch.from_numpy(np.maximum.reduceat(logs.detach().numpy(), begin))
         area_m2 = self.area_m2[points]
         shares = area_m2 * torch.exp(logs - largest[owner])
@@ -410,13 +410,13 @@ class _Tensors:
 
 
 def _runs_of(starts: IntArray, counts: IntArray) -> IntArray:
-    """Return so many numbers from each start on, one run after the other."""
+    """Return the concatenated ranges of `counts` integers from each start."""
     runs = [np.arange(e, e + count) for e, count in zip(starts, counts, strict=True)]
     return np.concatenate(runs)
 
 
 class _Network(nn.Module):
-    """A network while it is fitted; its parameters are in the order of `Member`."""
+    """A network during its fit; its parameters are in the order of `Member`."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -427,12 +427,12 @@ class _Network(nn.Module):
         self.last = nn.Linear(HIDDEN, 1)
 
     def forward(self, features: Tensor, relations: Tensor, hearing: Tensor) -> Tensor:
-        """Return what it says of points.
+        """Return the predictions at points (points,).
 
         Args:
-            features: Of the points (points, FEATURES).
-            relations: Where solids stand for points (rows, RELATIONS).
-            hearing: To which point each of these rows belongs (rows,).
+            features: Features of the points (points, FEATURES).
+            relations: Relations of solids to points (rows, RELATIONS).
+            hearing: Index of the point of each of these rows (rows,).
         """
         silu = nn.functional.silu
         messages = silu(self.message(silu(self.send(relations))))
@@ -442,7 +442,7 @@ class _Network(nn.Module):
         return said
 
     def plain(self) -> Member:
-        """Return its numbers."""
+        """Return the weights and biases as arrays."""
         arrays: Sequence[FloatArray] = [
             each.detach().numpy().astype(np.float64) for each in self.parameters()
         ]

@@ -1,7 +1,7 @@
-"""The surrogate: small networks that tell what reaches each point of a wall, and how surely.
+"""The surrogate: small networks that predict the load at each point of a wall and its spread.
 
-Each solid sends a message to each point, made from where it stands for that. What a network says of
-a point goes by the features of the point and the sum of all messages.
+Each solid sends a message to each point, computed from their relations. The prediction at a point
+is a function of the features of the point and the sum of all messages.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,23 +35,23 @@ HIDDEN: Final = 64
 """Width of the two hidden layers."""
 
 MESSAGE: Final = 32
-"""Length of a message, and width of the layer that it is made by."""
+"""Length of a message, and width of its hidden layer."""
 
 IMPULSE_POWER: Final = 1.0
-"""The impulse on a structure is the mean over its walls."""
+"""Exponent of the power mean over the walls for impulses: the arithmetic mean."""
 
 PEAK_POWER: Final = 16.0
-"""The peak on a structure is nearly the largest: a mean of so high a power."""
+"""Exponent of the power mean over the walls for peaks: close to the maximum."""
 
 _AT_ONCE: Final = 64
-"""Points of which a network is asked at a time.
+"""Points per matrix product.
 
-So few stay in a processor's cache, and are multiplied by one thread: with more of them OpenBLAS
-wakes others, which wait in a loop for most of the time, or for ever where processors are taken.
+So few fit into a processor's cache, and one thread multiplies them: with more, OpenBLAS wakes other
+threads, which mostly wait in a loop, or for ever where processors are busy.
 """
 
 _MOST_SPREADS: Final = 4.0
-"""Inputs are cut so far from their mean, in their scale."""
+"""Bound on the distance of inputs from their mean, in units of their scale."""
 
 SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,)) + (
     (FEATURES + MESSAGE, HIDDEN),
@@ -61,17 +61,17 @@ SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,
     (HIDDEN, 1),
     (1,),
 )
-"""Of the arrays of a network, in the order of `Member`."""
+"""Shapes of the arrays of a network, in the order of `Member`."""
 
 
 class Check(BaseModel):
-    """How far guesses of one load are off on sites that were held out of the fit.
+    """Errors of the predictions of one kind of load on sites held out of the fit.
 
     Attributes:
-        rms: Root of the mean square error of the logarithm of a load.
+        rms: Root mean square error of the logarithm of a load.
         rank: Rank correlation with the engine among the layouts of a case.
-        lost: What choosing among these by it costs: by how much the load behind the layout that it
-            likes best is above the least one of the case, as a share of the largest.
+        lost: Regret of a choice by prediction: excess of the load of the layout with the best
+            prediction over the least load of the case, relative to the largest.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -82,18 +82,18 @@ class Check(BaseModel):
 
 
 class Fit(BaseModel):
-    """What a surrogate was fitted to, and how far it was off where it was not.
+    """Provenance of a surrogate, and its errors on sites held out of the fit.
 
     Attributes:
-        format: Version of this form.
-        command: What fitted it.
-        versions: With what.
-        engine: The engine of the blasts.
-        blasts: How many loads of structures it was fitted to.
-        sites: Of how many sites.
-        seconds: Time that the fit took, without the check.
-        impulse: How far impulses are off, if that was told.
-        peak: How far peak overpressures are off, if that was told.
+        format: Version of the file format.
+        command: Command that fitted it.
+        versions: Versions of the software.
+        engine: Engine of the blasts.
+        blasts: Number of loads of structures in the fit.
+        sites: Number of sites in the fit.
+        seconds: Duration of the fit without the check, in s.
+        impulse: Errors of impulses, if checked.
+        peak: Errors of peak overpressures, if checked.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -110,15 +110,14 @@ class Fit(BaseModel):
 
 
 class Guess(NamedTuple):
-    """What the surrogate says of layouts.
+    """Predicted loads of layouts.
 
     Attributes:
         impulse_pa_s: Mean impulse on each protected structure (layouts, structures).
-        spread: By how much its members differ about that, as a share of it: the standard deviation
-            of the logarithm (layouts, structures).
-        peak_pa: Largest overpressure on each (layouts, structures); `None` where the objective
-            counts none.
-        peak_spread: By how much its members differ about that (layouts, structures).
+        spread: Standard deviation of its logarithm among the members (layouts, structures).
+        peak_pa: Largest overpressure on each protected structure (layouts, structures); `None` if
+            the objective counts no peaks.
+        peak_spread: Standard deviation of its logarithm among the members (layouts, structures).
     """
 
     impulse_pa_s: FloatArray
@@ -127,15 +126,15 @@ class Guess(NamedTuple):
     peak_spread: FloatArray | None = None
 
     def loads(self, site: SurrogateSite, layouts: Sequence[Sequence[Element]] = ()) -> FloatArray:
-        """Return the load that counts behind each layout, in the objective's unit (layouts,).
+        """Return the load of each layout, in the objective's unit (layouts,).
 
-        Where the response of facades counts, each bay of a structure gets a triangular load with
-        the impulse and the peak that were guessed for the structure. The peak is the largest one
-        on it, so that the guess of the response is on the safe side.
+        If the objective counts the response of facades, each bay of a structure has a triangular
+        load with the predicted impulse and peak of the structure. The peak is the largest one on
+        the structure, so that the response is conservative.
 
         Args:
-            site: The site that was guessed.
-            layouts: The layouts; needed where the response of facades counts.
+            site: The site of the prediction.
+            layouts: The layouts; required if the objective counts the response of facades.
         """
         load, structures = site.scenario.objective.load, site.protected
         if site.scenario.objective.is_response:
@@ -173,9 +172,10 @@ class Guess(NamedTuple):
 
 
 class Member(NamedTuple):
-    """A network: weights and biases of its layers, in the order in which they are used.
+    """A network: weights and biases of its layers, in the order of their use.
 
-    The first two layers make messages, the others say what they and the features of a point mean.
+    The first two layers compute messages, the others the prediction at a point from messages and
+    features.
     """
 
     send: AnyFloats
@@ -191,15 +191,15 @@ class Member(NamedTuple):
 
 
 class Networks:
-    """Networks that were fitted to the same loads, each from another start; asked together.
+    """An ensemble of networks fitted to the same loads from different initial weights.
 
-    They work with single precision: what is lost is far below what they are off.
+    They use single precision: its rounding is far below their errors.
 
     Args:
         members: The networks.
 
     Attributes:
-        members: The same.
+        members: The networks.
     """
 
     def __init__(self, members: Sequence[Member]) -> None:
@@ -212,10 +212,10 @@ class Networks:
         self._layers = Member(*(each[:, np.newaxis] if each.ndim == 2 else each for each in single))
 
     def messages(self, scaled: FloatArray) -> SingleArray:
-        """Return what each solid tells each point (members, solids x points, MESSAGE).
+        """Return the message of each solid to each point (members, solids x points, MESSAGE).
 
         Args:
-            scaled: Where they stand, less the mean, over the scale (solids x points, RELATIONS).
+            scaled: Their relations, less the mean, over the scale (solids x points, RELATIONS).
         """
         layers = self._layers
         found = np.empty((len(self.members), len(scaled), MESSAGE), dtype=np.float32)
@@ -226,11 +226,11 @@ class Networks:
         return found
 
     def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
-        """Return by how much each says that logarithms of loads differ from Kingery and Bulmash's.
+        """Return the predicted differences of logarithmic loads from Kingery and Bulmash's.
 
         Args:
             scaled: Features of points, less the mean, over the scale (points, FEATURES).
-            heard: The messages to each, added up (members, points, MESSAGE).
+            heard: Sum of the messages to each point (members, points, MESSAGE).
 
         Returns:
             (members, points).
@@ -248,9 +248,9 @@ class Networks:
 
 
 def _runs(count: int) -> list[slice]:
-    """Return which rows are multiplied together.
+    """Return the slices of rows that are multiplied together.
 
-    None is left alone: a single row is multiplied in another order than several are.
+    No slice has a single row unless that is all, since a single row is summed in a different order.
     """
     starts = range(0, max(count - 1, 1), _AT_ONCE)
     return [slice(*ends) for ends in pairwise((*starts, count))]
@@ -258,14 +258,14 @@ def _runs(count: int) -> list[slice]:
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """Networks that were fitted to blasts.
+    """Networks fitted to blasts.
 
     Attributes:
-        mean: Of each feature and each relation (INPUTS,).
-        scale: Their spread (INPUTS,).
-        impulse: The networks that know impulses.
-        peak: Those that know peak overpressures.
-        fit: What they were fitted to.
+        mean: Mean of each feature and each relation (INPUTS,).
+        scale: Their standard deviations (INPUTS,).
+        impulse: The networks for impulses.
+        peak: The networks for peak overpressures.
+        fit: Their provenance.
     """
 
     mean: FloatArray
@@ -276,7 +276,7 @@ class Surrogate:
 
     @property
     def digest(self) -> str:
-        """Tells surrogates apart: of their numbers."""
+        """Digest of all numbers, which identifies the surrogate."""
         members = (*self.impulse.members, *self.peak.members)
         arrays = (self.mean, self.scale, *(each for member in members for each in member))
         numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
@@ -285,12 +285,12 @@ class Surrogate:
     def guess(
         self, site: SurrogateSite, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
     ) -> Guess:
-        """Return what blasts behind layouts would do, without one.
+        """Return the predicted loads of layouts.
 
         Args:
             site: The site.
             layouts: Legal layouts.
-            charges: What goes off behind each of them, where it does (layouts,).
+            charges: The charge against each layout (layouts,).
 
         Raises:
             LayoutError: If the catalogue has no such piece.
@@ -318,10 +318,10 @@ class Surrogate:
         return Guess(*impulse, *of(self.peak, [each.log_peak for each, _ in pairs], PEAK_POWER))
 
     def save(self, path: str | Path) -> Path:
-        """Write everything as one JSON file, numbers to five digits.
+        """Write the surrogate as a JSON file, numbers to five digits.
 
         Raises:
-            BlastEnvError: If it cannot be written.
+            BlastEnvError: If the file cannot be written.
         """
         path = Path(path)
         content = _File(
@@ -338,9 +338,9 @@ class Surrogate:
     def _heard(
         self, networks: Networks, approach: Approach, barrier: FloatArray, site: SurrogateSite
     ) -> SingleArray:
-        """Return the messages to points from all that stands there (members, points, MESSAGE).
+        """Return the sum of messages to each point (members, points, MESSAGE).
 
-        Layouts have many pieces in common, so those of each piece are remembered.
+        Layouts have many pieces in common, so the messages of each piece are cached.
         """
 
         def sent(related: FloatArray) -> SingleArray:
@@ -356,11 +356,11 @@ class Surrogate:
         return heard
 
     def scaled(self, features: FloatArray) -> FloatArray:
-        """Return what the networks are given of features of points (points, FEATURES)."""
+        """Return the scaled and bounded features of points (points, FEATURES)."""
         return bounded(features, self.mean[:FEATURES], self.scale[:FEATURES])
 
     def related(self, relations: FloatArray) -> FloatArray:
-        """Return what they are given of relations (solids x points, RELATIONS)."""
+        """Return the scaled and bounded relations (solids x points, RELATIONS)."""
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
 
 
@@ -371,24 +371,24 @@ def _of_piece(
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return numbers less their mean, over their scale, cut where networks have met none (rows, n).
+    """Return numbers less their mean, over their scale, clipped to the range of a fit (rows, n).
 
-    A wall of 60 m has points much farther from its edges than those of the sites of a fit, and what
-    a network says so far outside has no bounds.
+    A wall of 60 m has points much farther from its edges than the sites of a fit, and predictions
+    so far outside that range are unbounded.
     """
     found: FloatArray = np.clip((numbers - mean) / scale, -_MOST_SPREADS, _MOST_SPREADS)
     return found
 
 
 def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return what the networks say on the mean, and by how much they differ (structures,)."""
+    """Return the trimmed geometric mean over the networks, and the spread of logarithms (n,)."""
     return np.exp(agreed(logs)), logs.std(axis=0)
 
 
 def agreed(logs: FloatArray) -> FloatArray:
     """Return the mean over the networks without the highest and the lowest (members, n) -> (n,).
 
-    Where nothing like it was in the fit, one of them may be far off.
+    A single network may be far off on layouts unlike those of the fit.
     """
     middle: FloatArray = np.sort(logs, axis=0)[1:-1] if len(logs) > 2 else logs
     mean: FloatArray = middle.mean(axis=0)
@@ -400,14 +400,14 @@ def log_loads(
 ) -> FloatArray:
     """Return the logarithm of the load on each structure, by each network (members, structures).
 
-    It is the power mean of the loads at its points, each by the area that it stands for.
+    It is the power mean of the loads at its points, weighted by area.
 
     Args:
-        differs: What the networks say of all points: `Networks` (members, points).
-        known: Logarithm of Kingery and Bulmash's load there (points,).
-        area_m2: What each point stands for (points,).
-        starts: The first point of each structure (structures,).
-        power: Of the mean.
+        differs: Predictions at all points, from `Networks` (members, points).
+        known: Logarithm of Kingery and Bulmash's load (points,).
+        area_m2: Wall area represented by each point (points,).
+        starts: Index of the first point of each structure (structures,).
+        power: Exponent of the mean.
     """
     area_of_all_m2 = np.add.reduceat(area_m2, starts)
     loads = area_m2 * np.exp(power * (known + differs))
@@ -419,7 +419,7 @@ def load_surrogate(path: str | Path) -> Surrogate:
     """Return a surrogate from its file.
 
     Raises:
-        BlastEnvError: If there is no such file, or it is no surrogate or damaged.
+        BlastEnvError: If the file does not exist, is damaged or is not a surrogate.
     """
     path = Path(path)
     try:
@@ -440,10 +440,9 @@ def load_surrogate(path: str | Path) -> Surrogate:
 
 
 def packaged_surrogate() -> Surrogate:
-    """Return the surrogate that comes with the package.
+    """Return the bundled surrogate.
 
-    Its `fit` says what it was fitted to: generated sites only, so that it may be judged on all
-    bundled ones.
+    It was fitted to generated sites only (see `fit`), so that all bundled sites are valid tests.
     """
     return load_surrogate(_PACKAGED)
 
@@ -452,7 +451,7 @@ _Members = Annotated[list[list[list[float]]], Field(min_length=1, max_length=100
 
 
 class _File(BaseModel):
-    """What is in a file: arrays as flat lists."""
+    """Content of a file: arrays as flat lists."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -496,7 +495,7 @@ def _numbers(array: AnyFloats) -> list[float]:
 
 
 def _silu(values: AnyFloats) -> SingleArray:
-    """Return x / (1 + exp(-x)); by the hyperbolic tangent nothing overflows, and it is faster."""
+    """Return x / (1 + exp(-x)), by the hyperbolic tangent for speed and without overflow."""
     half: SingleArray = np.float32(0.5) * values
     silu: SingleArray = np.tanh(half)
     silu *= half

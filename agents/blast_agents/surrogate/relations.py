@@ -1,10 +1,10 @@
-"""Where solids stand as seen from a charge and from a point on a wall.
+"""Positions of solids relative to a charge and a point on a wall.
 
-Ways tell what is open between the two. They tell neither what stands beside and behind the charge,
-which throws the wave back, nor how near a solid is, nor how far it reaches beyond the detours. All
-this is relative to the straight way in plan: ahead is from the charge to the point, and aside is
-where the wall of the point looks, so that a mirrored site has the same numbers. Lengths are scaled
-as Hopkinson and Cranz's.
+Paths describe the open space between charge and point (`blast_agents.surrogate.ways`). Relations
+add the solids beside and behind the charge, which reflect the wave, the distance of each solid and
+its extent beyond the detours. The axes follow the straight path in plan: ahead is from the charge
+to the point, and aside is the side that the wall of the point faces, so that a mirrored site has
+the same numbers. Lengths follow Hopkinson-Cranz scaling.
 """
 
 from math import hypot, log, sqrt
@@ -16,13 +16,13 @@ from numba import njit
 from blast_env.arrays import FloatArray
 
 RELATIONS: Final = 15
-"""Numbers for each solid and point."""
+"""Number of relations per solid and point."""
 
 _LEAST_SCALED: Final = 0.05
-"""What is nearer to a solid counts as so near, m/kg^(1/3)."""
+"""Offset of scaled distances to a solid before their logarithm, m/kg^(1/3)."""
 
 _MOST: Final = 6.0
-"""No number is farther from 0: what is so far away is far away."""
+"""Bound on the magnitude of all relations."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -33,20 +33,20 @@ def relations(
     scale_m: float,
     solids: FloatArray,
 ) -> FloatArray:
-    """Return where each solid stands for each point (solids, points, RELATIONS).
+    """Return the relations of each solid to each point (solids, points, RELATIONS).
 
-    In order: how far ahead its middle is, as a share of the way; the same from the charge, and back
-    from the point; how far aside its middle is; half its extent ahead and aside; its height; how
-    far that is above the straight way; logarithms of the distances from charge and point to it;
-    the detours round its far and its near end, and over its top; the gap between it and the way;
-    whether it stands in the way in plan.
+    In order: distance ahead of its centre, as a share of the path; scaled distances ahead of the
+    charge and back from the point; distance aside of its centre; half its extent ahead and aside;
+    its height; its height above the straight path; logarithms of its distances from charge and
+    point; the detours round its far and near end, and over its top; the gap between it and the
+    path; whether it crosses the path in plan.
 
     Args:
-        start_m: Where the charge is (3,).
+        start_m: Position of the charge (3,).
         points_m: The points (points, 3).
-        outward: Where their walls look (points, 2).
-        scale_m: Cube root of the charge's mass: of lengths, m.
-        solids: Left, bottom, right, top, height of what stands there, m (solids, 5).
+        outward: Outward normals of their walls, in plan (points, 2).
+        scale_m: Scaling length: the cube root of the charge's mass in kg.
+        solids: Left, bottom, right, top and height of each solid, m (solids, 5).
     """
     found = np.zeros((len(solids), len(points_m), RELATIONS))
     for point in range(len(points_m)):
@@ -92,7 +92,7 @@ def relations(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _away_m(x_m: float, y_m: float, solid: FloatArray) -> float:
-    """Return the distance in plan from a place to a solid."""
+    """Return the distance in plan from a position to a solid."""
     beside_m = max(solid[0] - x_m, x_m - solid[2], 0.0)
     before_m = max(solid[1] - y_m, y_m - solid[3], 0.0)
     return hypot(beside_m, before_m)
@@ -100,5 +100,5 @@ def _away_m(x_m: float, y_m: float, solid: FloatArray) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _detour_m(there_m: float, way_m: float, off_m: float) -> float:
-    """Return by how much a way is longer that makes a detour so far off the straight one."""
+    """Return the excess length of a path that passes `off_m` from the straight one at `there_m`."""
     return sqrt(there_m**2 + off_m**2) + sqrt((way_m - there_m) ** 2 + off_m**2) - way_m

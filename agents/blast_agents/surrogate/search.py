@@ -1,4 +1,4 @@
-"""Layouts by what has been learnt: a surrogate, an agent or both, with and without blasts."""
+"""Layouts from trained models: a surrogate, an agent or both, with and without blasts."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,27 +31,29 @@ from blast_env.values import generator
 
 _DRAWN_CHARGES: Final = 16
 _HIDDEN_CHARGES: Final = 4
-"""Where the charge is not known, layouts are guessed against so many different ones of those drawn:
-the middle one, and those that are farthest from each other."""
+"""Number of drawn charges, and of those used for predictions, where the charge is unknown.
+
+The latter are the central one and those farthest apart.
+"""
 
 _KEPT: Final = 4
-"""How many of the best layouts are changed."""
+"""Number of best layouts that the search changes."""
 
 _BATCH: Final = 8
-"""How many changes are guessed at a time."""
+"""Number of changed layouts per call of the surrogate."""
 
 _SITE_SHARE: Final = 0.3
-"""Of the time for guesses alone, what the rules and the ways around on a site take, about."""
+"""Approximate share of the rules and paths of a site in the time of a search without blasts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Guesses:
-    """What the surrogate says of the layouts of a case; each is asked once.
+    """Cached predictions of a surrogate for the layouts of a case.
 
     Attributes:
         surrogate: The surrogate.
-        case: What layouts meet.
-        site: The scenario as the surrogate sees it.
+        case: The scenario and its threats.
+        site: The scenario as the surrogate represents it.
     """
 
     surrogate: Surrogate
@@ -61,15 +63,15 @@ class Guesses:
 
     @classmethod
     def of(cls, surrogate: Surrogate, case: Case) -> "Guesses":
-        """Begin with none.
+        """Return an empty cache.
 
         Raises:
-            BlastEnvError: If nothing is protected.
+            BlastEnvError: If no structure is protected.
         """
         return cls(surrogate, case, site_of(case.scenario))
 
     def loads(self, layouts: Sequence[Layout]) -> FloatArray:
-        """Return the load that counts behind each layout, as rewards are paid (layouts,)."""
+        """Return the predicted value of the objective for each layout (layouts,)."""
         new = [each for each in dict.fromkeys(layouts) if each not in self._known]
         if new:
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
@@ -79,11 +81,11 @@ class Guesses:
 
     @property
     def count(self) -> int:
-        """How many layouts it was asked about."""
+        """Number of layouts with a prediction."""
         return len(self._known)
 
     def ranked(self) -> list[Layout]:
-        """Return all layouts that it was asked about, the least load first."""
+        """Return all layouts with a prediction, the least load first."""
         return sorted(self._known, key=lambda layout: self._known[layout])
 
     def _weighted(self, layouts: Sequence[Layout], threat: Threat) -> FloatArray:
@@ -98,16 +100,16 @@ def improved(
     rng: np.random.Generator,
     tell: Callable[[float], None] = lambda _: None,
 ) -> list[Layout]:
-    """Return the layouts that a search by guesses alone has met, the best first.
+    """Return all layouts of a search by predictions alone, the best first.
 
-    Begins with given layouts, then changes the best ones so far by one or two moves.
+    The search starts from given layouts, then changes the best so far by one or two moves.
 
     Args:
-        guesses: Is asked, and remembers.
-        begin_with: Legal layouts.
-        most: Most layouts to ask about, beside those.
+        guesses: The predictions, which it extends.
+        begin_with: Legal initial layouts.
+        most: Largest number of further layouts.
         rng: Draws the changes.
-        tell: Is told the share that is done.
+        tell: Called with the share that is done.
     """
     guesses.loads([tuple(sorted(each)) for each in begin_with])
     moves, end = Moves(guesses.case.scenario), guesses.count + most
@@ -123,37 +125,37 @@ def improved(
 
 @dataclass(frozen=True)
 class LearntSearch(Search):
-    """Proposes by what a surrogate of gas dynamics has learnt, an agent, or both.
+    """A search guided by a surrogate of gas dynamics, a trained agent, or both.
 
     Without a blast (a budget of 0) it proposes
 
-    - what the surrogate likes best of the rules' layouts and changes of them;
-    - what the agent proposes;
-    - with both, what the surrogate likes best of what the agent proposes and draws.
+    - with a surrogate, the best prediction among the rules' layouts and changes of them;
+    - with an agent, the agent's layout;
+    - with both, the best prediction among the agent's layout and its samples.
 
-    With blasts a surrogate says what gets one: first what the agent proposes, then the rules'
-    layouts and the best that a search by guesses alone has found, in turn; then changes of the best
-    by blasts, of which it picks one out of many. What it picks is by guesses that are corrected by
-    how far it was off on layouts that are alike (`Correction`). Against a hidden charge layouts
-    meet a few places alone. The guesses under all places, times the ratio of blast and guess under
-    those few, tell more of a layout than its loads there: they decide what is changed, and what
-    meets the other places in the end.
+    With blasts, a surrogate selects the layouts to simulate: first the agent's layout, then in
+    turn the rules' layouts and the best of a search by predictions alone, then changes of the best
+    simulated layouts, one out of many at a time. The selection uses predictions corrected by the
+    errors on similar layouts (`Correction`). Against a hidden charge, layouts are simulated for a
+    few places only. The prediction under all places, times the ratio of simulated to predicted
+    load under those few, estimates a layout better than its simulated loads alone: it selects the
+    layouts to change, and those to simulate for the other places in the end.
 
-    An agent without a surrogate gets its blasts for what it proposes and draws and for the rules;
-    then for changes of the best of these, the better ones more often, by one or two moves.
+    An agent without a surrogate spends its blasts on its own layout, its samples and the rules,
+    and then on changes of the best of these by one or two moves, in favour of the better ones.
 
     Attributes:
         surrogate: The surrogate.
         agent: The agent.
-        digest: Of both, so that results of different ones are told apart.
-        changes: Changed layouts that are guessed where there is no blast.
-        ranked: Layouts that the agent draws for the surrogate where there is no blast.
-        guesses: Layouts that are guessed before the first blast.
-        agent_draws: Layouts that the agent draws for that.
-        drawn: Changes that the surrogate picks one out of, afterwards.
-        guessed_share: Share of the blasts for what was found by guesses alone.
-        drawn_share: Without a surrogate, share of the layouts that the agent draws.
-        name: In tables.
+        digest: Digest of both, which identifies results.
+        changes: Number of changed layouts to predict in a search without blasts.
+        ranked: Number of samples of the agent in a search without blasts.
+        guesses: Number of layouts to predict before the first blast.
+        agent_draws: Number of samples of the agent among these.
+        drawn: Number of changed layouts from which the surrogate selects one, afterwards.
+        guessed_share: Share of the blasts for layouts found by predictions alone.
+        drawn_share: Without a surrogate, share of the layouts that the agent samples.
+        name: Name in tables.
 
     Raises:
         BlastEnvError: If there is neither a surrogate nor an agent.
@@ -178,10 +180,10 @@ class LearntSearch(Search):
     def propose(
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the best layout that was met; with a budget of 0 the best one by guesses.
+        """Return the best layout by blasts or, with a budget of 0, by predictions.
 
         Raises:
-            BlastEnvError: If nothing is protected.
+            BlastEnvError: If no structure is protected.
         """
         if budget:
             return super().propose(problem, budget, seed, report)
@@ -199,13 +201,13 @@ class LearntSearch(Search):
         charge: AnyCharge | None = None,
         tell: Callable[[float], None] = lambda _: None,
     ) -> Layout:
-        """Return the layout that is proposed without a blast; always the same one.
+        """Return the layout proposed without a blast; it is deterministic.
 
         Args:
             scenario: The scenario; it has a build zone.
-            charge: Where the charge is, if that is known; otherwise the layout is for some of the
-                places where the scenario may have one.
-            tell: Is told the share that is done.
+            charge: The charge, if it is known; otherwise the layout is for some of the charges of
+                the scenario.
+            tell: Called with the share that is done.
 
         Raises:
             BlastEnvError: As for `propose`.
@@ -227,7 +229,7 @@ class LearntSearch(Search):
         return guesses.ranked()[0]
 
     def plan(self, problem: LayoutProblem, budget: int) -> Plan:
-        """Divide the blasts; by guesses against a hidden charge for few layouts, met well."""
+        """Divide the blasts; with a surrogate and a hidden charge, favour threats over layouts."""
         plan = Plan.of(problem, budget)
         most = len(problem.threats)
         places = min(max(plan.threats, _LEAST_PLACES), most, budget)
@@ -236,7 +238,7 @@ class LearntSearch(Search):
         return Plan(places, budget - min(round(_CHOOSING_SHARE * budget), budget - places))
 
     def phases(self, session: SearchSession) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Return how a session is explored, and how the choice is made then."""
+        """Return the functions that explore a session and make the final choice."""
         if self.surrogate is None:
             return super().phases(session)
         estimates = _Estimates.of(self.surrogate, session)
@@ -248,7 +250,7 @@ class LearntSearch(Search):
         return partial(self._explore_by_guesses, session, estimates), choose
 
     def explore(self, session: SearchSession) -> None:
-        """Let blasts decide between rules and draws of the agent, and changes of the best."""
+        """Simulate the rules' layouts and the agent's samples, then changes of the best."""
         scenario, told, plan = session.problem.scenario, session.problem.told, session.plan
         agent = _given(self.agent)
         count = max(1, round(self.drawn_share * plan.exploring_layouts))
@@ -261,7 +263,7 @@ class LearntSearch(Search):
             session.assess([moves.near_best(best, session.rng)])
 
     def _explore_by_guesses(self, session: SearchSession, estimates: "_Estimates") -> None:
-        """Let blasts decide between what guesses like best, and changes of it."""
+        """Simulate the layouts with the best predictions, then changes of the best."""
         scenario, told = session.problem.scenario, session.problem.told
         guesses = estimates.everywhere
         rules = layouts_by_rule(scenario, told).values()
@@ -293,7 +295,7 @@ class LearntSearch(Search):
 
 
 def packaged_search() -> LearntSearch:
-    """Return the search by the surrogate that comes with the package."""
+    """Return the search by the bundled surrogate."""
     return search_by(packaged_surrogate())
 
 
@@ -308,7 +310,7 @@ def _given(agent: SamplingAgent | None) -> SamplingAgent:
 
 
 def case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
-    """Return what a proposal is guessed against: the charge, or some of those that may be."""
+    """Return the case of a proposal without blasts: the charge, or some of the possible ones."""
     if charge is not None:
         return practice_visible(scenario, charge, 1, 0)
     drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
@@ -316,35 +318,35 @@ def case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
 
 
 _LAYOUTS_A_RULE: Final = 8
-"""Of so many layouts that get a blast one is a rule's, as long as there are some."""
+"""Exploring layouts per rule's layout: limits the rules that are simulated."""
 
 _LEAST_PLACES: Final = 4
-"""Of a hidden charge, that a layout meets before it is said how wrong the surrogate is of it."""
+"""Least number of threats per exploring layout against a hidden charge."""
 
 _POOL: Final = 64
-"""Of what is liked best by guesses alone, so many may get a blast."""
+"""Number of best predicted layouts that are candidates for a blast."""
 
 _LEARNT_FROM: Final = 64
-"""The correction is learnt from so many of the best layouts: its cost grows with the cube."""
+"""Number of best layouts that the correction is fitted to: its cost grows with the cube."""
 
 _LEAST_SHARE: Final = 1e-3
-"""Of a guess; particles may all miss, and then there is no load at all."""
+"""Least ratio of simulated to predicted load; without it, a load of zero has no logarithm."""
 
 _HOPE: Final = 0.5
-"""How many standard deviations less than expected is hoped for of a layout that gets a blast."""
+"""Standard deviations below the mean at which the lower confidence bound lies."""
 
 _CHOOSING_SHARE: Final = 0.4
-"""Of the blasts, for the places of a hidden charge that the best layouts have not met."""
+"""Share of the blasts held in reserve for the remaining places of a hidden charge."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Estimates:
-    """What layouts that have met some threats would let through under all of them.
+    """Estimated loads under all threats for layouts simulated under the first threats.
 
     Attributes:
-        session: Knows the loads under the first threats.
-        everywhere: Guesses under all threats.
-        met: Guesses under those that layouts meet while the search explores.
+        session: Holds the simulated loads under the first threats.
+        everywhere: Predictions under all threats.
+        met: Predictions under the first threats, those of exploration.
     """
 
     session: SearchSession
@@ -353,7 +355,7 @@ class _Estimates:
 
     @classmethod
     def of(cls, surrogate: Surrogate, session: SearchSession) -> "_Estimates":
-        """Begin with none."""
+        """Return estimates without predictions."""
         problem = session.problem
 
         def under(threats: Sequence[Threat]) -> Guesses:
@@ -364,7 +366,7 @@ class _Estimates:
         return cls(session, under(problem.threats), under(first))
 
     def ranked(self) -> list[Layout]:
-        """Return the layouts that have met the first threats, the least estimate first."""
+        """Return the layouts simulated under the first threats, the least estimate first."""
         layouts = self.session.ranked(self.session.plan.threats)
         if not layouts:
             return []
@@ -373,7 +375,7 @@ class _Estimates:
         return [layouts[index] for index in order.tolist()]
 
     def likeliest(self, layouts: Sequence[Layout]) -> Layout:
-        """Return the layout that most likely lets the least through, by guesses and all blasts."""
+        """Return the layout with the least lower confidence bound of the corrected prediction."""
         scores = np.log(self.everywhere.loads(layouts))
         met = self.session.ranked(self.session.plan.threats)[:_LEARNT_FROM]
         if met:
@@ -384,7 +386,7 @@ class _Estimates:
         return layouts[int(scores.argmin())]
 
     def _errors(self, layouts: Sequence[Layout]) -> FloatArray:
-        """Return logarithms of loads under the first threats over those guessed (layouts,)."""
+        """Return the logarithms of simulated over predicted loads, first threats (layouts,)."""
         shares = self.session.assess(layouts) / self.met.loads(layouts)
         errors: FloatArray = np.log(np.maximum(shares, _LEAST_SHARE))
         return errors

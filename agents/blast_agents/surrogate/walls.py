@@ -1,4 +1,4 @@
-"""What the surrogate sees of a site: points on the walls that count, and what may stop a blast."""
+"""Sites as the surrogate represents them: points on protected walls, and obstacles to the blast."""
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
@@ -22,42 +22,45 @@ from blast_env.scenario.terraces import ground_below_m, is_open_below
 
 _ALONG_M: Final = 1.0
 _UP_M: Final = 1.5
-"""Points on a wall are so far apart, or farther where there would be too many of them."""
+"""Spacing of points along and up a wall; larger where there would be too many points."""
 
 MOST_POINTS: Final = 250
-"""On all walls of a site, about. More cost time and say the same, for large walls are far away."""
+"""Approximate largest number of points on all walls of a site.
+
+More points cost time and do not change the loads, since large walls are far away.
+"""
 
 _BEFORE_M: Final = 0.05
-"""Points are this far before their wall, so that it does not stop what comes to them."""
+"""Distance of points in front of their wall, so that the wall does not obstruct their paths."""
 
 _LEAST_HEIGHT_M: Final = 0.3
-"""A charge on the ground begins so high: its middle."""
+"""Least height of the centre of a charge above the ground."""
 
 _LEAST_Z: Final = 0.2
-"""A point that is nearer to the charge, m/kg^(1/3), has the reflected loads from there."""
+"""Least scaled distance, m/kg^(1/3): nearer points have the reflected loads at this distance."""
 
 _MOST_BYTES: Final = 2**26
 
 SingleArray = NDArray[np.float32]
 
 FEATURES: Final = 7 + 2 * SHARES
-"""Numbers that a network is given about a point: geometry and ways."""
+"""Inputs of a network per point: geometry and path shares."""
 
 INPUTS: Final = FEATURES + RELATIONS
-"""The same, and those about a solid and the point."""
+"""Inputs per point, plus those per solid and point."""
 
 
 @dataclass(frozen=True, eq=False)
 class WallPoints:
-    """Points that stand for the walls that count.
+    """Points that represent the protected walls.
 
     Attributes:
-        starts: The first point of each structure (structures,).
-        points_m: (points, 3).
-        outward: Where their wall looks (points, 2).
-        area_m2: What each stands for (points,).
-        to_edge_m: To the nearest upright edge of its wall (points,).
-        to_roof_m: To the roof (points,).
+        starts: Index of the first point of each structure (structures,).
+        points_m: Positions (points, 3).
+        outward: Outward normals of their walls, in plan (points, 2).
+        area_m2: Wall area represented by each point (points,).
+        to_edge_m: Distance to the nearest vertical edge of the wall (points,).
+        to_roof_m: Distance to the roof (points,).
     """
 
     starts: IntArray
@@ -69,11 +72,11 @@ class WallPoints:
 
     @classmethod
     def on(cls, structures: Sequence[AnyStructure], air_m: float) -> "WallPoints":
-        """Put points on structures: one a metre along a wall and 1.5 m of its height, or so.
+        """Place points on structures, about one per metre of length and 1.5 m of height.
 
         Args:
             structures: The structures.
-            air_m: Height of those that have none.
+            air_m: Height of structures without a height of their own.
         """
         heights_m = [each.height_m or air_m for each in structures]
         apart = _apart(structures, heights_m)
@@ -85,7 +88,7 @@ class WallPoints:
 
 
 def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArray:
-    """Return place, outward, area, and distance to edge and roof of points (points, 8)."""
+    """Return position, outward normal, area, and distances to edge and roof (points, 8)."""
     left, bottom, right, top = structure.rectangle_m
     rise_m = height_m - structure.base_m
     levels = max(1, round(rise_m / (_UP_M * apart)))
@@ -108,19 +111,19 @@ def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArra
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """A charge and the walls that count: what of it no layout changes.
+    """The layout-independent data of a charge and the protected walls.
 
     Attributes:
-        starts: The first point of each structure (structures,).
-        ways: From the charge to the points.
-        outward: Where their walls look (points, 2).
-        scale_m: Cube root of the charge's mass: of lengths, m.
-        on_empty: Features of each point where no barrier stands (points, FEATURES): geometry, open
-            ways without and with the barrier.
-        solids: Where structures stand for each point (solids, points, RELATIONS).
-        log_impulse: Logarithm of Kingery and Bulmash's reflected impulse there, Pa s (points,).
-        log_peak: Logarithm of their reflected overpressure there, Pa (points,).
-        area_m2: What each point stands for (points,).
+        starts: Index of the first point of each structure (structures,).
+        ways: Paths from the charge to the points.
+        outward: Outward normals of their walls, in plan (points, 2).
+        scale_m: Scaling length: the cube root of the charge's mass in kg.
+        on_empty: Features of each point on the empty site (points, FEATURES): geometry, then open
+            path shares without and with the barrier, which are equal here.
+        solids: Relations of each structure to each point (solids, points, RELATIONS).
+        log_impulse: Logarithm of Kingery and Bulmash's reflected impulse, Pa s (points,).
+        log_peak: Logarithm of their reflected overpressure, Pa (points,).
+        area_m2: Wall area represented by each point (points,).
     """
 
     starts: IntArray
@@ -134,7 +137,7 @@ class Approach:
     area_m2: FloatArray
 
     def points_of(self, structure: int) -> slice:
-        """Return the points of a structure, by its number among the protected ones."""
+        """Return the slice of a structure's points, by its index among the protected ones."""
         return slice(*[*self.starts.tolist(), len(self.area_m2)][structure : structure + 2])
 
     def features(self, barrier: FloatArray) -> FloatArray:
@@ -149,7 +152,7 @@ class Approach:
         return features
 
     def relations(self, barrier: FloatArray) -> FloatArray:
-        """Return where pieces stand for each point (pieces, points, RELATIONS).
+        """Return the relations of each piece to each point (pieces, points, RELATIONS).
 
         Args:
             barrier: As for `features`.
@@ -162,7 +165,7 @@ class Approach:
 
 
 class Memory:
-    """Remembers arrays up to so many bytes; then it forgets all of them.
+    """A cache of arrays that is cleared when it exceeds a bound.
 
     Args:
         most_bytes: The bound.
@@ -173,7 +176,7 @@ class Memory:
         self._kept: dict[Hashable, SingleArray] = {}
 
     def of(self, key: Hashable, make: Callable[[], SingleArray]) -> SingleArray:
-        """Return the array of a key, made if it is not there; nobody may change it."""
+        """Return the array of a key, and create it if necessary; it must not be modified."""
         found = self._kept.get(key)
         if found is None:
             found = make()
@@ -186,21 +189,22 @@ class Memory:
 
 
 class SurrogateSite:
-    """A scenario as the surrogate sees it.
+    """A scenario as the surrogate represents it.
 
-    What begins above the ground, and on no terrace, stops nothing, as if it were not there: the
-    surrogate never met it. Nor was it fitted to terraces: they are boxes as other structures are.
+    Structures that begin above the ground, and on no terrace, do not obstruct the blast: the fit of
+    the surrogate contained none. It contained no terraces either, which are boxes like other
+    structures.
 
     Args:
         scenario: The scenario.
-        most_bytes: Of what is remembered of pieces.
+        most_bytes: Bound on the cache of messages.
 
     Attributes:
         scenario: The scenario.
-        memory: What surrogates remember of it.
-        protected: Its protected structures.
-        counts_peaks: Whether its objective counts peak overpressures.
-        alternatives: The bays of its facades, where their response counts.
+        memory: The cache of messages.
+        protected: The protected structures.
+        counts_peaks: Whether the objective needs peak overpressures.
+        alternatives: The bays of the facades, if the objective counts their response.
     """
 
     def __init__(self, scenario: Scenario, most_bytes: int = _MOST_BYTES) -> None:
@@ -229,7 +233,7 @@ class SurrogateSite:
         self._named: dict[frozenset[Element], tuple[NamedBay, ...]] = {}
 
     def approach(self, charge: Charge) -> Approach:
-        """Return what comes from a charge to the protected structures on the empty site."""
+        """Return the layout-independent data of a charge and the protected structures."""
         if charge not in self._approaches:
             self._approaches[charge] = self._approach_of(charge)
         return self._approaches[charge]
@@ -243,15 +247,15 @@ class SurrogateSite:
     def response(
         self, structure: str, layout: Sequence[Element], peak_pa: float, impulse_pa_s: float
     ) -> float:
-        """Return what counts of the response of a protected structure to one triangular load.
+        """Return the objective's response measure of a protected structure under a triangular load.
 
-        Most layouts differ in what few structures get, so answers are kept.
+        Most layouts differ in the loads of few structures, so results are cached.
 
         Args:
             structure: Its name.
             layout: The layout, whose measures harden bays.
-            peak_pa: The peak.
-            impulse_pa_s: The impulse.
+            peak_pa: The peak overpressure.
+            impulse_pa_s: The impulse per area.
         """
         measures = frozenset(each for each in layout if isinstance(each, Measure))
         asked = structure, measures, peak_pa, impulse_pa_s
@@ -264,7 +268,7 @@ class SurrogateSite:
         return self._responses[asked]
 
     def barrier(self, layout: Sequence[Element]) -> FloatArray:
-        """Return left, bottom, right, top and height of what a layout sets down, m (pieces, 5).
+        """Return left, bottom, right, top and height of a layout's pieces, m (pieces, 5).
 
         Raises:
             LayoutError: If the catalogue has no such piece.
@@ -319,7 +323,7 @@ class SurrogateSite:
 
 
 def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:
-    """Return how many times as far apart points are as on a small site, not to be many."""
+    """Return the factor on the spacing of points that keeps their number near `MOST_POINTS`."""
     area_m2 = 0.0
     for structure, height_m in zip(structures, heights_m, strict=True):
         left, bottom, right, top = structure.rectangle_m
@@ -331,14 +335,14 @@ def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> fl
 
 
 def site_of(scenario: Scenario, most_bytes: int = _MOST_BYTES) -> SurrogateSite:
-    """Return a scenario as the surrogate sees it.
+    """Return a scenario as the surrogate represents it.
 
     Args:
         scenario: The scenario.
-        most_bytes: Of what is remembered of pieces.
+        most_bytes: Bound on the cache of messages.
 
     Raises:
-        BlastEnvError: If nothing on it is protected.
+        BlastEnvError: If no structure is protected.
     """
     site = SurrogateSite(scenario, most_bytes)
     if not site.protected:

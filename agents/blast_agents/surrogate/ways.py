@@ -1,15 +1,14 @@
-"""How much of what goes from a charge to a wall is stopped: straight, over the top and round ends.
+"""Obstruction of the paths from a charge to a wall: straight, over the top and round the ends.
 
-A wave that meets a barrier goes on over its top and round its ends, the weaker the longer that way
-is. From the charge to each point on a wall lead the straight way and many that make a detour, each
-by one place beside or above the straight one; a way is stopped by any solid that it meets. What
-counts is the share of the ways that is open, in which a way weighs the less the longer its detour
-is: for detours near the charge, half way, and near the wall, and for several lengths over which the
-weight falls. Gaps, several rows and heights need no rule of their own.
+A wave passes over the top and round the ends of a barrier, the weaker the longer its path is. From
+the charge to each point on a wall lead the straight path and many detours, each by one place beside
+or above the straight one; any solid on a path blocks it. The features are the shares of open paths,
+weighted by the exponential of the detour's length: for detours near the charge, half way, and near
+the wall, and for several decay lengths. Gaps, several rows and heights need no special rule.
 
-Of the ways that make their detour by the same place in plan and differ in height alone, what stops
-one stops all below it. So it is enough to know how many a solid stops, and where it is met in plan
-is found once for all of them, at all heights of a wall.
+A solid that blocks a path also blocks all lower paths by the same place in plan. So it suffices to
+count the blocked ones, and the crossings in plan are found once for all of them, at all heights of
+a wall.
 """
 
 from dataclasses import dataclass
@@ -22,35 +21,36 @@ from numba import njit
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 
 STATIONS: Final = (0.2, 0.5, 0.8)
-"""Where on the straight way a detour is made, as a share of it."""
+"""Positions of the detours along the straight path, as shares of its length."""
 
 ASIDE_M: Final = (0.0, 0.7, -0.7, 1.5, -1.5, 2.5, -2.5, 4.0, -4.0, 6.0, -6.0, 9.0, -9.0)
 ABOVE_M: Final = np.array((0.0, 0.7, 1.5, 2.5, 4.0, 6.0))
-"""So far above the straight way, and beside it, detours are made; upwards."""
+"""Offsets of the detours beside (`ASIDE_M`) and above the straight path; ascending heights."""
 
 FALLS_M: Final = (0.1, 0.3, 1.0, 3.0)
-"""Lengths of a detour, m, at which its weight is 1/e, for 100 kg; others as Hopkinson-Cranz."""
+"""Decay lengths of the weight of a detour for 100 kg; Hopkinson-Cranz scaling for other charges."""
 
 SHARES: Final = len(STATIONS) * len(FALLS_M) + 1
-"""Numbers that say what is open to a point: the last is 1 if the straight way is."""
+"""Number of open shares per point: the last is 1 if the straight path is open, otherwise 0."""
 
 _REFERENCE_KG: Final = 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """The ways from a charge to points on walls of an empty site.
+    """The paths from a charge to points on walls of an empty site.
 
     Attributes:
-        start_m: Where the charge is (3,).
-        points_m: The points; those above each other follow one another (points, 3).
-        by_m: Where ways make their detour, in plan (points, stations, asides, 2).
-        by_height_m: How high the straight way is there (points, stations).
-        stopped: How many ways by each place structures stop, from the lowest up (points, stations,
-            asides).
-        is_straight_open: Whether none stops the straight one (points,).
-        weights: Of the ways by each place that are left if so many are stopped (points, stations,
-            asides, ways above each other + 1, falls). Those of a station add up to 1 if none is.
+        start_m: Position of the charge (3,).
+        points_m: The points; those above each other are consecutive (points, 3).
+        by_m: Places of the detours in plan (points, stations, asides, 2).
+        by_height_m: Height of the straight path at the stations (points, stations).
+        stopped: Number of paths by each place that structures block, from the lowest up (points,
+            stations, asides).
+        is_straight_open: Whether the straight path is open (points,).
+        weights: Total weight of the open paths by each place, for each number of blocked paths
+            (points, stations, asides, heights + 1, decay lengths). Those of a station add up to 1
+            if no path is blocked.
     """
 
     start_m: FloatArray
@@ -65,12 +65,12 @@ class Ways:
     def between(
         cls, start_m: FloatArray, points_m: FloatArray, tnt_kg: float, solids: FloatArray
     ) -> "Ways":
-        """Lay the ways from a charge to points.
+        """Return the paths from a charge to points.
 
         Args:
-            start_m: Where the charge is (3,).
+            start_m: Position of the charge (3,).
             points_m: The points (points, 3), none above or below the charge.
-            tnt_kg: Its mass.
+            tnt_kg: Mass of the charge.
             solids: Left, bottom, right, top, height of each structure, m (solids, 5).
         """
         points_m = np.ascontiguousarray(points_m)  # one kind of arrays is compiled once
@@ -92,10 +92,10 @@ class Ways:
         return ways
 
     def shares(self, barrier: FloatArray | None = None) -> FloatArray:
-        """Return what is open to each point (points, SHARES), from 0 to 1.
+        """Return the shares of open paths to each point (points, SHARES), from 0 to 1.
 
         Args:
-            barrier: Left, bottom, right, top, height of each piece of it, m (pieces, 5).
+            barrier: Left, bottom, right, top, height of each of its pieces, m (pieces, 5).
         """
         shares = _open_shares(self.every, self.stopped, self.is_straight_open, self.weights)
         if barrier is not None:
@@ -103,13 +103,13 @@ class Ways:
         return shares
 
     def behind(self, barrier: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return to which points a barrier stops ways, and what is open to these.
+        """Return the points to which a barrier blocks paths, and their open shares.
 
         Args:
             barrier: As for `shares`.
 
         Returns:
-            Numbers of the points (behind,), and their shares (behind, SHARES).
+            Indices of the points (behind,), and their shares (behind, SHARES).
         """
         stopped, is_straight_open = self.stopped.copy(), self.is_straight_open.copy()
         is_behind = self._stop(barrier, stopped, is_straight_open)
@@ -118,13 +118,13 @@ class Ways:
 
     @property
     def every(self) -> IntArray:
-        """The numbers of all points (points,)."""
+        """The indices of all points (points,)."""
         return np.arange(len(self.points_m))
 
     def _stop(
         self, solids: FloatArray, stopped: IntArray, is_straight_open: BoolArray
     ) -> BoolArray:
-        """Mark what solids stop beside what was stopped; return to which points (points,)."""
+        """Mark the further paths that solids block; return the mask of their points (points,)."""
         is_behind = np.zeros(len(stopped), dtype=bool)
         by = (self.by_m, self.by_height_m)
         _stop(self.start_m, self.points_m, *by, solids, stopped, is_straight_open, is_behind)
@@ -179,7 +179,7 @@ def _flat_m2(one_m: FloatArray, other_m: FloatArray) -> float:
 def _open_shares(
     chosen: IntArray, stopped: IntArray, is_straight_open: BoolArray, weights: FloatArray
 ) -> FloatArray:
-    """Return what is open to some of the points (chosen, SHARES)."""
+    """Return the shares of open paths to some of the points (chosen, SHARES)."""
     _, stations, asides = stopped.shape
     falls = weights.shape[-1]
     shares = np.zeros((len(chosen), stations * falls + 1))
@@ -204,9 +204,9 @@ def _stop(
     is_straight_open: BoolArray,
     is_behind: BoolArray,
 ) -> None:
-    """Mark the ways as stopped that meet a solid; those that are stopped are not looked at.
+    """Mark the paths that solids block, and the points with newly blocked paths.
 
-    Marks the points to which a way is newly stopped, too.
+    Paths that are blocked already are skipped.
     """
     points, stations, asides = stopped.shape
     met = np.empty((2 * len(solids), 3))
@@ -246,9 +246,9 @@ def _stop(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _meet(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: FloatArray) -> int:
-    """Note where a straight line in plan enters and leaves solids, and how high these are.
+    """Record where a straight line in plan enters and leaves solids, with their heights.
 
-    Slab by slab. Returns how many it meets.
+    Uses the slab method; returns the number of solids on the line.
     """
     count = 0
     for solid in range(len(solids)):
@@ -270,7 +270,7 @@ def _meet(start_m: FloatArray, end_m: FloatArray, solids: FloatArray, met: Float
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _is_stopped(start_m: float, end_m: float, met: FloatArray) -> bool:
-    """Return whether a line between two heights is below any solid that it meets in plan."""
+    """Return whether a line between two heights is below the top of any solid it crosses."""
     rise_m = end_m - start_m
     for enter, leave, height_m in met:
         if min(start_m + enter * rise_m, start_m + leave * rise_m) < height_m:
