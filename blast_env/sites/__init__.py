@@ -1,4 +1,4 @@
-"""Generated sites: varied, valid, worth solving, and all of one size."""
+"""Generated sites: varied, valid, worth solving, and of one size per family."""
 
 from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.sites.criterion import (

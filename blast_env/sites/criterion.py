@@ -1,7 +1,6 @@
-"""Which generated sites are worth solving, by measures that need no blast.
+"""Acceptance criterion of generated sites, by measures that need no blast.
 
-The first of them is visibility: the lines along which a charge sees the protected structures, and
-who cuts them.
+The measures are shares of the lines of sight from charge to protected structures that barriers cut.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,31 +30,31 @@ from blast_env.scenario.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
 
 DIRECTIONS: Final = 360
-"""Lines that leave each place."""
+"""Number of lines from each place of a charge."""
 
 TARGETS: Final = 3
-"""Heights on a facade that lines go to, where it has a height: the middles of thirds."""
+"""Number of target heights on a facade with a height: the middles of its thirds."""
 
 PLACES: Final = 9
-"""Places along a segment or an entry, or in a rectangle, 3 x 3."""
+"""Number of places along a segment or an entry, or in a rectangle (3 x 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """The lines of sight from where a charge may be to the protected structures.
+    """The lines of sight from the places of charges to the protected structures.
 
-    From places spread evenly over every source, lines leave in directions spread evenly, as the
-    balls of a charge do. Those that would meet a protected structure count, each by the weights
-    of its source and of the structure. Where the structure has a height, each of them stands for
-    several, which rise from the charge to the middle of its lower, middle and upper third: a low
-    wall cuts them near the charge, and the lower ones alone near the structure. A terrace stops
-    those of them that it is higher than where they come to it.
+    Lines leave evenly spaced places of every source in evenly spaced directions, like the balls of
+    a charge. The lines that reach a protected structure count, each by the weights of its source
+    and of the structure. If the structure has a height, each line becomes three, which rise from
+    the ground at the charge to the middle of its lower, middle and upper third: a low wall cuts
+    all three near the charge, but only the lower ones near the structure. A terrace stops the
+    lines that arrive below its top.
 
     Attributes:
         weight: Weight of each line that no other structure stops (lines,).
-        cut: Which lines an endlessly high module on each cell of the build zone would cut
-            (lines, rows, columns).
-        height_m: How high each line is over the ground of each cell (lines, rows, columns).
+        cut: Whether a module of unlimited height on each cell of the build zone would cut each
+            line (lines, rows, columns).
+        height_m: Height of each line over the ground of each cell (lines, rows, columns).
         open_share: Share, by weight, of the lines that no other structure stops.
     """
 
@@ -89,7 +88,7 @@ class Visibility:
                 protected_m = np.minimum(protected_m, entry_m)
             elif structure.carries:
                 terraces.append((entry_m, structure.height_m or 0.0))
-            elif not is_open_below(structure, scenario.structures):  # else one sees below it
+            elif not is_open_below(structure, scenario.structures):  # else lines pass below it
                 other_m = np.minimum(other_m, entry_m)
         free = (weight > 0.0) & (protected_m < other_m)
         open_share = float(weight[free].sum() / max(weight.sum(), 1e-300))
@@ -110,10 +109,10 @@ class Visibility:
         return cls(weight[over], np.tile(cut, (TARGETS, 1, 1))[over], height_m[over], open_share)
 
     def cut_by(self, height_m: float | None) -> BoolArray:
-        """Return which lines a module of a height would cut on each cell (lines, rows, columns).
+        """Return whether a module on each cell would cut each line (lines, rows, columns).
 
         Args:
-            height_m: The height; `None` is as high as the air.
+            height_m: Height of the module; `None` is the height of the air.
         """
         return self.cut if height_m is None else self.cut & (self.height_m < height_m)
 
@@ -124,7 +123,8 @@ class Visibility:
 
         Args:
             cells: (row, column) of the cells that hold a module (`Placement.cells`).
-            heights_m: Height of each module; all are as high as the air unless given.
+            heights_m: Height of each module, `None` for the height of the air; all `None` unless
+                given.
         """
         if not cells or not len(self.weight):
             return 0.0
@@ -147,18 +147,18 @@ def _all_lines(scenario: Scenario) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 @cache
 def _directions() -> tuple[tuple[float, float], ...]:
-    """Return the directions, none of them along an axis.
+    """Return the directions, none along an axis.
 
-    Rounded, so that the last bit of sines, which differs between machines, decides nothing.
+    Rounding keeps the last bit of sines, which differs between machines, without effect.
     """
     angles = (2.0 * pi * (index + 0.5) / DIRECTIONS for index in range(DIRECTIONS))
     return tuple((round(cos(angle), 9), round(sin(angle), 9)) for angle in angles)
 
 
 def _places(source: AnySource) -> list[PointM]:
-    """Return the places of a source, each in the middle of as large a part of it.
+    """Return the places of a source: the centres of equal parts of it.
 
-    Those of a vehicle are along its entries: where it gets to is for the layout to decide.
+    Those of a vehicle lie along its entries, since its reach depends on the layout.
     """
     if isinstance(source, PointSource):
         return [source.position_m]
@@ -177,7 +177,7 @@ def _places_along(start_m: PointM, end_m: PointM) -> list[PointM]:
 
 
 def _entry_m(origin: FloatArray, direction: FloatArray, rectangle: Rectangle) -> FloatArray:
-    """Return how far along each line it enters a rectangle (lines,); infinite if it misses."""
+    """Return the distance along each line to a rectangle, m (lines,); infinite if it misses."""
     low = (np.array([rectangle.left, rectangle.bottom]) - origin) / direction
     high = (np.array([rectangle.right, rectangle.top]) - origin) / direction
     enter = np.minimum(low, high).max(axis=1)
@@ -188,9 +188,9 @@ def _entry_m(origin: FloatArray, direction: FloatArray, rectangle: Rectangle) ->
 def _cut(
     scenario: Scenario, origin: FloatArray, direction: FloatArray, length_m: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
-    """Return which lines a module on each cell would cut, and how far along each line that is.
+    """Return whether a module on each cell would cut each line, and the place along the line.
 
-    Both (lines, rows, columns); the latter as a share of the line's length, 0 to 1.
+    Both are (lines, rows, columns); the place is a share of the line's length, 0 to 1.
     """
     x, y = scenario.zone.centres_m
     to_x = x[0] - origin[:, :1]  # (lines, columns)
@@ -215,12 +215,12 @@ class SiteMeasures:
     Attributes:
         open_share: Share that no other structure stops; the other shares are of these lines.
         layout_share: Share that `visibility_layout` cuts.
-        wall_share: Share that the best straight wall cuts, one row or column of the zone with as
-            many modules in a run as there are, budget and access way aside. With a catalogue: as
-            many pieces of one item as stock and budget pay for.
-        random_share: Share that as many modules cut on cells drawn at random, on average,
-            access way aside. With a catalogue: as many pieces as can be paid for, each of an item
-            drawn at random, in a place drawn at random.
+        wall_share: Share that the best straight wall cuts: the whole stock in one run along a row
+            or column of the zone, without regard to budget and access way. With a catalogue: as
+            many pieces of one item as stock and budget allow.
+        random_share: Expected share that the affordable modules cut on random cells, without
+            regard to the access way. With a catalogue: as many pieces as stock and budget allow,
+            each of a random item in a random place.
     """
 
     open_share: float
@@ -251,16 +251,15 @@ class SiteMeasures:
 
 
 def cut_share_of(lines: Visibility, placement: Placement) -> float:
-    """Return the share of the lines that what stands cuts, its heights heeded."""
+    """Return the share of the lines that the placed modules cut, with their heights."""
     modules = placement.modules
     return lines.cut_share([each.cell for each in modules], [each.height_m for each in modules])
 
 
 def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
-    """Return a layout of which each module cuts as many lines by its cost as one more can.
+    """Return the greedy layout: each step adds the element that cuts most lines per cost.
 
-    With a catalogue, each piece. It keeps every condition of the build zone, and ends where
-    nothing more would cut another line.
+    It is legal, and complete when no further module or piece would cut another line.
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -285,10 +284,10 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
 
 
 _ROUNDING: Final = 1e-9
-"""Share of the lines that is nothing: what rounding leaves where weights are no whole numbers."""
+"""Share of the lines that counts as 0, to absorb rounding of fractional weights."""
 
 _NUMBERS_AT_ONCE: Final = 1_000_000
-"""Truth values that are turned into numbers at a time, eight bytes each."""
+"""Truth values converted to numbers at a time, eight bytes each."""
 
 
 def _gains(weight: FloatArray, cut: BoolArray) -> FloatArray:
@@ -301,7 +300,10 @@ def _gains(weight: FloatArray, cut: BoolArray) -> FloatArray:
 
 
 def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
-    """Return which lines each action would cut (lines, actions); those outside count in part."""
+    """Return whether each action would cut each line (lines, actions).
+
+    A piece that reaches beyond the zone counts with its part inside.
+    """
     cut = np.zeros((len(lines.weight), len(catalogue.variants), *catalogue.shape), dtype=bool)
     by_height = {
         height_m: lines.cut_by(height_m)
@@ -318,7 +320,7 @@ def _cut_by_variants(lines: Visibility, catalogue: Catalogue) -> BoolArray:
 
 
 def _take_next(cells: BoolArray, length: int) -> None:
-    """Let each cell be true if any of so many along the first axis is, from itself on."""
+    """Set each cell to whether any of `length` cells from it along the first axis is true."""
     taken = 1
     while taken < length:
         step = min(taken, length - taken)
@@ -372,17 +374,17 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
     if zone.budget is not None:
         mean_cost = Placement.empty(scenario).module_costs[usable].mean()
         modules = min(modules, int(zone.budget / mean_cost))
-    # A line is missed if all modules stand on the cells that do not cut it.
+    # A line is missed if all modules stand on cells that do not cut it.
     harmless = cells - lines.cut[:, usable].sum(axis=1)
     missed: FloatArray = np.ones(len(harmless))
     for placed in range(modules):
         missed *= np.maximum(harmless - placed, 0) / (cells - placed)
     share = 1.0 - float(lines.weight @ missed) / max(float(lines.weight.sum()), 1e-300)
-    return round(share, 9)  # so that the last bit, which differs between machines, never decides
+    return round(share, 9)  # the last bit differs between machines and must not decide
 
 
 def _random_pieces_share(scenario: Scenario, lines: Visibility) -> float:
-    """Return about the share of the lines that random pieces cut; those may overlap here."""
+    """Return the approximate share of the lines that random pieces cut; overlaps are allowed."""
     zone, placement = scenario.zone, Placement.empty(scenario)
     legal = placement.legal.reshape(len(placement.legal), -1)
     cut = _cut_by_variants(lines, placement.catalogue).reshape(len(lines.weight), *legal.shape)
@@ -400,11 +402,11 @@ def _random_pieces_share(scenario: Scenario, lines: Visibility) -> float:
 
 
 class Objection(NamedTuple):
-    """Why a site is not used.
+    """The reason for rejecting a site.
 
     Attributes:
-        rule: What it does not keep, in the same words for all sites.
-        found: What it has instead.
+        rule: The violated rule, in the same words for all sites.
+        found: The value found.
     """
 
     rule: str
@@ -415,21 +417,21 @@ class SiteCriterion(Protocol):
     """Decides whether a site is used: a pure function of the scenario."""
 
     def objection(self, scenario: Scenario) -> Objection | None:
-        """Return why a site is not used, or `None` if it is."""
+        """Return the reason for rejecting a site, or `None` if it is accepted."""
 
 
 @dataclass(frozen=True)
 class VisibilityCriterion:
-    """Sites where a good layout does much, none does everything, and places make a difference.
+    """Accepts sites where a good layout is effective but incomplete, and placement matters.
 
-    Told from the lines of sight (`SiteMeasures`) in a few milliseconds, without a blast.
+    Decided from the lines of sight (`SiteMeasures`) in a few milliseconds, without a blast.
     `studies/check_sites.py` compares it with blasts.
 
     Attributes:
-        least_open_share: Share of the lines of sight that other structures must leave open.
-        least_layout_share: Share of these that the visibility layout must cut at least.
-        most_layout_share: Share that it may cut at most, and any straight wall.
-        least_advantage: How much more it must cut than random layouts do on average.
+        least_open_share: Least share of the lines of sight that other structures leave open.
+        least_layout_share: Least share of these that the visibility layout cuts.
+        most_layout_share: Largest share that it cuts, and that any straight wall cuts.
+        least_advantage: Least difference between its share and the mean share of random layouts.
     """
 
     least_open_share: float = 0.6
@@ -438,7 +440,7 @@ class VisibilityCriterion:
     least_advantage: float = 0.3
 
     def objection(self, scenario: AnyScenario) -> Objection | None:
-        """Return why a site is not used, or `None` if it is.
+        """Return the reason for rejecting a site, or `None` if it is accepted.
 
         Args:
             scenario: The scenario, or its bundled name or path.

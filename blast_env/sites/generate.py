@@ -1,4 +1,4 @@
-"""Drawing a site: ground, structures, charges and conditions."""
+"""Random generation of a site: ground, structures, charges and conditions."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -36,10 +36,10 @@ NEIGHBOUR_DISTANCE_M: Final = 2.0
 
 @dataclass(frozen=True)
 class SiteGround:
-    """Where things lie on a site, m.
+    """The plan of a site, m.
 
     Attributes:
-        threat: Where the centre of the charge may be; of no width if that is a line.
+        threat: Area of possible centres of the charge; of width 0 if that is a line.
         building: The protected building.
         zone: The build zone.
         neighbour: The unprotected building, if there is one.
@@ -52,7 +52,7 @@ class SiteGround:
 
 
 def draw_ground(draws: Draws, ranges: SiteRanges) -> SiteGround:
-    """Draw where things lie."""
+    """Draw the plan of a site."""
     threat = _draw_threat(draws, ranges)
     building = _draw_building(draws, ranges, threat)
     zone = _draw_zone(draws, ranges, threat, building)
@@ -107,7 +107,7 @@ def _draw_neighbour(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> Rec
 
 
 def _draw_bottom(draws: Draws, ranges: SiteRanges, shift_m: Span, length_m: float) -> float:
-    """Draw the lower end of a thing along the road from how far its middle is from the site's."""
+    """Draw the lower end of an object along the road, from the shift of its middle."""
     lowest = on_grid((ranges.side_m - length_m) / 2.0)
     bottom = lowest + draws.length_m(shift_m)
     return min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - length_m)
@@ -183,7 +183,7 @@ def _draw_path(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> list[Kee
 
 
 def _draw_access_way(draws: Draws, ranges: SiteRanges, ground: SiteGround) -> AccessWay:
-    """Draw a way along the facade, or, where the building leaves it room, one towards it."""
+    """Draw an access way along the facade or, if the building leaves room, towards it."""
     along = draws.happens(0.5) or ground.zone.overlaps(ground.building)
     between: Literal["left_right", "bottom_top"] = "bottom_top" if along else "left_right"
     return AccessWay(width_m=draws.length_m(ranges.access_way_width_m), between=between)
@@ -212,27 +212,27 @@ def _yard(ground: SiteGround) -> Rectangle:
 
 
 AnyRanges = SiteRanges | ItemSiteRanges
-"""A family of sites: what they may be."""
+"""The ranges of a family of sites."""
 
 RANGES: Final = SiteRanges()
-"""The ranges that sites are drawn from unless others are given."""
+"""The default ranges of sites."""
 
 CRITERION: Final = VisibilityCriterion()
-"""The criterion that sites of `SiteRanges` meet unless another one is given."""
+"""The default criterion of sites of `SiteRanges`."""
 
 ITEM_CRITERION: Final = VisibilityCriterion(
     least_layout_share=0.5, most_layout_share=1.0, least_advantage=0.25
 )
-"""That of sites of `ItemSiteRanges`: a wall that cuts all lines in plan lets the blast over it."""
+"""The same for `ItemSiteRanges`: a wall may cut all lines in plan, since blast passes over it."""
 
 
 def criterion_of(ranges: AnyRanges) -> SiteCriterion:
-    """Return the criterion that the sites of a family meet unless another one is given."""
+    """Return the default criterion of a family of sites."""
     return ITEM_CRITERION if isinstance(ranges, ItemSiteRanges) else CRITERION
 
 
 MOST_TRIES: Final = 200
-"""Sites that are drawn for a seed before it is given up."""
+"""Most sites that are drawn for a seed."""
 
 MOST_SEED: Final = 2**63 - 1
 
@@ -245,15 +245,15 @@ _SIDES: Final = ("left", "lower", "right", "upper")
 def generate_site(
     seed: int, ranges: AnyRanges = RANGES, criterion: SiteCriterion | None = None
 ) -> Scenario:
-    """Return the site of a seed: the first one of the seed's stream that the criterion accepts.
+    """Return the site of a seed: the first site of its random stream that the criterion accepts.
 
-    A pure function of its arguments, in any process. The name is `site_` with the seed, whatever
-    ranges and criterion are; the content hash tells sites apart.
+    It is a pure function of its arguments, in any process. The name is `site_` with the seed for
+    all ranges and criteria; the content hash distinguishes sites.
 
     Args:
         seed: 0 to 2^63 - 1.
-        ranges: What the site may be.
-        criterion: Which sites are used; the family's own unless given (`criterion_of`).
+        ranges: Ranges of the site.
+        criterion: Acceptance criterion; the family's default unless given (`criterion_of`).
 
     Raises:
         BlastEnvError: If the seed is out of bounds, or none of 200 sites is accepted.
@@ -280,16 +280,16 @@ def generate_site(
 
 
 def draw_site(rng: np.random.Generator, ranges: AnyRanges, name: str) -> Scenario:
-    """Draw a site, whether any criterion would accept it or not.
+    """Draw a site without applying a criterion.
 
     Args:
-        rng: The stream.
-        ranges: What the site may be.
-        name: Its name.
+        rng: The random stream.
+        ranges: Ranges of the site.
+        name: Name of the site.
 
     Raises:
-        ScenarioError: If the things that were drawn do not fit each other, which does not happen
-            with the default ranges.
+        ScenarioError: If the drawn objects are inconsistent, which does not happen with the
+            default ranges.
     """
     if isinstance(ranges, ItemSiteRanges):
         return draw_item_site(rng, ranges, name)
@@ -317,7 +317,7 @@ def draw_site(rng: np.random.Generator, ranges: AnyRanges, name: str) -> Scenari
 
 
 def _source(threat: Rectangle, tnt_kg: float) -> AnySource:
-    """Return a stretch of road, or a parking area."""
+    """Return the charge on a stretch of road or a parking area."""
     left, bottom, right, top = threat
     if left == right:
         return SegmentSource(
@@ -349,7 +349,7 @@ def _description(ground: SiteGround, side: str) -> str:
 
 
 def _nothing_accepted(seed: int, objections: Sequence[Objection]) -> BlastEnvError:
-    """Return the error that says what was wrong how often."""
+    """Return the error with the count and the last value of each violated rule."""
     counted = Counter(objection.rule for objection in objections)
     last = {objection.rule: objection.found for objection in objections}
     reasons = "; ".join(

@@ -30,15 +30,15 @@ from blast_env.units import MODULE_SIDE_M
 
 
 class ItemKind(NamedTuple):
-    """An item that every site of the family has a place for: the actions are always the same.
+    """An item of the catalogue that all sites of the family share, for equal action spaces.
 
     Attributes:
-        name: Its name.
+        name: Name of the item.
         length_modules: Modules along its length.
         thickness_modules: Modules across it.
         rotatable: Whether it may be turned.
         heights_m: Lowest and highest height, on the 0.5 m grid.
-        pieces: Least and largest number of pieces, where there are any.
+        pieces: Least and largest number of pieces, if the item is in stock.
     """
 
     name: str
@@ -63,60 +63,60 @@ POST: Final = "post"
 
 @dataclass(frozen=True)
 class ItemSiteRanges:
-    """What a generated site with a catalogue may be.
+    """Ranges of generated sites with a catalogue.
 
-    As `SiteRanges`: pairs are lowest and highest value, lengths are on the 0.5 m grid, and the
-    words are those for a site with the threat on its left. Sizes are such that a blast of gas
-    dynamics with cells of 0.5 m takes a fraction of a second.
+    As in `SiteRanges`, pairs are lowest and highest value, lengths are on the 0.5 m grid, and
+    descriptions assume the threat on the left. With the default sizes a gas blast with cells of
+    0.5 m takes a fraction of a second.
 
-    All sites have one size, build zones of one size, and the items of `ITEM_KINDS`, of which some
-    are not in stock; so they share action and observation space. Some have a vehicle: the planes
-    and values of vehicles are there for all.
+    Sites of the same ranges have one size, build zones of one size, and the items of `ITEM_KINDS`,
+    some of them not in stock. So they share action and observation space, which includes the
+    planes and values of vehicles for sites without one.
 
     Attributes:
         side_m: Width and height of the site, m.
         air_height_m: Height of the air, m.
         zone_side_m: Width and height of the build zone, m.
-        tnt_kg: Mass of the charge.
-        vehicle_probability: How likely a vehicle brings the charge.
-        parking_probability: Of sites without a vehicle: how likely the charge is somewhere on a
-            parking area, not on a road.
+        tnt_kg: TNT-equivalent mass of the charge.
+        vehicle_probability: Probability that a vehicle carries the charge.
+        parking_probability: Probability, without a vehicle, of a charge on a parking area instead
+            of a road.
         road_length_m: Length of the road or parking area along the border, m.
-        entry_m: Length of the border through which a vehicle enters, m.
+        entry_m: Length of the vehicle's entry along the border, m.
         vehicle_width_m: Width of the vehicle, m.
-        forecourt_m: Extent along the border of the ground on which a vehicle can drive, m; it ends
-            within the build zone, so that it can be closed.
-        kerb_m: How far from the building that ground ends, m.
+        forecourt_m: Extent of the drivable ground along the border, m; it lies within the build
+            zone's extent, so that barriers can close it.
+        kerb_m: Distance from the end of that ground to the building, m.
         zone_from_border_m: From the left border to the build zone, m.
         stand_off_m: From road, parking area or border to the nearest building, m.
         facade_m: Length of the facades of the protected buildings, m.
         depth_m: Their depth, m.
-        storeys: Their storeys, of 3 m.
-        second_probability: How likely there is a second protected building beside the first.
-        second_weight: How much its load counts; that of the first counts 1.
-        shed_probability: How likely there is an unprotected shed, where it has room.
+        storeys: Their number of storeys, 3 m each.
+        second_probability: Probability of a second protected building beside the first.
+        second_weight: Weight of its load; that of the first is 1.
+        shed_probability: Probability of an unprotected shed, if there is room.
         shed_side_m: Its sides, m.
         shift_m: From the middle of the site to that of road, entry and building, m.
-        path_probability: How likely a path to the door is kept out.
+        path_probability: Probability of a path to the door that is kept free.
         path_width_m: Its width, m.
-        trees: Number of trees that are kept out.
-        tree_side_m: Side of the square that a tree takes, m.
+        trees: Number of trees, each a keep-out.
+        tree_side_m: Side of the square of a tree, m.
         clearance_m: Least distance between a piece and a building, m.
-        access_way_probability: How likely an access way must stay open; with a vehicle it has a
-            gate.
+        access_way_probability: Probability of an access way that must stay open; with a vehicle it
+            has a gate.
         access_way_width_m: Its width, m.
-        duct_probability: How likely there is a strip where building costs more.
-        duct_factor: What costs are multiplied by there.
-        item_probability: How likely an item is in stock; one kind of wall always is, and posts
-            only where there is a vehicle.
-        price_of_height: The cost of a piece is its length times its height to this power.
-        budget: What may be spent, in the cost of a metre of a wall 1 m high.
-        cvar_probability: How likely the worst charges count, not all alike.
+        duct_probability: Probability of a strip with higher costs.
+        duct_factor: Factor of the costs there.
+        item_probability: Probability that an item is in stock; one of the two T-walls always is,
+            and posts exactly if there is a vehicle.
+        price_of_height: Exponent p in the cost of a piece, length times height to the power p.
+        budget: Budget, in the cost of 1 m of a wall 1 m high.
+        cvar_probability: Probability that the objective is the CVaR over charges, not the mean.
         preset: Preset of the particle model.
-        calibration: Calibration that the sites name, for the particle engines.
+        calibration: Name of the calibration for the particle engines.
 
     Raises:
-        BlastEnvError: If a value is out of bounds, or the site has no room for what may be drawn.
+        BlastEnvError: If a value is out of bounds, or the site is too small for these ranges.
         UnknownNameError: If there is no such preset.
     """
 
@@ -187,12 +187,12 @@ class ItemSiteRanges:
 
     @property
     def zone_cells(self) -> int:
-        """Number of rows of the build zone, and of columns."""
+        """Number of rows and of columns of the build zone."""
         return round(self.zone_side_m / MODULE_SIDE_M)
 
 
 LARGE_SIDE_M: Final = 60.0
-"""Side of the sites of `large_sites`."""
+"""Default side of the sites of `large_ranges`."""
 
 CLOSE_SIDES_M: Final = (16.0, 24.0)
 """Least and largest side of a site of `close_ranges`."""
@@ -201,9 +201,9 @@ _LARGE_SIDES_M: Final = (40.0, 100.0)
 
 
 def close_ranges(side_m: float) -> ItemSiteRanges:
-    """Return what a site may be on which the threat is as close as on the bundled small ones.
+    """Return the ranges of sites with a threat as close as on the small bundled sites.
 
-    Stand-offs, build zone, roads and buildings grow with the site.
+    Stand-offs, build zone, roads and facades grow with the site.
 
     Args:
         side_m: Width and height of the site, 16 to 24 m in whole modules.
@@ -232,10 +232,9 @@ def close_ranges(side_m: float) -> ItemSiteRanges:
 
 
 def large_ranges(side_m: float = LARGE_SIDE_M) -> ItemSiteRanges:
-    """Return what a site of real size may be.
+    """Return the ranges of sites of real size.
 
-    Stand-offs, buildings and roads grow with the site. Pieces and the build zone, which closes a
-    forecourt, do not.
+    Stand-offs, buildings and roads grow with the site. Pieces and the build zone do not.
 
     Args:
         side_m: Width and height of the site, 40 to 100 m in whole modules.
@@ -284,22 +283,22 @@ def _shares_m(side_m: float, shares: Span) -> Span:
 
 
 _ROAD_M: Final = 2.0
-"""From the left border to a road, and the depth of a parking area."""
+"""Distance from the left border to a road, and depth of a parking area."""
 
 _BETWEEN_M: Final = 2.0
-"""Between two buildings."""
+"""Distance between two buildings."""
 
 STOREY_M: Final = 3.0
 
 
 class ItemSitePlan(NamedTuple):
-    """Where things lie on a site, m.
+    """The plan of a site, m.
 
     Attributes:
-        buildings: The protected ones.
+        buildings: The protected buildings.
         zone: The build zone.
-        front_m: Where the nearest facade is.
-        middle_m: Middle of road or entry, along the border.
+        front_m: x of the nearest facade.
+        middle_m: y of the middle of road or entry.
     """
 
     buildings: tuple[Rectangle, ...]
@@ -309,15 +308,15 @@ class ItemSitePlan(NamedTuple):
 
 
 def draw_item_site(rng: np.random.Generator, ranges: ItemSiteRanges, name: str) -> Scenario:
-    """Draw a site, whether any criterion would accept it or not.
+    """Draw a site without applying a criterion.
 
     Args:
-        rng: The stream.
-        ranges: What the site may be.
-        name: Its name.
+        rng: The random stream.
+        ranges: Ranges of the site.
+        name: Name of the site.
 
     Raises:
-        ScenarioError: If the things that were drawn do not fit each other.
+        ScenarioError: If the drawn objects are inconsistent.
     """
     draws = Draws(rng)
     has_vehicle = draws.happens(ranges.vehicle_probability)
@@ -378,7 +377,7 @@ def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
 
 
 def _place(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str, Any]:
-    """Return a stretch of road, or a parking area, on which the charge is hidden."""
+    """Return the source of a charge on a stretch of road or a parking area."""
     length_m = draws.length_m(ranges.road_length_m)
     bottom = on_grid(plan.middle_m - length_m / 2.0)
     bottom = min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - length_m)
@@ -409,7 +408,7 @@ def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[s
 
 
 def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list[dict[str, Any]]:
-    """Return the protected buildings, and a shed where it has room."""
+    """Return the protected buildings, and perhaps a shed if there is room."""
     structures: list[dict[str, Any]] = []
     for number, building in enumerate(plan.buildings):
         weight = round(draws.amount(ranges.second_weight, 1), 1) if number else 1.0
@@ -469,7 +468,7 @@ def _zone(
 
 
 def _items(draws: Draws, ranges: ItemSiteRanges, has_vehicle: bool) -> list[dict[str, Any]]:
-    """Return the catalogue: always the same items, of which some are not in stock."""
+    """Return the catalogue: the same items for all sites, some of them not in stock."""
     power = draws.amount(ranges.price_of_height, 1)
     always = draws.count((1, 2))  # one of the two kinds of T-walls
     items = []
@@ -523,7 +522,7 @@ def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list
 def _access_way(
     draws: Draws, ranges: ItemSiteRanges, zone: Rectangle, has_vehicle: bool
 ) -> dict[str, Any]:
-    """Return a way along the buildings or, with a vehicle, one towards them through a gate."""
+    """Return an access way along the buildings or, with a vehicle, towards them with a gate."""
     width_m = draws.length_m(ranges.access_way_width_m)
     if not has_vehicle:
         return {"width_m": width_m, "between": "bottom_top"}

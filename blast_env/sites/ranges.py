@@ -1,7 +1,4 @@
-"""Bounds of the values of a dataclass, written as annotations beside them, and their checks.
-
-Below them how values and places on the grid of the modules are drawn within bounds.
-"""
+"""Bounds of a dataclass's values as annotations, their checks, and draws within bounds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -30,8 +27,8 @@ class Bounds:
     """A number within bounds.
 
     Attributes:
-        least: The least value that is allowed.
-        most: The largest one.
+        least: Lower bound.
+        most: Upper bound.
     """
 
     least: float
@@ -43,7 +40,7 @@ class Bounds:
         return f"{self.words} from {self.least:.10g} to {self.most:.10g}"
 
     def allow(self, value: object) -> bool:
-        """Return whether a value is what it should be."""
+        """Return whether a value has the right form and is within bounds."""
         return self._is_within(value)
 
     def _is_within(self, value: object) -> TypeGuard[float]:
@@ -58,7 +55,7 @@ class PairBounds(Bounds):
     words = "a pair (lowest, highest) of numbers"
 
     def allow(self, value: object) -> bool:
-        """Return whether a value is what it should be."""
+        """Return whether a value has the right form and is within bounds."""
         return self._is_pair(value)
 
     def _is_pair(self, value: object) -> TypeGuard[Span]:
@@ -73,7 +70,7 @@ class CountsBounds(PairBounds):
     words = "a pair (lowest, highest) of whole numbers"
 
     def allow(self, value: object) -> bool:
-        """Return whether a value is what it should be."""
+        """Return whether a value has the right form and is within bounds."""
         return self._is_pair(value) and all(isinstance(each, int) for each in value)
 
 
@@ -83,7 +80,7 @@ class LengthBounds(Bounds):
     words = f"a multiple of {MODULE_SIDE_M:g} m"
 
     def allow(self, value: object) -> bool:
-        """Return whether a value is what it should be."""
+        """Return whether a value has the right form and is within bounds."""
         return self._is_within(value) and _has_grid((value, value))
 
 
@@ -93,7 +90,7 @@ class LengthsBounds(PairBounds):
     words = f"a pair (lowest, highest) with a multiple of {MODULE_SIDE_M:g} m between,"
 
     def allow(self, value: object) -> bool:
-        """Return whether a value is what it should be."""
+        """Return whether a value has the right form and is within bounds."""
         return self._is_pair(value) and _has_grid(value)
 
 
@@ -113,7 +110,7 @@ def check_bounds(instance: Any) -> None:
 
 
 def modules_within(span_m: Span) -> tuple[int, int]:
-    """Return the least and the largest multiple of 0.5 m in a range, in modules."""
+    """Return the least and the largest whole number of modules in a range of lengths."""
     low_m, high_m = span_m
     return ceil(low_m / MODULE_SIDE_M - _TOLERANCE), floor(high_m / MODULE_SIDE_M + _TOLERANCE)
 
@@ -126,57 +123,57 @@ def _has_grid(span_m: Span) -> bool:
 Probability = Annotated[float, Bounds(0.0, 1.0)]
 
 MARGIN_M: Final = 1.0
-"""What stays free along the border of a site."""
+"""Width of the free strip along the border of a site."""
 
 
 @dataclass(frozen=True)
 class SiteRanges:
-    """What a generated site may be.
+    """Ranges of generated sites.
 
-    A pair is the lowest and the highest value, both possible, and all values between are as
-    likely; lengths are drawn on the 0.5 m grid of the modules. The words are those for a site
-    with the threat on its left; `generate_site` turns it by right angles.
+    A pair is the lowest and the highest value, both included, of a uniform distribution; lengths
+    are drawn on the 0.5 m grid of the modules. Descriptions assume the threat on the left;
+    `generate_site` turns the site by right angles.
 
-    All sites of the same ranges have one size, and so have their build zones.
+    Sites of the same ranges have one size, and build zones of one size.
 
     Attributes:
         side_m: Width and height of the site, m.
         zone_side_m: Width and height of the build zone, m.
-        tnt_kg: TNT-equivalent mass of the charge, whole kg where the range has any.
-        road_from_border_m: From the left border to where the charge may be, m.
-        road_length_m: Length of the stretch of road that the charge may be on, m.
-        parking_probability: How likely a parking area takes the place of the road.
+        tnt_kg: TNT-equivalent mass of the charge, rounded to whole kg within the range.
+        road_from_border_m: From the left border to road or parking area, m.
+        road_length_m: Length of the stretch of road with the charge, m.
+        parking_probability: Probability of a parking area instead of the road.
         parking_length_m: Length of a parking area along the road, m.
         parking_depth_m: Its depth, m.
         threat_shift_m: From the middle of the site to that of road or parking area, m.
-        stand_off_m: From road or parking area to the facade of the protected building, m; not
-            more than the site has room for.
+        stand_off_m: From road or parking area to the facade of the protected building, m; limited
+            by the room on the site.
         facade_m: Length of that facade, m.
-        depth_m: Depth of the protected building, m; not more than the site has room for.
+        depth_m: Depth of the protected building, m; limited by the room on the site.
         building_shift_m: From the middle of the site to that of the facade, m.
-        neighbour_probability: How likely there is an unprotected building, where it has room.
+        neighbour_probability: Probability of an unprotected building, if there is room.
         neighbour_side_m: Its width, and its height, m.
         zone_from_threat_m: From road or parking area to the build zone, m.
         zone_shift_m: From midway between threat and facade to the zone's middle, along the
             road, m.
-        path_probability: How likely a path from the road to the door is kept out.
+        path_probability: Probability of a path from the road to the door that is kept free.
         path_width_m: Its width, m.
-        hydrant_probability: How likely a hydrant, 1.5 m square, is kept out.
-        trees: Number of trees that are kept out.
-        tree_side_m: Side of the square that a tree takes, m.
+        hydrant_probability: Probability of a hydrant, a keep-out 1.5 m square.
+        trees: Number of trees, each a keep-out.
+        tree_side_m: Side of the square of a tree, m.
         clearance_m: Least distance between a module and a building, m.
-        access_way_probability: How likely an access way must stay open.
+        access_way_probability: Probability of an access way that must stay open.
         access_way_width_m: Its width, m.
         stock: Number of modules.
-        duct_probability: How likely there is a budget, and a duct with dearer modules above it.
+        duct_probability: Probability of a budget, and of a duct with dearer modules above it.
         duct_width_m: Width of the strip above the duct, m.
         duct_module_cost: Cost of a module in it; elsewhere it is 1.
         budget_share: Budget divided by stock.
-        preset: Preset of the blast model.
-        calibration: Calibration that the sites name.
+        preset: Preset of the particle model.
+        calibration: Name of the calibration for the particle engines.
 
     Raises:
-        BlastEnvError: If a value is out of bounds, or the site has no room for what may be drawn.
+        BlastEnvError: If a value is out of bounds, or the site is too small for these ranges.
         UnknownNameError: If there is no such preset.
     """
 
@@ -221,11 +218,11 @@ class SiteRanges:
 
     @property
     def zone_cells(self) -> int:
-        """Number of rows of the build zone, and of columns."""
+        """Number of rows and of columns of the build zone."""
         return round(self.zone_side_m / MODULE_SIDE_M)
 
     def _check_room(self) -> None:
-        """Refuse a site that is too small for what may be drawn."""
+        """Refuse a site that is too small for the ranges."""
         parking_m = self.parking_depth_m[1] if self.parking_probability > 0.0 else 0.0
         before_m = self.road_from_border_m[1] + parking_m
         behind_m = self.stand_off_m[0] + self.depth_m[0] + MARGIN_M
@@ -252,21 +249,21 @@ class SiteRanges:
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws values; each method takes one number from the stream.
+    """Draws of random values; each method takes one number from the stream.
 
     Attributes:
-        rng: The stream.
+        rng: The random stream.
     """
 
     rng: np.random.Generator
 
     def length_m(self, span_m: Span) -> float:
-        """Return a multiple of 0.5 m; the lowest one where the range has none."""
+        """Return a multiple of 0.5 m; the next one above the range if it has none."""
         first, last = modules_within(span_m)
         return int(self.rng.integers(first, max(first, last), endpoint=True)) * MODULE_SIDE_M
 
     def amount(self, span: Span, digits: int) -> float:
-        """Return a number, rounded to so many decimal places where the range allows it."""
+        """Return a number, rounded to `digits` decimal places within the range."""
         low, high = span
         drawn = round(low + (high - low) * float(self.rng.random()), digits)
         return min(max(drawn, low), high)
@@ -289,11 +286,11 @@ _TOLERANCE_M = 1e-9
 
 
 class Apart(NamedTuple):
-    """Something that a thing must not come near to.
+    """An obstacle with a least distance.
 
     Attributes:
-        rectangle: Where it is, m.
-        distance_m: How far away the thing must be; at 0 they may touch, but not overlap.
+        rectangle: Its rectangle, m.
+        distance_m: Least distance to it; at 0 rectangles may touch, but not overlap.
     """
 
     rectangle: Rectangle
@@ -303,16 +300,16 @@ class Apart(NamedTuple):
 def draw_place(
     draws: Draws, area: Rectangle, size_m: tuple[float, float], others: Sequence[Apart]
 ) -> Rectangle | None:
-    """Draw where a thing stands, all places on the 0.5 m grid as likely.
+    """Draw the place of a rectangle, uniformly over the allowed places on the 0.5 m grid.
 
     Args:
         draws: Draws.
-        area: Where it must lie, m; its corner is on the grid.
+        area: Area within which it must lie, m; its corner is on the grid.
         size_m: Width and height.
-        others: What it must keep away from.
+        others: Obstacles.
 
     Returns:
-        `None` if there is no such place.
+        The rectangle, m; `None` if there is no allowed place.
     """
     width_m, height_m = size_m
     left = np.arange(area.left, area.right - width_m + _TOLERANCE_M, MODULE_SIDE_M)
@@ -324,7 +321,7 @@ def draw_place(
         if distance_m > 0.0:
             has_room &= box_distances_m(rectangle, boxes) >= distance_m - _TOLERANCE_M
         else:
-            # Smaller by a little, so that what only touches is at a distance.
+            # Shrunk slightly, so that a touching rectangle is at a distance above 0.
             has_room &= box_distances_m(rectangle.grown(-_TOLERANCE_M), boxes) > 0.0
     places = np.argwhere(has_room)
     if not len(places):

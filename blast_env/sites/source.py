@@ -1,4 +1,4 @@
-"""Sites for an environment: one set of seeds to train on, another to be judged on."""
+"""Sites for an environment: disjoint sets of seeds for training and evaluation."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -18,29 +18,29 @@ from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
 FAMILIES: Final[Mapping[str, AnyRanges]] = MappingProxyType(
     {SITES: RANGES, ITEM_SITES: ItemSiteRanges(), LARGE_SITES: large_ranges()}
 )
-"""The families of generated sites that have names."""
+"""The named families of generated sites."""
 
 HELD_OUT_SITES: Final = 10_000
-"""Seeds 0 to 9,999 are held out; training has the seeds from 10,000 on."""
+"""Number of held-out seeds, 0 to 9,999; training uses the seeds from 10,000."""
 
 TRAINING_SITES: Final = 2**31
-"""Number of seeds for training, as good as endless."""
+"""Default number of training seeds, practically unlimited."""
 
 _MOST_LOOKED_AT: Final = 50
 
 
 @dataclass(frozen=True)
 class SiteSource:
-    """Gives every episode a generated site; a `ScenarioSource`.
+    """A `ScenarioSource` of generated sites with consecutive seeds.
 
     Attributes:
-        first_seed: The first seed of the sites.
-        count: How many sites there are; their seeds follow each other.
-        ranges: What the sites may be.
-        criterion: Which sites are used; the family's own unless given.
+        first_seed: Seed of the first site.
+        count: Number of sites, at least 1.
+        ranges: Ranges of the sites.
+        criterion: Acceptance criterion; the family's default unless given.
 
     Raises:
-        BlastEnvError: If seeds are out of bounds, or there are none.
+        BlastEnvError: If a seed or the count is out of bounds.
     """
 
     first_seed: int
@@ -60,24 +60,24 @@ class SiteSource:
 
     @classmethod
     def training(cls, count: int = TRAINING_SITES, ranges: AnyRanges = RANGES) -> "SiteSource":
-        """Return the sites to train on.
+        """Return the training sites.
 
         Args:
-            count: How many; fewer show how far what is learnt carries over.
-            ranges: What the sites may be.
+            count: Number of sites; small numbers serve to study generalisation.
+            ranges: Ranges of the sites.
 
         Raises:
-            BlastEnvError: If there are none.
+            BlastEnvError: If the count is out of bounds.
         """
         return cls(HELD_OUT_SITES, count, ranges)
 
     @classmethod
     def held_out(cls, count: int = HELD_OUT_SITES, ranges: AnyRanges = RANGES) -> "SiteSource":
-        """Return sites that training never sees, always the same ones in the same order.
+        """Return the first held-out sites, which training never uses, in a fixed order.
 
         Args:
-            count: How many; at most 10,000.
-            ranges: What the sites may be.
+            count: Number of sites, at most 10,000.
+            ranges: Ranges of the sites.
 
         Raises:
             BlastEnvError: If the count is out of bounds.
@@ -88,7 +88,7 @@ class SiteSource:
 
     @cached_property
     def representative(self) -> Scenario:
-        """The first site; in a family with vehicles the first one that has a vehicle."""
+        """The first site; in a family with vehicles the first of 50 sites that has one."""
         wanted = isinstance(self.ranges, ItemSiteRanges) and self.ranges.vehicle_probability > 0.0
         if wanted:
             sites = (self.site(index) for index in range(min(self.count, _MOST_LOOKED_AT)))
@@ -98,7 +98,7 @@ class SiteSource:
         return self.site(0)
 
     def sample(self, rng: np.random.Generator) -> Scenario:
-        """Draw a site, all as likely, with nothing but `rng`.
+        """Draw a site uniformly with `rng`.
 
         Raises:
             BlastEnvError: As `generate_site`.
@@ -106,25 +106,25 @@ class SiteSource:
         return self.site(int(rng.integers(self.count)))
 
     def site(self, index: int) -> Scenario:
-        """Return the site of an index, from 0 on.
+        """Return the site of an index from 0.
 
         Raises:
-            BlastEnvError: If there is none, or as `generate_site`.
+            BlastEnvError: If the index is out of bounds, or as `generate_site`.
         """
         if not 0 <= index < self.count:
             raise BlastEnvError(f"site {index} does not exist, must be 0 to {self.count - 1}")
         return generate_site(self.first_seed + index, self.ranges, self.criterion)
 
     def __iter__(self) -> Iterator[Scenario]:
-        """Yield all sites in their order."""
+        """Yield all sites in order."""
         return (self.site(index) for index in range(self.count))
 
 
 @cache
 def training_sites(family: str) -> SiteSource:
-    """Return the sites of a family to train on: one source, which finds its first site once.
+    """Return the cached source of a family's training sites.
 
     Args:
-        family: Name of one of `FAMILIES`.
+        family: A name in `FAMILIES`.
     """
     return SiteSource.training(ranges=FAMILIES[family])

@@ -1,4 +1,4 @@
-"""The same site turned by right angles."""
+"""Rotation of sites by right angles."""
 
 from collections.abc import Mapping
 from typing import Any, Final, TypeVar
@@ -33,14 +33,13 @@ _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
 
 
 def turned(scenario: AnyScenario, quarter_turns: int) -> Scenario:
-    """Return a scenario turned to the left: what was on its right is now at its top.
+    """Return a scenario turned counterclockwise: its right side becomes its top.
 
-    It is the same problem, seen from another side; the cells of the build zone turn too. The
-    place on a map is left out.
+    It is an equivalent problem; the cells of the build zone turn too. The georeference is removed.
 
     Args:
         scenario: The scenario, or its bundled name or path.
-        quarter_turns: By how many right angles.
+        quarter_turns: Number of right angles.
     """
     scenario = find_scenario(scenario)
     for _ in range(quarter_turns % 4):
@@ -49,7 +48,7 @@ def turned(scenario: AnyScenario, quarter_turns: int) -> Scenario:
 
 
 def _turned_once(scenario: Scenario) -> Scenario:
-    """Return a scenario turned by one right angle; its sections are not checked again."""
+    """Return a scenario turned by one right angle, without checking its sections again."""
     site, zone = scenario.site, scenario.build_zone
     changes: dict[str, Any] = {
         "site": site.model_copy(update={"width_m": site.height_m, "height_m": site.width_m}),
@@ -57,7 +56,7 @@ def _turned_once(scenario: Scenario) -> Scenario:
         "structures": tuple(_structure(each, site.height_m) for each in scenario.structures),
         "gauges": tuple(_gauge(each, site.height_m) for each in scenario.gauges),
         "build_zone": None if zone is None else _zone(zone, site.height_m),
-        "georeference": None,  # another place than that of the map
+        "georeference": None,  # the turned site has no place on the map
     }
     return scenario.model_copy(update=changes)
 
@@ -107,7 +106,7 @@ def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
 
 
 def _with_walls(part: _Covering) -> _Covering:
-    """Return a part of a facade, or a measure, on the turned walls."""
+    """Return a part of a facade or a hardening measure on the turned walls."""
     return part.model_copy(update={"walls": tuple(_TURNED_WALL[wall] for wall in part.walls)})
 
 
