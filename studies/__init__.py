@@ -1,4 +1,4 @@
-"""What the documentation claims and the commands behind it, one file or package a question.
+"""Commands behind the claims of the documentation, one file or package per question.
 
-Of the repository: nothing here is in the wheel, and nothing of the package imports it.
+Part of the repository only: the wheel contains none of it, and the package imports none of it.
 """

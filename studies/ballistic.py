@@ -1,6 +1,6 @@
-"""The preset `ballistic`: how its parameters were chosen, and other widths of the facade.
+"""The preset `ballistic`: the search for its parameters, and the effect of the facade's width.
 
-The search has the seeds 0 and up; `blast-env calibrate` checks its choice on seeds from 1000 up.
+The search uses seeds from 0; `blast-env calibrate` checks its choice on seeds from 1000.
 """
 
 import json
@@ -30,7 +30,7 @@ app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=F
 MOST_MAPE_PERCENT, MOST_INTEGRAL_PERCENT, MOST_RMS_PERCENT = 8.0, 1.5, 20.0
 FACADES_MODULES: Final = (10, 20)
 WIDTHS_MODULES: Final = (20, 40, 80)
-"""The calibrations' reference facade, twice and four times it."""
+"""Width of the calibrations' reference facade, twice and four times that."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,11 @@ class ParameterPoint:
 
     @classmethod
     def from_unit_cube(cls, point: np.ndarray) -> "ParameterPoint":
-        """Return the candidate of a point in the unit cube: 6-14, 0.05-1 (log), 0.7-1."""
+        """Return the candidate of a point in the unit cube.
+
+        Spacing 6 to 14 units, air mass 0.05 to 1 (logarithmic), elasticity 0.7 to 1, and the
+        widths of `FACADES_MODULES`.
+        """
         facade = FACADES_MODULES[min(int(point[3] * len(FACADES_MODULES)), 1)]
         return cls(
             spacing_units=round(6.0 + 8.0 * float(point[0]), 1),
@@ -70,8 +74,8 @@ class ParameterPoint:
                     "elasticity": self.elasticity,
                 },
                 "explosive": {"elasticity": self.elasticity},
-                # What the preset had when the choice was made. At 120 m it cuts off the last
-                # arrivals, so the preset now has 2 s; the stored calibrations were made with those.
+                # The preset's limit at the time of the search. It cuts off the last arrivals at
+                # 120 m; the preset now has 2 s, as do the stored calibrations.
                 "stepping": {"time_limit_s": 1.0},
             }
         )
@@ -79,7 +83,7 @@ class ParameterPoint:
 
 @dataclass(frozen=True)
 class Score:
-    """How well a candidate does; all in percent, and its largest share of a bound."""
+    """Errors of a candidate in percent, and the exponent of its fitted law."""
 
     mape_percent: float
     integral_error_percent: float
@@ -88,7 +92,7 @@ class Score:
 
     @property
     def worst(self) -> float:
-        """The largest of the three errors, each over its bound; below 1 all are met."""
+        """The largest ratio of an error to its bound; below 1, all are within their bounds."""
         return max(
             self.mape_percent / MOST_MAPE_PERCENT,
             self.integral_error_percent / MOST_INTEGRAL_PERCENT,
@@ -132,9 +136,9 @@ def search(
 ) -> None:
     """Search `ballistic`, print every candidate, and write the finalists to a file.
 
-    Searches air spacing, air mass, elasticity and facade width for the two things that the paper's
-    verification asks of a simulator: with a power law of its own it agrees with the paper's UFC
-    column, and its impulses fall with distance as the paper's own do.
+    Varies air spacing, air mass, elasticity and facade width to satisfy the two conditions of the
+    paper's verification: with a fitted power law the simulator agrees with the paper's UFC column,
+    and its impulses decrease with distance as the paper's simulated ones do.
     """
     start, rng = perf_counter(), np.random.default_rng(0)
     tried: list[tuple[np.ndarray, ParameterPoint, Score]] = []
@@ -169,7 +173,7 @@ def facade_width(
     processes: int = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Print the scaled impulse on the reference facade, on twice and on four times it."""
+    """Print the scaled impulse on facades of one, two and four times the reference width."""
     with user_errors(), running_on(cluster):
         for side_modules in WIDTHS_MODULES:
             scenario = free_field(side_modules=side_modules).at_stand_off(distance_m)

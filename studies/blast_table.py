@@ -1,8 +1,8 @@
-"""All blasts of a folder of the cache as one table: what was asked, and what came of it.
+"""Write the blasts of cache folders as one table of inputs and loads.
 
 Studies, searches, leagues and trainings keep their blasts (`--cache`, `--blasts`, a run folder's
-`blasts`). As a table they are data to fit a surrogate to, and they outlive the version of the code
-that a cache is bound to.
+`blasts`). A table of them is training data for a surrogate, and remains valid when a new version
+of the code invalidates the cache.
 """
 
 import json
@@ -53,33 +53,32 @@ COLUMNS: Final = (
     Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
     Column("peak_pa", "Pa", "largest overpressure on them; missing for particles"),
 )
-"""A row a structure of a blast."""
+"""One row per structure and blast."""
 
 SITE_NAME: Final = "item_sites/"
-"""What the names of generated sites in the table begin with; their seed follows."""
+"""Prefix of the names of generated sites in the table; the seed follows."""
 
 FRONT_SITES: Final = "front_sites"
-"""Close sites of which only the walls that the blast comes from count, as on bundled ones."""
+"""Close sites on which only the walls that face the charge count, as on bundled sites."""
 
 _SIZED: Final = {
     "close_sites": close_ranges,
     FRONT_SITES: close_ranges,
     LARGE_SITES: large_ranges,
 }
-"""Families with sites of any side within bounds: the side follows, and then the seed."""
+"""Families of sites with a chosen side: in a name, the side follows, and then the seed."""
 
 _LEAST_SEEN_M: Final = 1.0
-"""A wall sees a charge that is farther out than this."""
+"""Distance of the charge in front of a wall beyond which the wall faces it."""
 
 
 def site_name(seed: int, side_m: float | None = None, *, front: bool = False) -> str:
-    """Return what a generated site is called in the table.
+    """Return the name of a generated site in the table.
 
     Args:
-        seed: Its seed.
-        side_m: Its side, if it is of `close_ranges` or `large_ranges`; otherwise it is of
-            `item_sites`.
-        front: Whether it is one of `front_only`, with a side.
+        seed: Seed of the site.
+        side_m: Side of a site of `close_ranges` or `large_ranges`; `None` for `item_sites`.
+        front: Whether the site is reduced by `front_only`; needs a side.
     """
     if side_m is None:
         return f"{SITE_NAME}{seed}"
@@ -102,11 +101,11 @@ def scenario_of(name: str) -> Scenario:
 
 
 def front_only(site: Scenario, one_wall: bool) -> Scenario:
-    """Return a site of whose structures only walls count that see its first threat.
+    """Return a site on which only the walls that face its first threat count.
 
     Args:
-        site: The site; the first threat is that of seed 0.
-        one_wall: Whether it is the one that looks towards it most, of each structure.
+        site: The site; the first threat has seed 0.
+        one_wall: Keep only the wall that faces it most, of each structure.
     """
     (threat,) = draw_threats(site, [0])
     place_m = np.array(threat.charge_against(site, ()).position_m)
@@ -168,7 +167,7 @@ def main(
 
 
 def _sites_of(folder: Path) -> dict[str, str]:
-    """Return the names of the generated sites that a run by self-labelling learnt from, by hash."""
+    """Return the names of a self-labelling run's generated training sites, by scenario hash."""
     configuration = RunFolder(folder).configuration()
     settings = configuration.settings
     if settings.scenario != ITEM_SITES or settings.algorithm != "self_labelling":

@@ -1,8 +1,8 @@
-"""What generated sites are like, and whether the criterion that they are chosen by means anything.
+"""Properties of generated sites, and a check by blasts of the criterion that selects them.
 
-The criterion is told from lines of sight; here every site is measured with blasts: of particles, or
-of gas dynamics for the sites with heights and catalogues. All sites that a seed draws are, if asked
-for the rejected ones too: a criterion that rejects the wrong ones would show.
+The criterion uses lines of sight. Here every site is measured with blasts: of particles, or of gas
+dynamics for sites with heights and catalogues. With rejected sites included, all sites that a seed
+draws are measured, so that wrong rejections show.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -58,12 +58,13 @@ MOST_REDUCTION: Final = 0.85
 
 
 LEAST_ADVANTAGE: Final = 0.1
-"""A site is worth solving if blasts say so: the visibility layout, or a rule, takes so much off the
-impulse, no layout takes more than that, and random layouts take so much less on average."""
+"""By blasts, a site is worth solving if the visibility layout or a rule lowers the load by the
+share `LEAST_REDUCTION`, no layout exceeds `MOST_REDUCTION`, and random layouts fall short of the
+former by `LEAST_ADVANTAGE` on average."""
 
 
 LEAST_OVER_RULES: Final = 0.03
-"""What was searched takes off so much more than every rule, where it matters to search."""
+"""Lead in reduction of a searched layout over every rule that makes a search worthwhile."""
 
 
 _SEARCH: Final = "annealing_from_rules"
@@ -73,19 +74,19 @@ QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 @dataclass(frozen=True)
 class MeasuredSite:
-    """What blasts say about a site.
+    """Results of blasts on a site.
 
     Attributes:
-        accepted: Whether the criterion accepts it.
-        shares: What its lines of sight say.
+        accepted: Whether the criterion accepts the site.
+        shares: Measures by lines of sight.
         unprotected_pa_s: Impulse on the building without a barrier, Pa*s.
         cut: Share of the lines of sight that each layout cuts: the visibility layout, then the
             random ones (1 + random,).
-        reduction: Share of the load that each of them takes off (1 + random,).
-        rules: Share that the layout of each rule takes off, by name.
+        reduction: Reduction of the load by each of them, a share (1 + random,).
+        rules: Reduction by the layout of each rule, a share, by name.
         has_vehicle: Whether a vehicle brings the charge.
         name: Name of the site.
-        found: Share that the best layout of a search takes off; `None` without a search.
+        found: Reduction by the best layout of a search, a share; `None` without a search.
     """
 
     accepted: bool
@@ -100,17 +101,17 @@ class MeasuredSite:
 
     @property
     def made(self) -> float:
-        """Reduction of the best layout that is made by a plan: for visibility, or by a rule."""
+        """Largest reduction by a planned layout: the visibility layout, or a rule's."""
         return max(float(self.reduction[0]), *self.rules.values(), -inf)
 
     @property
     def advantage(self) -> float:
-        """How far that is above the reduction of random layouts, on average."""
+        """Lead of `made` over the mean reduction by random layouts."""
         return float(self.made - self.reduction[1:].mean())
 
     @property
     def fault(self) -> str:
-        """What is wrong with the site by the blasts; empty if it is worth solving."""
+        """Reason why the site is not worth solving, by blasts; empty if it is."""
         if self.made < LEAST_REDUCTION:
             return "too little to gain"
         if max(self.reduction.max(), self.made) > MOST_REDUCTION:
@@ -126,15 +127,15 @@ def measured(
     criterion: SiteCriterion | None = None,
     search: int = 0,
 ) -> MeasuredSite:
-    """Measure a site with blasts of charges drawn from where they may be.
+    """Measure a site with blasts of charges drawn from its threat.
 
     Args:
         site: The site.
-        random_layouts: How many random layouts.
-        threats: Charges, or seeds of particles, of each layout.
+        random_layouts: Number of random layouts.
+        threats: Number of charges, or seeds of particles, per layout.
         engine: Runs the blasts.
-        criterion: Accepts the site or not.
-        search: Blasts of a search for the best layout; 0 searches none.
+        criterion: Accepts or rejects the site; `VisibilityCriterion` by default.
+        search: Blasts of a search for the best layout; 0 for no search.
     """
     rng = np.random.default_rng(0)
     lines = Visibility.of(site)
@@ -165,9 +166,9 @@ def measured(
 
 
 def rule_layouts(site: Scenario) -> dict[str, Layout]:
-    """Return the layouts of the rules by hand where there is a catalogue; none without one.
+    """Return the layouts of the rules on a site with a catalogue, by name; else none.
 
-    A rule that finds no place for anything has none.
+    Rules that place nothing are left out.
     """
     if not site.zone.items:
         return {}
@@ -175,12 +176,12 @@ def rule_layouts(site: Scenario) -> dict[str, Layout]:
 
 
 def drawn_sites(seed: int, ranges: AnyRanges) -> Iterator[Scenario]:
-    """Yield the sites that `generate_site` draws for a seed; the last one is what it returns."""
+    """Yield the sites that `generate_site` draws for a seed; it returns the last one."""
     rng = np.random.default_rng(seed)
     while True:
         try:
             site = draw_site(rng, ranges, f"site_{seed}")
-        except ScenarioError:  # what was drawn does not fit together
+        except ScenarioError:  # the parts drawn do not fit together
             continue
         yield site
         if criterion_of(ranges).objection(site) is None:
@@ -238,14 +239,14 @@ def main(
 
 
 def cpu_time_s(seed: int, ranges: AnyRanges) -> float:
-    """Return the processor time that the site of a seed takes."""
+    """Return the processor time of generating the site of a seed."""
     start_s = process_time()
     generate_site(seed, ranges)
     return process_time() - start_s
 
 
 def print_properties(sites: Sequence[Scenario]) -> None:
-    """Print how the properties of sites are distributed."""
+    """Print the quantiles of the properties of sites."""
     print_row("property", "least", "10 %", "median", "90 %", "largest")
     print_line("|---" * 6 + "|")
     for name, value_of in PROPERTIES.items():
@@ -259,7 +260,7 @@ def print_properties(sites: Sequence[Scenario]) -> None:
 
 
 def print_time(seconds: Sequence[float], drawn: int) -> None:
-    """Print how long it takes to generate a site."""
+    """Print the time to generate a site."""
     ms = 1e3 * np.array(seconds)
     print_line(
         f"processor time a site: mean {ms.mean():.1f} ms, median {np.median(ms):.1f} ms,"
@@ -268,7 +269,7 @@ def print_time(seconds: Sequence[float], drawn: int) -> None:
 
 
 def print_measured(results: Sequence[MeasuredSite]) -> None:
-    """Print what blasts say about the sites that the criterion accepts."""
+    """Print the results of blasts on the sites that the criterion accepts."""
     reduction = np.array([each.reduction for each in results])
     columns = {
         "unprotected impulse (Pa s)": np.array([each.unprotected_pa_s for each in results]),
@@ -288,7 +289,7 @@ def print_measured(results: Sequence[MeasuredSite]) -> None:
 
 
 def print_rules(results: Sequence[MeasuredSite]) -> None:
-    """Print what each rule does, over sites with and without vehicles."""
+    """Print the reduction by each rule, and means over sites with and without vehicles."""
     if not results:
         return
     print_row("rule", "sites", "mean reduction (%)", "sites where it is the best rule")
@@ -316,7 +317,7 @@ def print_rules(results: Sequence[MeasuredSite]) -> None:
 
 
 def print_searched(results: Sequence[MeasuredSite]) -> None:
-    """Print how far the best found is above the best rule, a site a row."""
+    """Print the lead of the best layout found over the best rule, one row per site."""
     print_row(
         "site", "best rule", "takes off (%)", "best found (%)", "points more", "worth searching"
     )
@@ -332,7 +333,7 @@ def print_searched(results: Sequence[MeasuredSite]) -> None:
 
 
 def print_agreement(results: Sequence[MeasuredSite]) -> None:
-    """Print how far lines of sight and blasts agree."""
+    """Print the agreement between lines of sight and blasts."""
     cut = np.array([each.cut for each in results])
     reduction = np.array([each.reduction for each in results])
     within = [np.corrcoef(*pair)[0, 1] for pair in zip(cut[:, 1:], reduction[:, 1:], strict=True)]
@@ -364,13 +365,13 @@ def stand_off_m(site: Scenario) -> float:
 
 
 def is_threatened_along_x(site: Scenario) -> bool:
-    """Return whether road or parking area is on the left or right of the building."""
+    """Return whether the road or parking area lies to the left or right of the building."""
     threat, building = source_bounds_m(site.charge[0]), site.structures[0].rectangle_m
     return threat.right < building.left or threat.left > building.right
 
 
 def facade_and_depth_m(site: Scenario) -> tuple[float, float]:
-    """Return the sides of the protected building: the one that faces the threat, the other."""
+    """Return the sides of the protected building: first the one that faces the threat."""
     left, bottom, right, top = site.structures[0].rectangle_m
     sides = (top - bottom, right - left)
     return sides if is_threatened_along_x(site) else (sides[1], sides[0])
@@ -418,13 +419,13 @@ _SCALE_M: Final = 10.0
 
 
 def contact_sheet(sites: Sequence[Scenario]) -> Figure:
-    """Return a picture of sites and what they differ in, four in a row.
+    """Return a picture of sites with the properties in which they differ, four per row.
 
     Args:
-        sites: At least one.
+        sites: The sites, at least one.
 
     Raises:
-        BlastEnvError: If there is none.
+        BlastEnvError: If there is no site.
     """
     if not sites:
         raise BlastEnvError("sites: there are none, must be at least one")
@@ -468,7 +469,7 @@ def _write(axes: Axes, feature: Feature, words: str) -> None:
 
 
 def _panel_title(site: Scenario) -> str:
-    """Return what cannot be drawn, in two lines."""
+    """Return the properties that cannot be drawn, in two lines."""
     charge = " or ".join(f"{source.tnt_kg:g}" for source in site.charge) + " kg TNT"
     zone = site.build_zone
     if zone is None:

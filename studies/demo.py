@@ -1,8 +1,9 @@
-"""`make demo`: train an agent for a few minutes by gas dynamics, and see what it has learnt.
+"""`make demo`: train an agent for a few minutes by gas dynamics, and compare its layouts.
 
 Trains an agent by self-labelling: it begins with the best layout by rule for each of some charges,
-then learns from its own best. Holds its layouts against no barrier, random layouts and all rules,
-on charges that the training has not met, and films one blast with and without its layout.
+then learns from the best layouts it finds. Compares its layouts with no barrier, random layouts and
+all rules, on charges that the training has not seen, and films one blast with and without its
+layout.
 """
 
 import shutil
@@ -84,12 +85,12 @@ class AgentComparison:
 
     @property
     def best_rule(self) -> Result:
-        """The rule that takes off most on the mean."""
+        """The rule with the largest mean reduction."""
         return max(self.standings.rules, key=lambda rule: self.standings.reduction(rule).value)
 
     @property
     def best_rule_each(self) -> Result:
-        """The best rule for each case, which only blasts with all of them can tell."""
+        """The best rule for each case, which only blasts with all rules can determine."""
         rules = self.standings.rules
         means = np.array([rule.loads.mean(axis=1) for rule in rules])
         chosen = [rules[number] for number in means.argmin(axis=0).tolist()]
@@ -108,7 +109,7 @@ class AgentComparison:
 
     @property
     def verdict(self) -> str:
-        """Whether the agent has learnt anything, and what it is beside the best rule."""
+        """Whether the agent has learnt anything, and its lead over the best rule, in words."""
         gain = self.standings.difference(self.agent, self.random)
         if isnan(gain.low):
             return "No verdict: one threat says nothing about the others."
@@ -129,7 +130,7 @@ class AgentComparison:
         )
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return the printed table, a row an entry; see `HEADERS`."""
+        """Return the printed table, one row per entry; see `HEADERS`."""
         others = [each for each in self.standings.results if each is not self.agent]
         return [self._row(result) for result in (*others, self.best_rule_each, self.agent)]
 
@@ -158,25 +159,25 @@ _CHANGES: Final[Mapping[str, Any]] = MappingProxyType(
         "updates": 100,
     }
 )
-"""For a site along which the charge moves on one line, and a few minutes."""
+"""Hyperparameters for charges on one line and a few minutes of training."""
 
 
 @dataclass(frozen=True)
 class DemoSettings:
-    """What the demonstration does.
+    """Settings of the demonstration.
 
     Attributes:
-        out: Folder for everything.
+        out: Folder for all output.
         scenario: Scenario file, or a bundled name.
-        steps: Steps of training: layouts that meet a charge.
-        seed: Of the training.
-        changes: Hyperparameters in the place of those of the package.
-        evaluation_interval: Rounds from one point of the learning curve to the next.
-        evaluation_cases: Held-out threats of such a point.
+        steps: Steps of training: layouts simulated against a charge.
+        seed: Seed of the training.
+        changes: Hyperparameters that replace those of the package.
+        evaluation_interval: Rounds between points of the learning curve.
+        evaluation_cases: Held-out threats of each point.
         threats: Unseen threats of the comparison.
         processes: Worker processes of training and comparison.
         film_width_px: Width of the film.
-        frames_per_s: Frames in a second of the film.
+        frames_per_s: Frames per second of the film.
     """
 
     out: Path = Path("out/demo")
@@ -207,10 +208,10 @@ def demonstrate(settings: DemoSettings) -> AgentComparison:
     """Train, compare, film; print a table and the paths.
 
     Returns:
-        The comparison that the verdict rests on.
+        The comparison behind the verdict.
 
     Raises:
-        BlastEnvError: If a setting is of no use, or a file cannot be written.
+        BlastEnvError: If a setting is invalid, or a file cannot be written.
     """
     began = perf_counter()
     trained = train_agent(settings)
@@ -254,7 +255,7 @@ def train_agent(settings: DemoSettings) -> TrainingResult:
 
 @contextmanager
 def _learning_curve(folder: RunFolder) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar, and print each evaluation as soon as it is there."""
+    """Show a progress bar, and print each evaluation as soon as it is available."""
     printed = 0
 
     def print_new() -> None:
@@ -285,7 +286,7 @@ def _evaluations(folder: RunFolder) -> list[EvaluationRow]:
 
 
 def clear(run: Path) -> None:
-    """Remove the run of an earlier demonstration; anything else is left alone."""
+    """Remove the run of an earlier demonstration; leave any other folder alone."""
     if (run / "config.json").exists():
         try:
             shutil.rmtree(run)
@@ -294,7 +295,7 @@ def clear(run: Path) -> None:
 
 
 def compare_methods(settings: DemoSettings, trained: TrainingResult) -> AgentComparison:
-    """Hold the best weights of the training against the other methods, on unseen threats."""
+    """Compare the best weights of the training with the other methods on unseen threats."""
     scenario = trained.folder.scenario(trained.configuration)
     agent = replace(TrainedRun.load(settings.run).entry, title=AGENT)
     contest = Contest(
@@ -308,7 +309,7 @@ def compare_methods(settings: DemoSettings, trained: TrainingResult) -> AgentCom
 
 
 def print_comparison(comparison: AgentComparison) -> None:
-    """Print a row a method: mean impulse, reduction, time to propose a layout."""
+    """Print one row per method: mean impulse, reduction, time to propose a layout."""
     cases = comparison.standings.track.cases
     table = ResultTable(
         f"{cases[0].scenario.name}: {len(cases)} threats that the training has not met, the same "
@@ -326,7 +327,7 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
 
     Args:
         settings: The settings.
-        comparison: Its first threat is filmed.
+        comparison: The comparison; its first threat is filmed.
 
     Returns:
         The files.

@@ -1,7 +1,7 @@
-"""How far the loads of pymunk are from those of the event engine, at ever shorter steps.
+"""Differences of pymunk's loads from the event engine's, at decreasing steps.
 
-The engines share charge and air of a seed. Each difference is the mean of the paired differences
-over the event engine's mean, with its 95 % interval.
+For a seed, both engines have the same charge and air. Each difference is the mean of the paired
+differences over the event engine's mean, with its 95 % interval.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +23,7 @@ from blast_env.statistics import Estimate, mean_estimate
 from blast_env.tables import markdown_table
 
 STEPS_RADII: Final = (0.5, 0.25, 0.1, 0.05)
-"""How far the fastest ball goes in a step, in radii of the smallest; 0.5 is the default."""
+"""Distance of the fastest ball in one step, in radii of the smallest; the default is 0.5."""
 
 DENSE_AIR: Final = {
     "air": {"spacing_units": 3.0, "mass": 0.1, "elasticity": 1.0},
@@ -32,7 +32,7 @@ DENSE_AIR: Final = {
 """Light, elastic air, three radii apart."""
 
 CLOSE: Final = 0.05
-"""The engines count as agreeing when the whole interval lies within this share."""
+"""The engines agree if the whole interval lies within this share."""
 
 HEADERS: Final = ("load on the building of", "step (radii)", "m|v|", "transferred impulse", "")
 
@@ -54,9 +54,9 @@ class Agreement:
 
     Attributes:
         scene: Name of the scene.
-        step_radii: The step.
+        step_radii: The step, in radii of the smallest ball.
         impulse: Difference of the mean m |v|, as a share of the event engine's.
-        transferred: Likewise of the momentum really transferred.
+        transferred: The same for the momentum actually transferred.
     """
 
     scene: str
@@ -90,9 +90,9 @@ def agreements(
 
     Args:
         scenes: The scenes by name.
-        seeds: Blasts of each; the seeds are 0 and up.
+        seeds: Blasts of each; the seeds count from 0.
         processes: Worker processes.
-        steps_radii: Steps of pymunk.
+        steps_radii: Steps of pymunk, in radii of the smallest ball.
     """
     for name, scenario in scenes.items():
         event = _loads(scenario, "event", seeds, processes, f"{name}: event")
@@ -122,7 +122,7 @@ def main(
     processes: Annotated[int, typer.Option(min=1)] = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Hold the loads of pymunk, at ever shorter steps, against those of the event engine."""
+    """Compare the loads of pymunk, at decreasing steps, with those of the event engine."""
     with user_errors(), running_on(cluster):
         scenes = engine_scenes()
         if scene is not None:

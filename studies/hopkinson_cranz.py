@@ -1,8 +1,8 @@
-"""Whether charges of 20, 100 and 1000 kg TNT obey Hopkinson-Cranz scaling in the particle model.
+"""Hopkinson-Cranz scaling of charges of 20, 100 and 1000 kg TNT in the particle model.
 
-The same scaled distances for every mass. The law of a calibration made with one mass, used with the
-scaling, is held against Kingery and Bulmash, beside a law fitted to each mass alone. The range of
-masses for which `collisional_kb` holds rests on it.
+All masses have the same scaled distances. The law of a calibration made with one mass, used with
+the scaling, and a law fitted to each mass are compared with Kingery and Bulmash. This is the basis
+for the range of masses of `collisional_kb`.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ def scaled_impulses(
     store: Path,
     progress: Callable[[float], None] | None = None,
 ) -> pd.DataFrame:
-    """Run the blasts; return one row a mass and distance.
+    """Run the blasts; return one row per mass and distance.
 
     Args:
         calibration: Name of the calibration.
@@ -50,11 +50,11 @@ def scaled_impulses(
         seeds: Seeds at every distance.
         processes: Worker processes.
         store: Folder of the finished blasts.
-        progress: Called with the share that is done.
+        progress: Called with the finished share.
 
     Returns:
         `tnt_kg`, `distance_m`, `i_sim`, `reference_psi_s` (Kingery and Bulmash, reflected) and
-        `scaled_psi_s`, what the calibration makes of the impulse over the cube root of the mass.
+        `scaled_psi_s`, the calibrated impulse with Hopkinson-Cranz scaling of the mass.
     """
     stored = load_calibration(calibration, engine)
     tables = []
@@ -75,7 +75,7 @@ def scaled_impulses(
 
 
 def law_rows(table: pd.DataFrame) -> list[tuple[str, ...]]:
-    """Return a row a mass: errors of the scaled law, and of a law of its own; see `HEADERS`."""
+    """Return one row per mass: errors of the scaled law and of a fitted law; see `HEADERS`."""
     rows: list[tuple[str, ...]] = []
     for tnt_kg, own in table.groupby("tnt_kg"):
         i_sim, reference = own.i_sim.to_numpy(), own.reference_psi_s.to_numpy()
@@ -106,7 +106,7 @@ def main(
     cluster: ClusterAddress = None,
     out: Path = Path("out/hopkinson_cranz"),
 ) -> None:
-    """Print and write whether charges obey Hopkinson-Cranz scaling."""
+    """Print and write the errors of Hopkinson-Cranz scaling for each mass."""
     with user_errors(), running_on(cluster):
         make_folder(out)
         numbers = range(first_seed, first_seed + seeds)

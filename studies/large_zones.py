@@ -1,4 +1,4 @@
-"""What placing costs on large build zones: masks, rules, lines of sight, proposals; no blasts.
+"""Cost of placing on large build zones, without blasts: masks, rules, lines of sight, proposals.
 
 python -m studies.large_zones
 """
@@ -24,7 +24,7 @@ STREET: Final = "street_100_m"
 """The street of `blast-env bench --site large` with a catalogue, on a zone of 112 x 43 cells."""
 
 _SMALL: Final = "visitor_entrance"
-"""Where everything is called once before: what is imported and compiled does not count."""
+"""Site of the first call of each function, to exclude the time of imports and compilation."""
 
 _CATALOGUE: Final = (
     ("bollard", 30),
@@ -39,11 +39,11 @@ class ZoneCost:
     """Processor seconds and memory of placing on a site.
 
     Attributes:
-        actions: Places times ways to set an item down, and to finish.
-        mask_s: The mask of the empty site.
-        rules_s: The layouts of all rules.
-        sight_s: The layout that cuts most lines of sight.
-        proposal_s: What `blast-env propose` does.
+        actions: Number of actions: places times ways to place an item, plus the end.
+        mask_s: Time of the mask of the empty site.
+        rules_s: Time of the layouts of all rules.
+        sight_s: Time of the layout that cuts most lines of sight.
+        proposal_s: Time of a proposal, as by `blast-env propose`.
         memory_mb: Peak memory of the process.
     """
 
@@ -56,7 +56,7 @@ class ZoneCost:
 
 
 def site_of(name: str) -> Scenario:
-    """Return the site of a name: the street, a bundled one, or one of a file."""
+    """Return a site by name: the street, a bundled site, or a scenario file."""
     if name != STREET:
         return load_scenario(name)
     document = street(100.0).model_dump(mode="json", exclude_none=True)
@@ -68,7 +68,7 @@ def site_of(name: str) -> Scenario:
 
 
 def zone_cost(name: str) -> ZoneCost:
-    """Measure placing on a site, in this process."""
+    """Measure the cost of placing on a site, in this process."""
     calls: tuple[Callable[[Scenario], object], ...] = (
         lambda site: Placement.empty(site).legal.ravel(),
         layouts_by_rule,
@@ -92,7 +92,7 @@ def main(
         list[str] | None, typer.Argument(help="The street and bundled sites unless given.")
     ] = None,
 ) -> None:
-    """Print what placing costs on large sites, each in a process of its own."""
+    """Print the cost of placing on large sites, each in a separate process."""
     headers = ("site", "actions", "mask (s)", "rules (s)", "sight lines (s)", "propose (s)", "MB")
     every = sites or [STREET, *sorted(REAL_SIZE)]
     rows = []

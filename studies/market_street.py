@@ -1,7 +1,7 @@
-"""Write the invented town block that the docs and tests import, in three formats.
+"""Write the fictitious town block that the docs and tests import, in three formats.
 
-`python -m studies.market_street FOLDER` writes `market_street.geojson`, `.osm` and `.dxf`. Nothing
-in it exists: it lies in the North Sea.
+`python -m studies.market_street FOLDER` writes `market_street.geojson`, `.osm` and `.dxf`. The
+coordinates lie in the North Sea.
 """
 
 import json
@@ -161,7 +161,7 @@ def write_dxf(path: Path) -> None:
             x, y = np.mean(points(house.outline), axis=0).tolist()
             text.set_placement((x, y), align=TextEntityAlignment.MIDDLE_CENTER)
     space.add_lwpolyline(points(STREET), dxfattribs={"layer": "STREETS"})
-    corners = points(ZONE)  # drawn side by side, as people do
+    corners = points(ZONE)  # drawn as single lines, as is common in drawings
     for start, end in zip(corners, [*corners[1:], corners[0]], strict=True):
         space.add_line(start, end, dxfattribs={"layer": "ZONE"})
     space.add_lwpolyline(points(MONUMENT), close=True, dxfattribs={"layer": "KEEP_CLEAR"})
@@ -170,7 +170,7 @@ def write_dxf(path: Path) -> None:
 
 
 def write_all(folder: Path) -> list[Path]:
-    """Write the block in all formats, and return the files."""
+    """Write the block in all formats; return the files."""
     files = [folder / f"{NAME}{suffix}" for suffix in (".geojson", ".osm", ".dxf")]
     collection = geojson()
     lines = ",\n".join(json.dumps(each) for each in collection.pop("features"))

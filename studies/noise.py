@@ -1,6 +1,6 @@
-"""How much of what an episode of `BlastBarrier-v0` pays is the layout, and how much luck.
+"""Signal and noise of the reward of `BlastBarrier-v0`.
 
-The defaults of `realisations`, `threats` and the deposit of its reward rest on it.
+The basis for the defaults of `realisations` and `threats` and for the deposit of the reward.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -36,8 +36,8 @@ class Noise:
         noise: Standard deviation of one layout's impulse between draws.
         reduction_noise: Standard deviation of one layout's reduction between draws, each against
             no barrier on the same draw.
-        paired_noise: That of the impulse after what a draw does to all layouts alike is taken off:
-            the noise of a comparison of layouts on the same draws.
+        paired_noise: Standard deviation of the impulse without the effect of a draw common to all
+            layouts: the noise of a comparison of layouts on the same draws.
     """
 
     signal: float
@@ -59,7 +59,7 @@ class Noise:
         between = impulses.mean(axis=1, keepdims=True)
         residual = impulses - between - impulses.mean(axis=0) + impulses.mean()
         interaction = float((residual**2).sum() / ((layouts - 1) * (draws - 1)))
-        # The means over the draws scatter by chance as well, which is no signal.
+        # The means over the draws also scatter by chance, which is not signal.
         signal = max(float(between.var(ddof=1)) - interaction / draws, 0.0)
         noise = float(impulses.var(axis=1, ddof=1).mean())
         of_reduction = float(reductions.var(axis=1, ddof=1).mean())
@@ -72,7 +72,7 @@ class Noise:
         return cls(*np.sqrt(squares.mean(axis=0)).tolist())
 
     def cells(self) -> list[str]:
-        """Return the four as shares, and the signal over the noise by the draws averaged."""
+        """Return the four as shares, then signal over noise for each number in `AVERAGED`."""
         ratio, paired = self.signal / self.noise, self.signal / self.paired_noise
         ratios = (f"{n**0.5 * ratio:.2f} ({n**0.5 * paired:.2f})" for n in AVERAGED)
         shares = (f"{100.0 * each:.1f} %" for each in astuple(self))
@@ -91,11 +91,11 @@ def reward(
     cluster: ClusterAddress = None,
     engine: str = "event",
 ) -> None:
-    """Print how much of what an episode of `BlastBarrier-v0` pays is the layout, and how much luck.
+    """Print the signal and noise of the reward of `BlastBarrier-v0`.
 
     The spread of the impulse between layouts (the signal), its scatter between seeds and between
-    charges (the noise), and their ratio by how many blasts are averaged (in brackets for
-    comparisons). The defaults of `realisations` and `threats` rest on it.
+    charges (the noise), and their ratio by the number of blasts averaged (in brackets for
+    comparisons). This is the basis for the defaults of `realisations` and `threats`.
     """
     with user_errors(), running_on(cluster):
         rows = []
@@ -140,10 +140,10 @@ def deposit(
     processes: int = 2,
     engine: str = "event",
 ) -> None:
-    """Print by how much a layout can make it worse, which the deposit of the reward must cover.
+    """Print the largest increase of the impulse by a layout, which the reward's deposit must cover.
 
-    Whole and unfinished layouts, and the largest impulse with one over that without a barrier, on
-    the same blasts.
+    For complete and incomplete layouts: the ratio of the impulse to that without a barrier, on the
+    same draws.
     """
     rows = []
     for name in SCENARIOS:
@@ -164,7 +164,7 @@ def deposit(
 def layouts_in_turn(
     scenario: Scenario, kinds: tuple[str, ...], count: int, rng: np.random.Generator
 ) -> Iterator[Layout]:
-    """Yield layouts of the whole stock, of the kinds in turn."""
+    """Yield layouts of the whole stock, with the kinds in rotation."""
     for number in range(count):
         yield LAYOUTS[kinds[number % len(kinds)]](scenario, rng)
 

@@ -1,4 +1,4 @@
-"""Put the best weights of a run into the package, with what they did in a league.
+"""Put the best weights of a run into the package, with their result in a league.
 
 python -m studies.pack_agent RUN NAME --league out/league --track known_NAME
 """
@@ -20,7 +20,7 @@ from blast_env.errors import BlastEnvError
 
 @dataclass(frozen=True)
 class SummaryRow:
-    """What is read of a row of a league's summary."""
+    """The columns used of a row of a league's summary."""
 
     __pydantic_config__: ClassVar = ConfigDict(allow_inf_nan=False)
 
@@ -46,15 +46,16 @@ def main(
 
 
 def league_result(folder: Path, track: str, run: str) -> LeagueResult:
-    """Return what the agent of a run did in a league.
+    """Return the result of a run's agent in a league.
 
     Args:
-        folder: Of the league.
+        folder: Folder of the league.
         track: Name of the track.
         run: Name of the run folder.
 
     Raises:
-        BlastEnvError: If the league has no such track, or the agent did not enter it.
+        BlastEnvError: If the league has no such track, the agent did not enter it exactly once,
+            no rule entered it, or the league's page is damaged.
     """
     try:
         rows = list(parse_csv(read_text(folder / f"{track}_summary.csv"), SummaryRow))

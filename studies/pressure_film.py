@@ -1,7 +1,7 @@
-"""Film a blast as overpressure, without a barrier and behind a wall: the animation of the README.
+"""Film the overpressure of a blast without a barrier and with a wall: the README's animation.
 
 `python -m studies.pressure_film FILM` films the site of docs/data/depot.toml with the wall that a
-rule puts near the building, by gas dynamics in cells of 0.5 m.
+rule places near the building, by gas dynamics in cells of 0.5 m.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ from blast_env.scenario import Charge, load_scenario
 SITE: Final = Path(__file__).parents[1] / "docs" / "data" / "depot.toml"
 CHARGE: Final = Charge((4.0, 11.0), 100.0)
 SECTION: Final = VerticalSection("y", 9.25)
-"""Through the wall; at the charge there is the path that must stay open."""
+"""Section through the wall, beside the path that must stay open and is level with the charge."""
 
 
 def main(
@@ -29,7 +29,7 @@ def main(
         float, typer.Option(help="Seconds of the film for a second of the blast.")
     ] = 100.0,
 ) -> None:
-    """Write the film, and say what the control room takes in it."""
+    """Write the film, and print the impulse on the control room with and without the wall."""
     with user_errors():
         scenario = load_scenario(SITE)
         wall = wall_near_building(scenario, CHARGE)

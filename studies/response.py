@@ -1,6 +1,6 @@
-"""The tables of docs/engineers/response.md: what was checked about the response of buildings.
+"""Checks of the response of buildings: the tables of docs/engineers/response.md.
 
-`python -m studies.response` prints those that need no blast; its commands are the others.
+`python -m studies.response tables` prints those without a blast; the other commands run blasts.
 """
 
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ E1300: Final = (
     (7.42, 1.0, 0.6, 9.786),
     (7.42, 2.2, 1.0, 2.596),
 )
-"""Least thickness (mm), sides (m), non-factored load (kPa): read by others from E1300's charts."""
+"""Least thickness (mm), sides (m), non-factored load (kPa): others' readings of E1300's charts."""
 
 _STIFFNESS_PA_M: Final = 1e6
 _STATIC_PA: Final = 1e3
@@ -59,7 +59,7 @@ Row = tuple[str, ...]
 
 
 def non_factored_loads() -> Iterator[Row]:
-    """Yield a row a pane: E1300's load, ours, and their ratio."""
+    """Yield one row per pane: E1300's load, this project's, and their ratio."""
     for thickness_mm, long_m, short_m, load_kpa in E1300:
         own_kpa = 1e-3 * Pane(long_m, short_m, 1e-3 * thickness_mm).load_resistance_pa()
         pane = f"{thickness_mm:g} mm, {long_m:g} x {short_m:g} m"
@@ -67,7 +67,7 @@ def non_factored_loads() -> Iterator[Row]:
 
 
 def load_factors() -> Iterator[Row]:
-    """Yield a row a duration: dynamic load factor of a triangle, in closed form and integrated."""
+    """Yield one row per duration: dynamic load factor of a triangle, closed and integrated."""
     system = System(100.0, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, 1e12))
     period = system.period_s
     for share in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0):
@@ -82,7 +82,7 @@ def load_factors() -> Iterator[Row]:
 
 
 def halved_peaks(impulse_pa_s: float = 60.0) -> Iterator[Row]:
-    """Yield a row a pane: what half the peak with the same impulse does to breakage."""
+    """Yield one row per pane: probability of breakage at two peaks of the same impulse."""
     for thickness_mm in (3.78, 5.56, 9.02):
         pane = Pane(1.2, 1.5, 1e-3 * thickness_mm)
         shares = []
@@ -95,7 +95,7 @@ def halved_peaks(impulse_pa_s: float = 60.0) -> Iterator[Row]:
 
 
 def step_and_ramp_factors() -> Iterator[Row]:
-    """Yield a row a load that stays: its dynamic load factor in closed form, and integrated."""
+    """Yield one row per sustained load: dynamic load factor in closed form and integrated."""
     system = System(100.0, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, 1e12))
     for share in (0.0, 0.25, 0.75, 1.5, 3.2):
         closed = 2.0 if share == 0.0 else 1.0 + abs(sin(pi * share)) / (pi * share)
@@ -108,9 +108,10 @@ def step_and_ramp_factors() -> Iterator[Row]:
 
 
 def ductilities() -> Iterator[Row]:
-    """Yield a row a point of Biggs' chart of triangles: ductility by scipy, and here.
+    """Yield one row per point of Biggs' chart of triangles: ductility by scipy, and here.
 
-    The last two are its asymptotes: an impulse, by energy, and a sudden load that stays, by work.
+    The last two rows are its asymptotes: an impulse, by energy, and a sudden sustained load, by
+    work.
     """
     mass = 100.0
     for resistance, share in product((0.3, 0.5, 0.8, 1.2), (0.2, 0.6, 2.0)):
@@ -144,7 +145,7 @@ def ductilities() -> Iterator[Row]:
 
 
 def side_on_values() -> Iterator[Row]:
-    """Yield a row a scaled distance: side-on values worked back from reflected ones, over KB's."""
+    """Yield one row per scaled distance: side-on values from reflected ones, over KB's values."""
     for scaled in (3.0, 5.0, 7.0, 10.0, 15.0, 20.0):
         peak, reflected, impulse, reflected_i = (
             float(kingery_bulmash(quantity, scaled, 1.0, "hemispherical"))
@@ -179,15 +180,15 @@ BEAM_DEFLECTION_MM: Final = 23.0
 Concrete structures subjected to blast loading, Chalmers, Lic 2015:04, paper B, has 24 mm."""
 
 BEAM_STEEL_DEPTHS_M: Final = (0.036, 0.041)
-"""Depth of the middle of the tension steel: in Nystroem's mesh, and with 25 mm over stirrups of 8
-mm, which is an assumption."""
+"""Depth of the middle of the tension steel: in Nystroem's mesh, and with an assumed cover of 25 mm
+over stirrups of 8 mm."""
 
 
 def beam_response(steel_depth_m: float, dynamic_increase: float) -> PanelResponses:
-    """Return what the tested beam does here.
+    """Return the computed response of the tested beam.
 
     160 mm deep and 300 mm wide with five bars of 16 mm, span 1.5 m, concrete of 50 MPa (Ekstroem,
-    section 3.2), steel that yields at 549 MPa (Nystroem, table 7.2).
+    section 3.2), steel with a yield stress of 549 MPa (Nystroem, table 7.2).
     """
     depth_m = 0.16 - steel_depth_m
     steel_m2 = 5.0 * pi * 0.008**2
@@ -204,7 +205,7 @@ def beam_response(steel_depth_m: float, dynamic_increase: float) -> PanelRespons
 
 
 def beam_rows() -> Iterator[Row]:
-    """Yield a row a way to take the beam: its deflection, over the measured one, and when."""
+    """Yield one row per model of the beam: deflection, its ratio to the test, and its time."""
     increases = (ReinforcedConcrete.model_fields["dynamic_increase"].default, 1.0)
     for steel_m, increase in product(BEAM_STEEL_DEPTHS_M, increases):
         motion = beam_response(steel_m, increase).motion
@@ -222,7 +223,7 @@ def beam_rows() -> Iterator[Row]:
         )
 
 
-# With blasts: a wall in the open before a charge on the ground.
+# With blasts: a wall in the open, in front of a charge on the ground.
 
 OPEN_KG: Final = 30.0
 OPEN_M: Final = 22.0
@@ -232,7 +233,7 @@ FRONT_M: Final = 30.0
 
 
 def open_wall(stand_off_m: float, width_m: float, height_m: float, tnt_kg: float) -> Scenario:
-    """Return a charge on the ground before the middle of a wall, in the open."""
+    """Return a scene in the open: a charge on the ground in front of the middle of a wall."""
     middle_m = 0.5 * width_m + 4.0
     office = {
         "kind": "ModularObstacle",
@@ -260,7 +261,7 @@ def open_wall(stand_off_m: float, width_m: float, height_m: float, tnt_kg: float
 
 
 def facade_on(site: Scenario, cell_m: float) -> FacadeResponse:
-    """Return what a blast with such cells does to the facade of a site."""
+    """Return the response of a site's facade to a blast on cells of a given side."""
     loads = GasBlast(site, engine=GasEngine(cell_m=cell_m)).run().bay_loads
     assert loads is not None
     return loads.response
@@ -277,10 +278,10 @@ def filled_with(bays: list[Bay], name: str) -> list[FilledBay]:
 def curve_histories(
     bays: list[Bay], stand_off_m: float, tnt_kg: float, middle_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return triangles with Kingery and Bulmash's reflected peak and impulse at each bay.
+    """Return triangular histories with Kingery and Bulmash's reflected peak and impulse, per bay.
 
-    At the distance of its middle, as if it faced the charge; Friedlander's negative phase is left
-    out, as are the edges of the wall.
+    The distance is that of the bay's middle, and the incidence is normal. The negative phase and
+    the clearing at the edges of the wall are neglected.
     """
     distance_m = np.array(
         [
@@ -303,7 +304,7 @@ def curve_histories(
 
 
 def period_rows(found: dict[float, FacadeResponse]) -> Iterator[Row]:
-    """Yield a row a period: deflection of elastic components over that on the finest cells."""
+    """Yield one row per period: deflection of elastic components over that on the finest cells."""
     cells = sorted(found, reverse=True)
     for period_s in PERIODS_S:
         stiffness = (2.0 * pi / period_s) ** 2 * 50.0
@@ -318,9 +319,9 @@ def period_rows(found: dict[float, FacadeResponse]) -> Iterator[Row]:
 
 
 def component_rows(found: dict[float, FacadeResponse], tnt_kg: float) -> Iterator[Row]:
-    """Yield a row a component: the level that the worst bay allows, by the cells.
+    """Yield one row per component: level of protection of the worst bay, by size of cells.
 
-    Coarser ones also with histories that are sharpened by `peak_factor`.
+    A worse level with histories sharpened by `peak_factor` follows in brackets.
     """
     cells = sorted(found, reverse=True)
     for name in catalogue():
@@ -337,7 +338,7 @@ def component_rows(found: dict[float, FacadeResponse], tnt_kg: float) -> Iterato
 
 
 def peak_rows(found: dict[float, FacadeResponse], reference_pa: FloatArray) -> Iterator[Row]:
-    """Yield a row a size of cells: peaks and impulses, over the curves and over the finest."""
+    """Yield one row per size of cells: peaks over the curves, impulses over the finest cells."""
     finest = found[min(found)]
     fine = np.trapezoid(np.maximum(finest.pressure_pa, 0.0), finest.time_s, axis=1)
     for cell_m, facade in sorted(found.items(), reverse=True):
@@ -373,7 +374,7 @@ def tables() -> None:
 def cells(
     finest: Annotated[float, typer.Option(help="Side of the finest cells, m.")] = 0.125,
 ) -> None:
-    """Print what the cells do to the response: 30 kg on the ground, 22 m before a wall."""
+    """Print the effect of the cells on the response: 30 kg on the ground, 22 m from a wall."""
     with user_errors():
         site = open_wall(OPEN_M, 6.0, 3.5, OPEN_KG)
         sides_m = [each for each in (0.5, 0.25, 0.125) if each >= finest]
@@ -396,7 +397,7 @@ def cells(
 def curves(
     cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.25,
 ) -> None:
-    """Print how often gas and Kingery and Bulmash's curves agree on 50 bays in the open."""
+    """Print the agreement of gas and Kingery and Bulmash's curves on the bays of an open wall."""
     with user_errors():
         site = open_wall(FRONT_M, 30.0, 17.5, FRONT_KG)
         facade = facade_on(site, cell)
@@ -429,7 +430,7 @@ def _levels(facade: FacadeResponse) -> FloatArray:
 def _levels_helped_by_suction(
     bays: list[FilledBay], time_s: FloatArray, pressure_pa: FloatArray
 ) -> FloatArray:
-    """Return levels under the histories as they are, whatever would be without suction."""
+    """Return the levels under unchanged histories, even where suction improves them."""
     panes = [each.glazing.pane for each in bays if each.glazing is not None]
     panels = [each.wall.panel(each.bay.height_m) for each in bays if each.wall is not None]
     damage = (

@@ -1,4 +1,4 @@
-"""Sites whose facades count: the criterion they were chosen by, and what impulse says of response.
+"""Sites with a response objective: their selection criterion, and impulse compared with response.
 
 python -m studies.response_sites criterion
 python -m studies.response_sites criterion --real-size --cells fine --rule-cells coarse
@@ -55,7 +55,7 @@ FOUND: Final = Path(__file__).parent.parent / "docs" / "data" / "best_found"
 _DRAWS: Final = 16
 _SEARCH: Final = "annealing_from_rules"
 _FACADE: Final = {"glazing": "window_laminated_12", "wall": "concrete_150"}
-"""What the older sites get: strong enough for a small charge behind the right barrier."""
+"""Facade of the older sites: strong enough for a small charge behind the right barrier."""
 
 _WIDTH_IN: Final = 13.5
 _PLAN_SHARE: Final = 0.55
@@ -80,7 +80,7 @@ def criterion(
         bool, typer.Option("--real-size", help="The sites of 90 to 120 m, unless some are given.")
     ] = False,
 ) -> None:
-    """Print whether the empty site fails, every rule fails, and what a search found passes."""
+    """Print whether the empty site and every rule fail, and the layout of a search passes."""
     headers = ("site", "charge", "wanted", "no layout", "rules that pass", "found", "cost")
     with user_errors():
         rows = []
@@ -96,12 +96,12 @@ def criterion(
 
 
 def criterion_row(scenario: Scenario, judge: Engine, first: Engine) -> Row:
-    """Return what the criterion says of a site; the last four cells are of what was found.
+    """Return the criterion's row for a site; the last four cells describe the layout found.
 
     Args:
         scenario: The site.
-        judge: Judges what was found.
-        first: Judges the empty site and the rules.
+        judge: Engine for the layout found.
+        first: Engine for the empty site and the rules.
     """
     target, charges = _target(scenario), site_charges(scenario)
     rules = layouts_by_rule(scenario)
@@ -123,7 +123,7 @@ def criterion_row(scenario: Scenario, judge: Engine, first: Engine) -> Row:
 
 
 def _charge_words(scenario: Scenario, charges: Sequence[AnyCharge]) -> str:
-    """Return how large charges are, and how near one comes to what is protected."""
+    """Return the range of the charges' masses and their least distance to a protected building."""
     met = [charge_against(scenario, (), each) for each in charges]
     masses_kg = [each.tnt_kg for each in met]
     protected = [each.rectangle_m for each in scenario.structures if each.protected]
@@ -135,7 +135,7 @@ def _charge_words(scenario: Scenario, charges: Sequence[AnyCharge]) -> str:
 def reaches(
     scenario: Scenario, layout: Layout, charges: Sequence[AnyCharge], engine: Engine
 ) -> bool:
-    """Return whether a layout reaches the target; one that fails meets no further charge."""
+    """Return whether a layout reaches the target under all charges; stop at the first failure."""
     target = _target(scenario)
     return all(consequences(scenario, layout, [each], engine).passes(target) for each in charges)
 
@@ -146,8 +146,8 @@ class Rival:
 
     Attributes:
         scenario: The site.
-        by_impulse: The layout that takes off most impulse.
-        by_response: The cheapest layout that reaches the level, or is nearest to it.
+        by_impulse: The layout with the largest reduction of impulse.
+        by_response: The cheapest layout that reaches the level, or the one nearest to it.
     """
 
     scenario: Scenario
@@ -156,7 +156,13 @@ class Rival:
 
     @classmethod
     def of(cls, name: str, budget: int, tnt_kg: float) -> "Rival":
-        """Return the rival layouts of a bundled site; an older one gets a facade and a charge."""
+        """Return the rival layouts of a bundled site.
+
+        Args:
+            name: Name of the site; older ones are given a facade.
+            budget: Blasts of a search.
+            tnt_kg: Charge of the older sites, kg.
+        """
         older = name in OLDER
         scenario = glazed(name, tnt_kg) if older else load_scenario(name)
         zone = scenario.zone.model_dump(mode="json", exclude={"stock"}, exclude_none=True)
@@ -170,7 +176,7 @@ class Rival:
         return cls(scenario, by_impulse, advise(problem, MeasureKind.SHIELD, budget).layout)
 
     def rows(self) -> Iterator[Row]:
-        """Yield a row a layout: its cost, what it takes off, what becomes of the facade."""
+        """Yield one row per layout: cost, reduction of impulse, worst damage and level."""
         scenario, threats = self.scenario, _threats(self.scenario)
         evaluator = BlastEvaluator(scenario, "gas")
         bare_pa_s = _impulse_pa_s(evaluator, (), threats)
@@ -199,7 +205,7 @@ def compare(
     budget: Annotated[int, typer.Option(min=4, help="Blasts of a search.")] = 60,
     tnt_kg: Annotated[float, typer.Option(help="Charge of the older sites, kg.")] = 10.0,
 ) -> None:
-    """Print what the layout that is best for impulse does for the response, and the reverse."""
+    """Print impulse and response of the layouts that are best for either."""
     headers = ("site", "best by", "layout", "cost", "impulse off", "worst damage", "level")
     with user_errors():
         rows: list[Row] = []
@@ -216,7 +222,7 @@ def pictures(
     sites: SomeSites = None,
     folder: Annotated[Path, typer.Option(help="Folder for the pictures.")] = PICTURES,
 ) -> None:
-    """Draw of each site what was found, and the damage that it, rules and nothing leave."""
+    """Draw the layout found for each site, and the damage with it, with rules and with none."""
     with user_errors():
         make_folder(folder)
         for name in sites or SITES:
@@ -225,9 +231,9 @@ def pictures(
 
 
 def damage_figure(scenario: Scenario) -> Figure:
-    """Return the plan of the layout that was found, and beside it what each layout leaves.
+    """Return the plan of the layout found, beside a chart of the damage with each layout.
 
-    That is the worst damage by cells of 0.5 m, with sharp peaks, as searches count it.
+    The damage is the worst one on cells of 0.5 m, with sharpened peaks, as in searches.
     """
     found = load_layout(FOUND / f"{scenario.name}.json", scenario)
     layouts = {"no layout": (), **layouts_by_rule(scenario), "found": found}
@@ -265,7 +271,7 @@ def damage_figure(scenario: Scenario) -> Figure:
 
 
 def _draw_damages(axes: Axes, damages: Mapping[str, float], target: LevelOfProtection) -> None:
-    """Draw a row a layout over a band a level; the target's limit is dashed."""
+    """Draw one row per layout over one band per level; the target's limit is dashed."""
     for level in LevelOfProtection:
         begin = float(LevelOfProtection.HIGH - level)
         axes.axvspan(begin, begin + 1.0, color=LEVEL_COLOURS[level], alpha=0.45, lw=0.0, zorder=0)
@@ -283,7 +289,7 @@ def _draw_damages(axes: Axes, damages: Mapping[str, float], target: LevelOfProte
 
 
 def glazed(name: str, tnt_kg: float) -> Scenario:
-    """Return an older site with a facade on what it protects, and other charges."""
+    """Return an older site with a facade on its protected buildings and charges of `tnt_kg`."""
     scenario = load_scenario(name)
     document = scenario.model_dump(mode="json", exclude_none=True)
     for structure in document["structures"]:
@@ -302,7 +308,7 @@ def _changed(scenario: Scenario, **sections: Any) -> Scenario:
 
 
 def site_charges(scenario: Scenario) -> list[AnyCharge]:
-    """Return every charge that a site is judged under."""
+    """Return every charge under which a site is judged."""
     return [each.charge for each in _threats(scenario)]
 
 

@@ -1,4 +1,4 @@
-"""What the response of facades adds to a blast: `python -m studies.response_speed`."""
+"""Processor time of the response of facades: `python -m studies.response_speed`."""
 
 import time
 from collections.abc import Callable
@@ -22,7 +22,7 @@ _FACADE: Final = {"bay_m": 1.5, "glazing": "window_annealed_6", "wall": "concret
 
 
 def site(**objective: Any) -> Scenario:
-    """Return the control room with a facade where its response counts, else without."""
+    """Return the control room, with a facade if an objective is given."""
     document = load_scenario("control_room").model_dump(mode="json")
     document["name"] = "glazed_room"
     if objective:
@@ -32,14 +32,14 @@ def site(**objective: Any) -> Scenario:
 
 
 def histories(count: int, steps: int = 400) -> tuple[FloatArray, FloatArray]:
-    """Return times, and a history for each of so many bays: triangles of 1 to 60 kPa and 12 ms."""
+    """Return times (steps,) in s and triangular histories of 1 to 60 kPa and 12 ms, one per bay."""
     time_s = np.linspace(0.0, 0.08, steps)
     falls = np.maximum(1.0 - time_s / 0.012, 0.0)
     return time_s, np.linspace(1e3, 6e4, count)[:, np.newaxis] * falls
 
 
 def least_ms(work: Callable[[], object]) -> float:
-    """Return the least processor time of some work; the first time compiles, and does not count."""
+    """Return the least processor time of repeated work, without the first run, which compiles."""
     seconds = []
     for _ in range(_REPEATS + 1):
         begin = time.process_time()
@@ -49,7 +49,7 @@ def least_ms(work: Callable[[], object]) -> float:
 
 
 def panels_ms(count: int = 1000) -> float:
-    """Return the processor time of so many wall panels, each under a history of its own."""
+    """Return the processor time of a number of wall panels, each under a different history."""
     wall = catalogue()["concrete_150"]
     assert isinstance(wall, Wall)
     systems, loads = [wall.panel(3.5).system] * count, histories(count)
@@ -57,7 +57,7 @@ def panels_ms(count: int = 1000) -> float:
 
 
 def panes_ms(name: str, count: int = 1000) -> float:
-    """Return the processor time of so many panes, each under a history of its own."""
+    """Return the processor time of a number of panes, each under a different history."""
     glazing = catalogue()[name]
     assert isinstance(glazing, Glazing)
     panes, loads = [glazing.pane] * count, histories(count)
@@ -65,10 +65,10 @@ def panes_ms(name: str, count: int = 1000) -> float:
 
 
 def main() -> None:
-    """Print by how much the processor time of a blast is longer, and what 1,000 panels take."""
+    """Print the response's share of a blast's processor time, and the time of 1,000 panels."""
     sites = {"with": site(kind="response"), "without": site()}
     seconds: dict[str, list[float]] = {name: [] for name in sites}
-    for _ in range(_REPEATS + 1):  # the first one compiles
+    for _ in range(_REPEATS + 1):  # the first run compiles
         for name, each in sites.items():
             evaluator = BlastEvaluator(each, "gas")
             begin = time.process_time()

@@ -1,4 +1,4 @@
-"""What scale costs: work on several workers, and a store with many blasts."""
+"""Costs at scale: work on several workers, and a store with many blasts."""
 
 import sqlite3
 import zlib
@@ -41,32 +41,32 @@ from studies.gas.loads import yard
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 CONTENT_BYTES: Final = 2_000
-"""About what the loads of a blast in the courtyard take."""
+"""Approximate size of the loads of a blast in the courtyard."""
 
 
 class Store(Protocol):
-    """What `FolderStore` offers."""
+    """The interface of `FolderStore`."""
 
     def get(self, key: str) -> bytes | None:
         """Return the content of a key, or `None` if it is not there."""
 
     def put(self, key: str, content: bytes) -> None:
-        """Keep the content of a key; the ones that were asked for longest ago may have to go."""
+        """Store the content of a key; evict the least recently used contents if necessary."""
 
     def __len__(self) -> int:
-        """Return how many contents there are."""
+        """Return the number of contents."""
 
 
 class SqliteStore:
     """The interface of `FolderStore` on one SQLite file in WAL mode.
 
-    A table with the hash of the key, key, content, its checksum, and when it was last asked for;
-    its index by that time makes eviction a matter of one transaction. As `FolderStore` without
-    waiting for the device: a loss of power takes the last contents, and damages none.
+    A table holds the hash of the key, the key, the content, its checksum, and the time of its last
+    use; with an index by that time, eviction is one transaction. Like `FolderStore` without waiting
+    for the device: a loss of power loses the last contents, and damages none.
 
     Args:
         path: The file.
-        most_bytes: Most that the contents take together.
+        most_bytes: Maximum total size of the contents.
     """
 
     def __init__(self, path: Path, most_bytes: int) -> None:
@@ -84,7 +84,7 @@ class SqliteStore:
             self._connection.execute(line)
 
     def get(self, key: str) -> bytes | None:
-        """Return the content of a key, or `None` if it is not there in one piece."""
+        """Return the content of a key, or `None` if it is missing or damaged."""
         at = sha256(key.encode()).digest()
         query = "SELECT key, content, checksum FROM kept WHERE hash = ?"
         row = self._connection.execute(query, (at,)).fetchone()
@@ -95,7 +95,7 @@ class SqliteStore:
         return content
 
     def put(self, key: str, content: bytes) -> None:
-        """Keep the content of a key; the ones that were asked for longest ago may have to go."""
+        """Store the content of a key; evict the least recently used contents if necessary."""
         at, run = sha256(key.encode()).digest(), self._connection.execute
         run("BEGIN IMMEDIATE")
         old = run("SELECT size FROM kept WHERE hash = ?", (at,)).fetchone()
@@ -108,7 +108,7 @@ class SqliteStore:
         run("COMMIT")
 
     def _evict(self, size: int) -> None:
-        """Delete what was asked for longest ago, a tenth of the whole."""
+        """Delete the least recently used contents, down to 90 % of `most_bytes`."""
         last, left = 0, size
         for used, own in self._connection.execute("SELECT used, size FROM kept ORDER BY used"):
             if left <= 0.9 * self._most_bytes:
@@ -128,16 +128,16 @@ class SqliteStore:
 
 @dataclass(frozen=True)
 class StoreFigures:
-    """What a store with many contents takes; times by the clock, of one of many.
+    """Wall-clock times and size of a store with many contents; `_us` times are means per content.
 
     Attributes:
-        fill_us: To put a content in, eviction aside.
-        hit_us: To get one that is there.
-        miss_us: To look for one that is not.
-        count_s: To count them.
-        evict_s: To put in the content that makes a tenth of them go.
-        shared_us: To put one in while another process does the same.
-        megabytes: On the device, when full.
+        fill_us: Time to put a content, without eviction.
+        hit_us: Time to get a stored content.
+        miss_us: Time to look up a missing one.
+        count_s: Time to count the contents.
+        evict_s: Time to put a content that causes an eviction to 90 % of the maximum.
+        shared_us: Time to put a content while another process does the same.
+        megabytes: Size of the full store on the device.
     """
 
     fill_us: float
@@ -176,7 +176,7 @@ def measure_store(make: Callable[[Path, int], Store], folder: Path, entries: int
     count_s = perf_counter() - began_s
     megabytes = sum(path.stat().st_blocks for path in folder.rglob("*")) * 512 / 1e6
     shared_us = _shared_us(make, folder, room, max(entries // 50, 10))
-    full = make(folder, entries * CONTENT_BYTES)  # less than is there
+    full = make(folder, entries * CONTENT_BYTES)  # less than the contents
     began_s = perf_counter()
     full.put("the one too many", content)
     return StoreFigures(
@@ -185,7 +185,7 @@ def measure_store(make: Callable[[Path, int], Store], folder: Path, entries: int
 
 
 def _keys(prefix: str, count: int) -> list[str]:
-    return [f"{prefix} {number} " + "k" * 300 for number in range(count)]  # as long as of a blast
+    return [f"{prefix} {number} " + "k" * 300 for number in range(count)]  # as long as a blast's
 
 
 def _each_us(act: Callable[[str], object], keys: Sequence[str]) -> float:
@@ -223,7 +223,7 @@ def compare_stores(
     entries: Annotated[int, typer.Option(min=100, help="Contents of 2 kB.")] = 100_000,
     folder: Annotated[Path, typer.Option(help="Where there is room for them.")] = Path("out"),
 ) -> None:
-    """Print what a store of files and one in an SQLite file take, both with so many blasts."""
+    """Print the times and sizes of a store of files and of one in SQLite, with many contents."""
     rows = []
     with user_errors(), progress_bar(f"stores with {entries:,} contents") as progress:
         make_folder(folder)
@@ -260,13 +260,13 @@ def compare_stores(
 
 @dataclass(frozen=True)
 class Speed:
-    """How fast blasts came from a number of workers, by the clock.
+    """Wall-clock speed of blasts on a number of workers.
 
     Attributes:
-        workers: How many workers.
-        blasts: How many blasts.
-        passed_s: How long all of them took.
-        alone_s: How long they took on the workers, added up; NaN if nobody looked.
+        workers: Number of workers.
+        blasts: Number of blasts.
+        passed_s: Time until all were finished.
+        alone_s: Sum of their times on the workers; NaN if not measured.
     """
 
     workers: int
@@ -276,7 +276,7 @@ class Speed:
 
     @property
     def overhead_ms(self) -> float:
-        """What passes on a worker beside each blast, waiting for the next one included."""
+        """Time on a worker per blast besides the blast, including the wait for the next one."""
         return MS_PER_S * (self.workers * self.passed_s - self.alone_s) / self.blasts
 
     def row(self, what: str) -> tuple[str, ...]:
@@ -298,7 +298,7 @@ PAUSE_S: Final = 0.02
 def on_workers(
     piece: Callable[[Layout], float], scenario: Scenario, workers: int, count: int
 ) -> Speed:
-    """Time a piece of work for random layouts, all at once, within `on_cluster`."""
+    """Time a piece of work for random layouts, submitted together, within `on_cluster`."""
     rng = np.random.default_rng(0)
     layouts = [random_layout(scenario, rng) for _ in range(count)]
     run_all(piece, layouts[: 4 * workers])  # so that all workers have loaded everything
@@ -308,7 +308,7 @@ def on_workers(
 
 
 def _blast_s(scenario: Scenario, engine: str, layout: Layout) -> float:
-    """Run a blast; return how long that took."""
+    """Run a blast; return its time in s."""
     began_s = perf_counter()
     evaluator = BlastEvaluator(scenario, engine)
     evaluator.loads(layout, Threat(draw_charge(scenario, 0), 0))
@@ -316,14 +316,14 @@ def _blast_s(scenario: Scenario, engine: str, layout: Layout) -> float:
 
 
 def _pause_s(_scenario: Scenario, _layout: Layout) -> float:
-    """Do nothing for a while, with what a blast is sent; return how long that took."""
+    """Sleep for `PAUSE_S`, with the arguments of a blast; return the time in s."""
     began_s = perf_counter()
     sleep(PAUSE_S)
     return perf_counter() - began_s
 
 
 def training_on_workers(scenario: Scenario, engine: str, workers: int, episodes: int) -> Speed:
-    """Time episodes of random placements in vectors of four environments a worker."""
+    """Time episodes of random placements in vectors of four environments per worker."""
     hyperparameters = load_hyperparameters("maskable_ppo", "default", {"n_envs": 4 * workers})
     configuration = RunConfiguration(
         settings=TrainingSettings(
@@ -337,7 +337,7 @@ def training_on_workers(scenario: Scenario, engine: str, workers: int, episodes:
     environments.reset()
     rng, blasts, ended, passed_s = np.random.default_rng(0), np.zeros(4 * workers), 0, 0.0
     first = 0.0
-    while ended < episodes + 4 * workers:  # the first of each loads what has to be loaded
+    while ended < episodes + 4 * workers:  # the first episode of each loads everything
         began_s = perf_counter()
         masks = environments.env_method("action_masks")
         actions = np.array([rng.choice(np.flatnonzero(mask[:-1])) for mask in masks])
@@ -355,7 +355,7 @@ def training_on_workers(scenario: Scenario, engine: str, workers: int, episodes:
 
 @contextmanager
 def local_workers(count: int) -> Iterator[None]:
-    """Run blasts on workers of this machine, as on those of others."""
+    """Run blasts on workers of this machine, in the same way as on remote ones."""
     with import_extra("cluster", "workers"):
         from distributed import LocalCluster
 
@@ -373,10 +373,10 @@ def compare_workers(
     gas_blasts: Annotated[int, typer.Option(min=1)] = 60,
     episodes: Annotated[int, typer.Option(min=1, help="Of training, with gas.")] = 32,
 ) -> None:
-    """Print how fast blasts and training are on workers of this machine, and what one is beside.
+    """Print the speed of blasts and training on workers of this machine, and their overhead.
 
-    By the clock: blasts need as many idle cores as workers. The pieces that do nothing tell what a
-    blast costs beside itself.
+    Times are wall-clock times, so that blasts need as many idle cores as workers. The pauses
+    measure the overhead per blast.
     """
     rows, site = [], yard()
     with user_errors(), progress_bar("workers") as progress:
@@ -401,12 +401,12 @@ def unit_costs(
     million: Annotated[float, typer.Option(min=0.0, help="Millions of blasts planned.")] = 1.0,
     price: Annotated[float, typer.Option(min=0.0, help="Of a core hour, any currency.")] = 0.04,
 ) -> None:
-    """Print what a gas blast costs, and what many would: core hours, storage, money."""
+    """Print the cost of a gas blast, and of millions: core hours, storage, money."""
     with user_errors(), TemporaryDirectory() as folder, progress_bar("gas blasts") as progress:
         site, rng = load_scenario(scenario), np.random.default_rng(0)
         engine = find_engine("gas", cell)
         evaluator = BlastEvaluator(site, engine, cache=folder)
-        evaluator.loads((), Threat(draw_charge(site, 0), 0))  # loads what has to be loaded
+        evaluator.loads((), Threat(draw_charge(site, 0), 0))  # loads everything
         began_s = process_time()
         for number in range(blasts):
             evaluator.loads(random_layout(site, rng), Threat(draw_charge(site, number), 0))

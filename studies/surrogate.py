@@ -1,4 +1,4 @@
-"""The surrogate of gas dynamics: blasts to fit it to, the fit, and whether a search exploits it."""
+"""The surrogate of gas dynamics: training blasts, the fit, and a check for exploitation."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ DATA: Final = tuple(
     Path(f"docs/data/{name}_blasts.parquet")
     for name in ("site", "site_agent", "many_site", "close_site")
 )
-"""What the package's surrogate is fitted to: blasts on generated sites."""
+"""Training data of the packaged surrogate: blasts on generated sites."""
 
 _FOLDS: Final = 5
 _MOST_DRAWN: Final = 10_000
@@ -78,9 +78,9 @@ def blasts(
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Run blasts on generated sites: no barrier, rules, random layouts, walls, changes of rules'.
+    """Run blasts on generated sites for the layouts of a recipe: rules, random, changed rules.
 
-    Those that are there already are not run again. `studies.blast_table` makes a table of them.
+    Cached blasts are not repeated. `studies.blast_table` turns the cache into a table.
     """
     with user_errors(), running_on(cluster):
         make_folder(cache)
@@ -98,15 +98,15 @@ def blasts(
 
 @dataclass(frozen=True)
 class Recipe:
-    """Which layouts meet a charge on a generated site, beside the empty one.
+    """The layouts to simulate for a charge on a generated site, besides the empty one.
 
     Attributes:
-        layouts: Random layouts, random walls, and changes of the rules' layouts, in turn.
-        rules: Most layouts by rules, drawn.
-        surrogate: Whose favourites are tried.
-        favourites: How many of them: the best that a search by its guesses has met, the tenth, the
-            twentieth and so on, for those next to each other are much alike.
-        changes: Layouts that this search looks at, beside the rules'.
+        layouts: Number of random layouts, random walls and changed rule layouts, in rotation.
+        rules: Maximum number of rule layouts, drawn at random.
+        surrogate: Surrogate whose best layouts are included; `None` for none.
+        favourites: Number of these: every tenth layout of a search by the surrogate's predictions,
+            from the best on, because neighbours in that ranking are much alike.
+        changes: Layouts that this search evaluates, besides those of the rules.
     """
 
     layouts: int = 12
@@ -116,7 +116,7 @@ class Recipe:
     changes: int = 300
 
     def of(self, site: Scenario, threat: Threat, seed: int) -> list[Layout]:
-        """Return them, the empty one first."""
+        """Return the layouts for a threat, sorted and distinct, the empty one first."""
         rng, moves = np.random.default_rng(seed), Moves(site)
         ruled = list(dict.fromkeys(layouts_by_rule(site).values()))
         found: list[Layout] = [(), *ruled]
@@ -140,7 +140,7 @@ class Recipe:
 
 
 def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: Path) -> int:
-    """Run the blasts of one site; return how many were not there before."""
+    """Run the blasts of one site; return the number of new ones."""
     site = scenario_of(name)
     evaluator = BlastEvaluator(site, engine, cache=cache)
     seed = int(name.rpartition("/")[-1])
@@ -163,8 +163,8 @@ def fit_it(
     seed: int = 0,
     out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
 ) -> None:
-    """Fit the surrogate; print its errors on sites that it was not fitted to."""
-    torch.set_num_threads(1)  # more of them only wait for each other, for minutes on busy cores
+    """Fit the surrogate; print its errors on held-out sites."""
+    torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors():
         make_folder(out.parent)
         named = named_rows(data or DATA, without or ())
@@ -187,20 +187,20 @@ def fit_it(
 
 
 def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFrame:
-    """Return the rows of tables of blasts whose scenario has a name that is not left out."""
+    """Return the rows of blast tables with a named scenario, except those in `without`."""
     names = [column.name for column in COLUMNS]
     table = pd.concat([read_frame(path, names) for path in paths], ignore_index=True)
     return table[~table["scenario"].isin(["", *without])]
 
 
 def samples_of(rows: pd.DataFrame) -> Samples:
-    """Return what a surrogate is fitted to."""
+    """Return the training samples of the rows of a blast table."""
     scenarios = [scenario_of(name) for name in rows["scenario"].unique()]
     return Samples.of(rows, {each.content_hash: each for each in scenarios})
 
 
 def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
-    """Print how far it is off on sites that it was not fitted to; return what is said of it."""
+    """Print the errors on a held-out fifth of the sites; return `about` with those errors."""
     out_of, *_ = folds(samples.site, _FOLDS, seed)
     found = errors(fit(samples, ~out_of, epochs, seed, about), samples, out_of)
     sites = len(np.unique(samples.site[out_of]))
@@ -216,7 +216,7 @@ def check(
     data: Annotated[list[Path], typer.Argument(help="Tables of blasts on other sites.")],
     surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
 ) -> None:
-    """Print how far a surrogate is off on sites of other tables than those it was fitted to."""
+    """Print the errors of a surrogate on the sites of other tables than its training data."""
     with user_errors():
         loaded, found = load_surrogate(surrogate), {}
         for path in data:
@@ -252,13 +252,13 @@ def _errors_table(found: Mapping[str, ErrorsOfBoth]) -> str:
 
 @dataclass(frozen=True)
 class LayoutsJudged:
-    """What layouts do against one charge, by gas dynamics; shares of the load without a barrier.
+    """Reductions against one charge by gas dynamics, as shares of the load without a barrier.
 
     Attributes:
-        reduction: Of the surrogate's layout.
-        promised: What it said of that.
-        rules: Of each rule's layout.
-        ms: Time that the proposal took.
+        reduction: Reduction by the surrogate's layout.
+        promised: The surrogate's prediction of that reduction.
+        rules: Reduction by each rule's layout.
+        ms: Time of the proposal.
     """
 
     reduction: float
@@ -274,7 +274,7 @@ def verdict(
     threat: Threat,
     processes: int = 1,
 ) -> LayoutsJudged:
-    """Judge what the surrogate proposes after some changes, and the rules' layouts."""
+    """Judge the surrogate's proposal after a number of changes, and the rules' layouts."""
     scenario, search = evaluator.scenario, LearntSearch(surrogate, changes=changes)
     began_s = perf_counter()
     proposed = search.at_once(scenario, threat.charge)
@@ -316,9 +316,9 @@ def judge(
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Let gas dynamics judge what the surrogate proposes, beside every rule, and what it promised.
+    """Compare the surrogate's proposals, by gas dynamics, with its predictions and every rule.
 
-    A surrogate that is exploited promises more than gas dynamics gives.
+    An exploited surrogate predicts a larger reduction than gas dynamics gives.
     """
     with user_errors(), running_on(cluster):
         loaded, rows = load_surrogate(surrogate), []
@@ -353,10 +353,10 @@ def compare(
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
 ) -> None:
-    """Let gas dynamics judge what surrogates and agents propose on unseen sites, case by case.
+    """Compare the proposals of surrogates and agents on unseen sites by gas dynamics, paired.
 
-    No proposal takes a blast. The best rule of a case is the best by the blasts that judge it: it
-    is chosen afterwards.
+    Proposals use no blasts. The best rule of a case is chosen afterwards, by the same blasts that
+    judge it.
     """
     with user_errors():
         searches = dict(_searches(surrogates, run or (), changes or (300,)))
@@ -395,7 +395,7 @@ def compare(
 def _searches(
     surrogates: Sequence[Path], runs: Sequence[Path], changes: Sequence[int]
 ) -> Iterator[tuple[str, LearntSearch]]:
-    """Yield what proposes, by name."""
+    """Yield the searches with their names."""
     loaded = [(path.stem, load_surrogate(path)) for path in surrogates]
     for stem, surrogate in loaded:
         for most in changes:
@@ -408,13 +408,13 @@ def _searches(
 
 @dataclass(frozen=True)
 class Compared:
-    """What gas dynamics says on one case; shares of the load without a barrier.
+    """Results of gas dynamics on one case, as shares of the load without a barrier.
 
     Attributes:
-        reductions: Of each proposal.
-        promised: What the surrogate said of it; `None` of an agent's own.
-        ms: Processor time that each took.
-        rule: Of the best rule; 0 if none was asked for.
+        reductions: Reduction by each proposal.
+        promised: Prediction of the surrogate for it; `None` for an agent without a surrogate.
+        ms: Processor time of each proposal.
+        rule: Reduction by the best rule; 0 if rules are not judged.
     """
 
     reductions: Sequence[float]
@@ -430,7 +430,7 @@ def compared(
     rules: bool,
     processes: int,
 ) -> Compared:
-    """Judge what is proposed for a case, and every rule if asked for."""
+    """Judge the proposals for a case, and every rule if `rules`."""
     layouts, ms = [], []
     for search in searches:
         began_s = process_time()
@@ -450,7 +450,7 @@ def compared(
 
 
 def promise(surrogate: Surrogate, layout: Layout, case: Case) -> float:
-    """Return by which share a surrogate says that a layout lowers the load that counts."""
+    """Return the share by which a layout lowers the case's load, as a surrogate predicts it."""
     bare, guessed = Guesses.of(surrogate, case).loads([(), layout])
     return float(1.0 - guessed / bare)
 
@@ -476,7 +476,7 @@ def draws(
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Let gas dynamics judge which of an agent's draws the surrogate picks: what limits both?"""
+    """Judge by gas dynamics which of an agent's draws the surrogate picks, to find the limit."""
     with user_errors(), running_on(cluster):
         agent, guessing = load_agent(run), load_surrogate(surrogate)
         track = known_track(agent.representative, cases, 1, noisy=False)
@@ -503,7 +503,7 @@ def draws(
 
 
 def _count(text: str) -> int:
-    """Return how many layouts are drawn, of those in `--counts`."""
+    """Return a number of draws from a part of `--counts`."""
     if not text.strip().isdecimal():
         raise BlastEnvError(f"--counts has {text.strip()!r}, must be whole numbers and commas")
     return whole_number("--counts", int(text), 1, _MOST_DRAWN)
@@ -512,17 +512,17 @@ def _count(text: str) -> int:
 def choices(
     agent: SamplingAgent, surrogate: Surrogate, case: Case, counts: Sequence[int], changes: int
 ) -> tuple[dict[str, Layout], list[Layout]]:
-    """Return what may be proposed for a case without a blast, by how it is chosen.
+    """Return proposals for a case that need no blast, by the way of choosing them.
 
     Args:
-        agent: Proposes and draws.
-        surrogate: Chooses.
-        case: The case, of a told charge.
-        counts: How many layouts are drawn.
-        changes: How many changes of the most draws are looked at, in the end.
+        agent: Proposes and draws layouts.
+        surrogate: Ranks the draws.
+        case: The case, with a known charge.
+        counts: Numbers of layouts to draw.
+        changes: Number of changes of the largest draw to evaluate at the end.
 
     Returns:
-        The layouts by name, and the most draws, those first that the surrogate likes best.
+        The layouts by name, and the largest draw, best first by the surrogate.
     """
     scenario, charge = case.scenario, case.threats[0].charge
     proposed: Layout = tuple(sorted(agent.propose(scenario, charge)))
@@ -541,7 +541,7 @@ def choices(
 def reductions_of(
     evaluator: BlastEvaluator, case: Case, layouts: Sequence[Layout], processes: int
 ) -> list[float]:
-    """Return by which share each layout lowers the load that counts, by gas dynamics."""
+    """Return the share by which each layout lowers the case's load, by gas dynamics."""
     asked = [(each, threat) for each in ((), *layouts) for threat in case.threats]
     loads = evaluator.loads_of_many(asked, processes)
     values = np.array([each.load(case.scenario.objective) for each in loads])

@@ -1,7 +1,7 @@
-"""`python -m studies.surrogate_limits`: what limits the surrogate on sites that it has not met.
+"""Limits of the surrogate on unseen sites: `python -m studies.surrogate_limits`.
 
-Sites, what the networks are given and their number change one at a time. All rows of a seed are
-judged on the same sites.
+The number of sites, the inputs and the number of networks change one at a time. All rows of a seed
+are judged on the same sites.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,9 +37,9 @@ class Trial:
     """A fit of impulses.
 
     Attributes:
-        share: Share of the sites that are not held out.
-        given: What the networks are given beside the geometry.
-        members: Networks.
+        share: Share of the sites not held out that the fit uses.
+        given: Inputs of the networks besides the geometry.
+        members: Number of networks.
     """
 
     share: float = 1.0
@@ -47,7 +47,7 @@ class Trial:
     members: int = 1
 
     def seen(self, samples: Samples) -> Samples:
-        """Return samples without what the networks are not given."""
+        """Return samples without the inputs that this trial leaves out."""
         if self.given == _WAYS:
             return replace(samples, relations=np.zeros_like(samples.relations))
         if self.given == _MESSAGES:
@@ -75,8 +75,8 @@ def main(
     sites: Annotated[int, typer.Option(min=4, help="Most sites of the tables.")] = 10_000,
     epochs: Annotated[int, typer.Option(min=1, help="Of each fit.")] = 30,
 ) -> None:
-    """Print the errors of each fit on what it has met and on sites that it has not."""
-    torch.set_num_threads(1)  # more of them only wait for each other
+    """Print the errors of each fit on its training sites and on unseen sites."""
+    torch.set_num_threads(1)  # more threads block each other
     with user_errors():
         rows = named_rows(data or DATA)
         samples = samples_of(rows[rows["scenario"].isin(rows["scenario"].unique()[:sites])])
@@ -101,7 +101,7 @@ def main(
 def results(
     trial: Trial, samples: Samples, seeds: Sequence[int], epochs: int
 ) -> Iterator[tuple[int, Errors, Errors]]:
-    """Yield for each seed the number of sites, and the errors on these and on those held out."""
+    """Yield for each seed the number of training sites, the errors there, and on held-out sites."""
     given = trial.seen(samples)
     for seed in seeds:
         sites = np.random.default_rng(seed).permutation(np.unique(samples.site))

@@ -1,1 +1,1 @@
-"""The benchmark's data: what problems are scored between, and how strong methods do."""
+"""The benchmark's data: reference layouts of the problems, and results of strong methods."""

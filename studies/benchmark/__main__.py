@@ -48,10 +48,10 @@ def references(
     ] = None,
     most_s: Annotated[float, typer.Option(help="Stop before a problem after so many s.")] = 1e9,
 ) -> None:
-    """Play the rules and all layouts that are known, on every problem that has no reference yet.
+    """Evaluate the rules and all known layouts on every problem without a reference.
 
-    Problems of the submissions get new ones: their layouts are known, too. That is for versions
-    that nobody has entered yet, since it moves what scores 1.
+    Problems with layouts in the submissions get new references that include those layouts. Use
+    submissions only for a version without entries, since new references change the scale.
     """
     with user_errors():
         known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
@@ -80,10 +80,9 @@ def references(
 
 @app.command()
 def headroom() -> None:
-    """Print by family how far the best layouts known are ahead of each problem's best rule.
+    """Print the lead of the best known layouts over each problem's best rule, by family.
 
-    That bounds from below what any method can gain, and with a search behind the layouts it is what
-    a method without a blast would have to find at once.
+    The lead is a lower bound of the possible gain over the rules.
     """
     shares: dict[str, list[tuple[float, float]]] = {}
     for name, each in stored_references().items():

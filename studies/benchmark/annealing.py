@@ -24,7 +24,7 @@ _TEMPERATURES: Final = ((0.002, 0.0005), (0.005, 0.001), (0.02, 0.001), (0.06, 0
 
 @dataclass(frozen=True)
 class Setting:
-    """A search with settings of its own.
+    """A search with its settings.
 
     Attributes:
         search: The search.
@@ -39,12 +39,12 @@ class Setting:
 
     @property
     def is_packaged(self) -> bool:
-        """Whether the package's own settings are these."""
+        """Whether these are the settings of the package."""
         return self.search in _PACKAGED
 
 
 def settings() -> list[Setting]:
-    """Return what is tried, of one walker and of several; the packaged ones are the first two."""
+    """Return the settings to try, for one walker and for several; the packaged ones are first."""
     tried = [Setting(each) for each in _PACKAGED]
     for each, share, (hot, cold) in product(_PACKAGED, _STARTING_SHARES, _TEMPERATURES):
         setting = Setting(replace(each, starting_share=share, hot=hot, cold=cold))
@@ -54,12 +54,12 @@ def settings() -> list[Setting]:
 
 
 def sites_for(purpose: str, count: int) -> tuple[Definition, ...]:
-    """Return generated sites; those for another purpose are others."""
+    """Return generated sites; different purposes get different sites."""
     return secret_sites(f"annealing, {purpose}", count)
 
 
 def taken_off_percent(setting: Setting, seeds: int, site: Definition) -> float:
-    """Return what a search from the rules takes off on a site, the mean over its seeds."""
+    """Return the reduction by a search from the rules on a site, the mean over seeds, in %."""
     propose, found = method_of(FromRulesSearch(setting.search)), []
     for seed in range(seeds):
         layout = propose(make(site, _BUDGET, engine="surrogate"), seed)
@@ -70,5 +70,5 @@ def taken_off_percent(setting: Setting, seeds: int, site: Definition) -> float:
 def on_sites(
     setting: Setting, sites: tuple[Definition, ...], seeds: int, workers: int
 ) -> FloatArray:
-    """Return what a search takes off on each site, in per cent (sites,)."""
+    """Return the reduction by a search on each site, in % (sites,)."""
     return np.array(run_all(partial(taken_off_percent, setting, seeds), sites, workers))

@@ -1,8 +1,8 @@
-"""Methods of other libraries on the benchmark: each asks for a layout, and is told its share.
+"""Methods of other libraries on the benchmark: each proposes a layout and receives its share.
 
-The libraries are no dependencies: `pip install optuna nevergrad botorch smac` for those that run.
-MCBO wants an environment of its own: its folder from huawei-noah/HEBO on the path, and `pip install
-"gpytorch<1.9" "pandas<3" disjoint_set`.
+The libraries are not dependencies: install them with `pip install optuna nevergrad botorch smac`.
+MCBO needs a separate environment, with its folder from huawei-noah/HEBO on the path and `pip
+install "gpytorch<1.9" "pandas<3" disjoint_set`.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,16 +22,16 @@ from blast_env.problems import BenchmarkProblem, Method
 from blast_env.problems.adapters import mcbo_task
 
 _REPEATS: Final = 200
-"""Questions without a new blast after which a method is through."""
+"""Evaluations in a row without a new blast after which a method ends."""
 
 _FIT_EVERY: Final = 5
-"""Evaluations after which the model's lengths are fitted anew: a fit takes as long as a blast."""
+"""Evaluations between fits of the model's length scales: a fit takes as long as a blast."""
 
 Value = Callable[[FloatArray], float]
 
 
 def by_keys(search: Callable[[BenchmarkProblem, int, Value], None]) -> Method:
-    """Return the method that lets a library choose random keys until the blasts are spent."""
+    """Return a method in which a library chooses random keys until the budget is spent."""
 
     def method(problem: BenchmarkProblem, seed: int) -> Layout:
         repeats = 0
@@ -80,12 +80,12 @@ def nevergrad_ngopt(problem: BenchmarkProblem, seed: int, value: Value) -> None:
 
 
 def _never_run(config: object, seed: int = 0) -> float:
-    """Stand for the function that SMAC wants to be given; it is asked and told instead."""
+    """Serve as the target function that SMAC requires; its ask-and-tell interface needs none."""
     raise BlastEnvError(f"{config}, {seed}: nothing is run by SMAC itself")
 
 
 def smac_forest(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """SMAC's Bayesian optimisation with a random forest, as it comes."""
+    """SMAC's Bayesian optimisation with a random forest, at its default settings."""
     from ConfigSpace import ConfigurationSpace, Float
     from smac import HyperparameterOptimizationFacade, Scenario
     from smac.runhistory.dataclasses import TrialValue
@@ -109,7 +109,7 @@ def smac_forest(problem: BenchmarkProblem, seed: int, value: Value) -> None:
 
 
 def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """Bayesian optimisation in a trust region (TuRBO's) with BoTorch: GP, Thompson samples."""
+    """Trust-region Bayesian optimisation (TuRBO) with BoTorch: GP, Thompson sampling."""
     import torch
     from botorch.fit import fit_gpytorch_mll
     from botorch.models import SingleTaskGP
@@ -154,7 +154,7 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
 
 
 def mcbo_casmopolitan(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """MCBO's Casmopolitan: what stands is nominal, where is whole numbers; in a trust region."""
+    """MCBO's Casmopolitan, in a trust region: items are nominal, places are integers."""
     from mcbo.optimizers.bo_builder import BO_ALGOS
     from mcbo.utils.general_utils import set_random_seed
 
@@ -168,7 +168,7 @@ def mcbo_casmopolitan(problem: BenchmarkProblem, seed: int, value: Value) -> Non
 
 
 def annealing_on_keys(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """Plain Python: simulated annealing on the keys, a few of them drawn anew at a time."""
+    """Simulated annealing on the keys in plain Python; each move redraws a few keys."""
     rng = np.random.default_rng(seed)
     keys = rng.random(problem.space.keys)
     share = value(keys)

@@ -1,4 +1,4 @@
-"""What each problem is scored between: the rules, and the best layout that is known anywhere."""
+"""Reference layouts for the score of each problem: the rules', and the best one known."""
 
 import json
 from collections import defaultdict
@@ -17,7 +17,10 @@ DATA = Path("docs/data")
 
 
 def published_layouts(definition: Definition, published: PublishedBlasts) -> Iterator[Layout]:
-    """Yield the layouts that met every charge of a problem whose charges are fixed."""
+    """Yield the published layouts with a blast for every charge of a problem.
+
+    Problems with vehicle charges, which are not fixed, have none.
+    """
     charges = [threat.charge for threat in definition.case.threats]
     if any(isinstance(charge, VehicleCharge) for charge in charges):
         return
@@ -33,7 +36,7 @@ def published_layouts(definition: Definition, published: PublishedBlasts) -> Ite
 
 
 def known_layouts(definition: Definition, published: PublishedBlasts) -> dict[str, Layout]:
-    """Return layouts that may be the best known, by what found them."""
+    """Return candidates for the best known layout of a problem, by their origin."""
     scenario = definition.scenario
     found: dict[str, Layout] = {}
     for number, layout in enumerate(published_layouts(definition, published)):
@@ -48,7 +51,7 @@ def known_layouts(definition: Definition, published: PublishedBlasts) -> dict[st
 
 
 def submitted_layouts(submissions: Iterable[Submission]) -> dict[str, dict[str, Layout]]:
-    """Return the layouts of submissions by problem, and by what found them."""
+    """Return the layouts of submissions, by problem and by their origin."""
     found: dict[str, dict[str, Layout]] = defaultdict(dict)
     for each in submissions:
         for run in each.runs:
@@ -58,6 +61,6 @@ def submitted_layouts(submissions: Iterable[Submission]) -> dict[str, dict[str, 
 
 
 def published_before(folder: Path, definitions: Mapping[str, Definition]) -> PublishedBlasts:
-    """Return the published blasts of these problems, before a folder for others."""
+    """Return the published blasts of these problems, with a folder for all others."""
     scenarios = {each.scenario.content_hash: each.scenario for each in definitions.values()}
     return PublishedBlasts(scenarios, DiskCache(folder))

@@ -1,1 +1,1 @@
-"""What the study of the scenarios, `studies.difficulty`, is made of."""
+"""The study of the scenarios' difficulty, `python -m studies.difficulty`."""

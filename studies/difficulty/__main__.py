@@ -1,11 +1,11 @@
-"""Whether it matters where the barrier stands, for docs/studies/scenarios.md.
+"""The effect of the barrier's place on the load, for docs/studies/scenarios.md.
 
-For every bundled scenario with a build zone: no barrier, random layouts, layouts by hand and the
-best that was searched, on the same threats. Where single modules are placed, with an engine of
-particles, on held-out seeds; once with one layout for all threats, once with a layout for each
-charge. Where the items of a catalogue are placed, with gas dynamics, one layout for all places of
-the charge. Prints the tables and a verdict, writes both into a file that the page includes, and
-draws a picture of each scenario with the best layout.
+For every bundled scenario with a build zone: no barrier, random layouts, rule layouts and the best
+layout of a search, on the same threats. Scenarios with modules use a particle engine and held-out
+seeds, once with one layout for all threats and once with one layout per charge. Scenarios with a
+catalogue use gas dynamics, with one layout for all places of the charge. Prints the tables and a
+verdict, writes both into a file that the page includes, and draws a picture of each scenario with
+the best layout.
 """
 
 from collections.abc import Sequence
@@ -103,9 +103,9 @@ def with_items() -> tuple[str, ...]:
 
 
 def studied_scenarios() -> tuple[str, ...]:
-    """Return the names of the bundled scenarios in which something is placed to lower a load.
+    """Return the names of the bundled scenarios with a build zone and a load as objective.
 
-    Those in which the response of facades counts are in `studies.response_sites`.
+    `studies.response_sites` has those with a response objective.
     """
     loaded = {name: load_scenario(name) for name in bundled_scenarios()}
     return tuple(
@@ -174,7 +174,7 @@ def study_items(
 
 
 def write_joint(results: Sequence[ItemResult], tables: Path) -> None:
-    """Print and write what the scenarios with a catalogue have together."""
+    """Print and write the joint table and criteria of the scenarios with a catalogue."""
     rows = joint_rows(results)
     headers = ("rule, points behind the best found", *(each.scenario.name for each in results))
     print_table("all scenarios with a catalogue", headers, rows)
@@ -208,7 +208,7 @@ def item_rows(result: ItemResult) -> list[tuple[str, ...]]:
 
 
 def item_origin(study: ItemStudy, result: ItemResult) -> str:
-    """Return what the figures were made with; the hash tells when they are out of date."""
+    """Return the origin of the figures; a changed hash shows that they are out of date."""
     scenario, engine = result.scenario, study.evaluator.engine
     layout, tried = result.best.layouts[0], min(result.effort.tried, len(result.places))
     return (
@@ -219,7 +219,7 @@ def item_origin(study: ItemStudy, result: ItemResult) -> str:
 
 
 def elsewhere_text(result: ItemResult) -> str:
-    """Return what layouts for one place are worth at the others."""
+    """Return the table of reductions at all places by the best layout for each place."""
     own = np.diag(result.elsewhere)
     cells = [
         (f"best for place {number}", *(f"{_PERCENT * value:.1f} %" for value in row))
@@ -233,7 +233,7 @@ def elsewhere_text(result: ItemResult) -> str:
 
 
 def joint_rows(results: Sequence[ItemResult]) -> list[tuple[str, ...]]:
-    """Return by how many points each rule falls short of the best found in each scenario."""
+    """Return the points by which each rule falls short of the best found in each scenario."""
     names = dict.fromkeys(rule.name for result in results for rule in result.task.rules)
     rows = []
     for name in names:
@@ -243,12 +243,12 @@ def joint_rows(results: Sequence[ItemResult]) -> list[tuple[str, ...]]:
 
 
 def hidden_title(effort: Effort) -> str:
-    """Return what the hidden task is."""
+    """Return the title of the hidden task."""
     return f"charge hidden: one layout for {effort.seeds} threats"
 
 
 def visible_title(effort: Effort) -> str:
-    """Return what the visible task is."""
+    """Return the title of the visible task."""
     return (
         f"charge visible: a layout for each of {effort.charges} charges, "
         f"{effort.realisations} blasts each"
@@ -256,12 +256,12 @@ def visible_title(effort: Effort) -> str:
 
 
 def picture_path(folder: Path, name: str) -> Path:
-    """Return where the picture of a scenario is."""
+    """Return the path of a scenario's picture."""
     return folder / f"scenario_{name}.png"
 
 
 def origin(study: DifficultyStudy) -> str:
-    """Return what the figures were made with; the hash tells when they are out of date."""
+    """Return the origin of the figures; a changed hash shows that they are out of date."""
     scenario, evaluator = study.evaluator.scenario, study.evaluator
     return (
         f"Preset `{scenario.simulation.preset}`, calibration `{evaluator.calibration_name}`, "
@@ -300,7 +300,7 @@ def print_table(title: str, headers: Sequence[str], rows: Sequence[Sequence[str]
 
 
 def print_verdict(criteria: Sequence[Criterion]) -> None:
-    """Print what the scenario has of what it must have."""
+    """Print each criterion with its finding, and the verdict."""
     for criterion in criteria:
         sign = "met    " if criterion.met else "NOT MET"
         print_line(f"{sign} {criterion.text}: {criterion.finding}")
@@ -338,12 +338,12 @@ def markdown_verdict(criteria: Sequence[Criterion]) -> str:
 
 
 def tables_path(folder: Path, name: str) -> Path:
-    """Return where the tables of a scenario are."""
+    """Return the path of a scenario's tables."""
     return folder / f"scenario_{name}.txt"
 
 
 def write_tables(folder: Path, name: str, text: str) -> Path:
-    """Write the tables of a scenario for the page, and return where."""
+    """Write the tables of a scenario for the page; return the path."""
     path = tables_path(folder, name)
     with write_atomically(path) as temporary:
         temporary.write_text(f"{text}\n", encoding="utf-8")

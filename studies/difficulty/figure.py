@@ -1,6 +1,6 @@
 """The picture of a scenario: site, threats and conditions, loads without and with a barrier.
 
-For a zone with a catalogue the plan of the best layout, and the reductions of all beside it.
+For a zone with a catalogue: the plan of the best layout, beside a chart of all reductions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -76,12 +76,12 @@ _PERCENT: Final = 100.0
 def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
     """Return two plans of the site: no barrier, and a layout.
 
-    Both show where charges may be, where modules may stand and at what cost, and the mean load on
-    every module of the protected structures.
+    Both show the places of the charges, the cells for modules by cost, and the mean load on every
+    module of the protected structures.
 
     Args:
-        evaluation: The layout against no barrier.
-        name: What the layout is, for the title.
+        evaluation: Evaluation of the layout against no barrier.
+        name: Description of the layout for the title.
     """
     scenario, count = evaluation.scenario, len(evaluation.layout)
     height_in = _PLAN_WIDTH_IN * scenario.site.height_m / scenario.site.width_m + _EXTRA_HEIGHT_IN
@@ -104,14 +104,14 @@ def difficulty_figure(evaluation: LayoutEvaluation, name: str) -> Figure:
         f"{evaluation.engine.name}",
     )
     for axes, layout in zip(plans, ((), evaluation.layout), strict=True):
-        # The others have names that say little and would cover much.
+        # The other names carry little information and would cover much.
         features = without(site_features(scenario, layout), Kinds.STRUCTURE, Kinds.CHARGE_PLACE)
         write_names(axes, features, inside=False)
     return figure
 
 
 def _draw_plans(plans: Sequence[Axes], evaluation: LayoutEvaluation) -> None:
-    """Draw the site without and with the layout, with the loads on one scale."""
+    """Draw the site without and with the layout, with a shared scale of loads."""
     scenario, modules, threat = evaluation.scenario, evaluation.module_table, evaluation.threats[0]
     columns = ["unprotected_impulse_sim", "impulse_sim"]
     protected = [structure.name for structure in scenario.structures if structure.protected]
@@ -158,7 +158,7 @@ def _draw_plan(
 
 
 def _draw_cells(axes: Axes, scenario: Scenario, zone: BuildZone) -> None:
-    """Colour the cells that may take a module, those that cost more in another colour."""
+    """Colour the free cells; those at a higher cost have a different colour."""
     placement = Placement.empty(scenario)
     dear = placement.module_costs > zone.module_cost
     kinds = np.ma.masked_array(dear.astype(float), mask=~placement.free)
@@ -177,13 +177,13 @@ def _draw_cells(axes: Axes, scenario: Scenario, zone: BuildZone) -> None:
 
 
 def _conditions(scenario: Scenario) -> tuple[Feature, ...]:
-    """Return the zone and its conditions; what cells cost is drawn cell by cell."""
+    """Return the zone and its conditions, without cost areas, which are drawn by cell."""
     features = without(site_features(scenario), Kinds.SITE, Kinds.COST_AREA, *STANDING)
     return without(features, Kinds.CHARGE_PLACE)
 
 
 def _draw_source(axes: Axes, source: AnySource, share: float) -> None:
-    """Draw where a charge may be, with its mass and how likely it is."""
+    """Draw the possible places of a charge, with its mass and probability."""
     colour = unit_interval(EXPLOSIVE)
     if isinstance(source, RectangleSource):
         patch = rectangle_patch(source.rectangle_m)
@@ -209,7 +209,7 @@ def _draw_source(axes: Axes, source: AnySource, share: float) -> None:
 def _write_source(
     axes: Axes, source: AnySource, middle_m: tuple[float, float], share: float
 ) -> None:
-    """Write the mass of a charge and how likely it is: into an area, or beside a line or point."""
+    """Write the mass and probability of a charge into an area, or beside a line or point."""
     if isinstance(source, RectangleSource):
         offset_pt, turn, across, along = (0.0, 0.0), 0.0, "center", "center"
     elif source.lines_m[0][0][0] == source.lines_m[0][1][0] != source.lines_m[0][0][1]:
@@ -232,7 +232,7 @@ def _write_source(
 
 
 def _legend(scenario: Scenario) -> list[Artist]:
-    """Return the legend entries for what the scenario has."""
+    """Return the legend entries for the features of the scenario."""
     zone = scenario.build_zone
     charge = (*unit_interval(EXPLOSIVE), 0.6)
     handles: list[Artist] = [
@@ -258,7 +258,7 @@ def _legend(scenario: Scenario) -> list[Artist]:
 
 
 def _free_label(zone: BuildZone) -> str:
-    """Return what the legend says about cells that may take a module."""
+    """Return the legend's label of the free cells."""
     words = f"free cell, stock of {zone.stock}"
     if zone.cost_areas:
         words += f", cost {zone.module_cost:g}"
@@ -272,7 +272,7 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-# Okabe and Ito's colours: they can be told apart with any colour vision.
+# Okabe and Ito's colours, distinguishable with any colour vision.
 _COLOURS: Final[Mapping[Purchase | None, str]] = {
     Purchase.HEIGHT: "#D55E00",
     Purchase.LENGTH: "#0072B2",
@@ -291,7 +291,7 @@ _ROW_IN: Final = 0.36
 
 
 def items_figure(result: ItemResult) -> Figure:
-    """Return the plan of the best layout, and beside it the reductions of all that was compared."""
+    """Return the plan of the best layout, beside a chart of the reductions of all layouts."""
     scenario, best = result.scenario, result.best
     site, rows = scenario.site, len(result.task.rules) + 3
     plan_in = _PLAN_SHARE * _WIDTH_IN * site.height_m / site.width_m
@@ -314,7 +314,7 @@ def items_figure(result: ItemResult) -> Figure:
 
 
 def _draw_item_plan(axes: Axes, result: ItemResult) -> Sequence[Feature]:
-    """Draw the best layout and every place of the charge; return what was drawn."""
+    """Draw the best layout and every place of the charge; return the features drawn."""
     scenario, layout = result.scenario, result.best.layouts[0]
     places = [place.charge_against(scenario, layout) for place in result.places]
     features = (
@@ -335,7 +335,7 @@ def _draw_item_plan(axes: Axes, result: ItemResult) -> Sequence[Feature]:
 
 
 def _draw_reductions(axes: Axes, result: ItemResult) -> None:
-    """Draw a row for each rule, for random layouts and for the search, the best rule on top."""
+    """Draw rows for no barrier, random layouts, the rules by reduction, and the search on top."""
     task = result.task
     pairs = sorted(
         zip(task.rules, result.buys, strict=True), key=lambda pair: pair[0].reduction.value

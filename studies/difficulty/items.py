@@ -1,8 +1,8 @@
-"""What rules, random layouts and a search take off the impulse where items are placed, by gas.
+"""Reduction of the impulse by rules, random layouts and a search, with items, by gas dynamics.
 
-The places of the charge are known, it is not known which of them it will be: one layout meets all
-of them. Gas dynamics has no noise, so a layout needs one blast a place. Beside that every place has
-a search of its own, which tells what a layout for one place is worth at another one.
+The places of the charge are known, but not which of them it takes: one layout serves for all. Gas
+dynamics is deterministic, so that a layout needs one blast per place. A separate search for every
+place shows the reduction by the layout for one place at the others.
 """
 
 from collections import Counter
@@ -45,16 +45,16 @@ from blast_env.scenario import (
 from studies.difficulty.study import STAND_OFFS, TaskResult, WayOutcome
 
 METHOD: Final = "annealing"
-"""The search; it begins with the best of rules, random layouts and random walls."""
+"""Search method; it begins with the best of rules, random layouts and random walls."""
 
 _BARE: Final = "no barrier"
 _RANDOM: Final = "random layouts (mean)"
 _CACHE_SIZE: Final = 100_000
-_BEST_RANDOM: Final = 3  # random layouts that the search begins with
+_BEST_RANDOM: Final = 3  # best random layouts among the starts of the search
 
 
 class Purchase(Enum):
-    """What a rule spends the budget on first."""
+    """The first use of the budget by a rule."""
 
     HEIGHT = "height"
     LENGTH = "length"
@@ -62,7 +62,7 @@ class Purchase(Enum):
 
 
 class NamedRule(NamedTuple):
-    """A rule with what it buys; `None` where it buys more than one thing."""
+    """A rule with its purchase; `None` for more than one."""
 
     rule: Rule
     buys: Purchase | None
@@ -86,7 +86,7 @@ RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
         "ring around the building": NamedRule(ring_around_building, None),
     }
 )
-"""The rules by hand where items are placed; where a vehicle comes, `POST_RULES` as well."""
+"""Rules for placing items; sites with vehicles have `POST_RULES` as well."""
 
 
 POST_RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
@@ -98,20 +98,20 @@ POST_RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
 
 
 def rules_of(scenario: Scenario) -> Mapping[str, NamedRule]:
-    """Return the rules that can be followed in a scenario."""
+    """Return the rules applicable to a scenario."""
     return {**RULES, **POST_RULES} if scenario.vehicles else RULES
 
 
 @dataclass(frozen=True)
 class ItemEffort:
-    """How many blasts a study may cost.
+    """Limits on the number of blasts of a study.
 
     Attributes:
         layouts: Random layouts.
         budget: Blasts of the search for one layout against all places.
-        tried: Places that this search meets; what it finds is judged at all of them.
-        finalists: Of its best layouts so far, how many of the last are judged.
-        place_budget: Blasts of the search for each place alone.
+        tried: Places used in this search; its finalists are judged at all places.
+        finalists: Number of the search's last improvements that are judged.
+        place_budget: Blasts of the search for each single place.
     """
 
     layouts: int = 50
@@ -121,7 +121,7 @@ class ItemEffort:
     place_budget: int = 100
 
     def blasts(self, scenario: Scenario) -> int:
-        """Return the most blasts that a study of a scenario costs."""
+        """Return the maximum number of blasts of a study of a scenario."""
         places, rules = len(every_place(scenario)), len(rules_of(scenario))
         judged = 1 + self.layouts + rules + self.finalists + places
         return judged * places + self.budget + places * self.place_budget
@@ -131,8 +131,8 @@ def every_place(scenario: Scenario) -> tuple[Threat, ...]:
     """Return one threat for each place of the charge: each point, and each rank of a vehicle.
 
     Raises:
-        BlastEnvError: If the charge may be anywhere on a line or area, or not all places are as
-            likely: the mean over them would not be what the scenario says.
+        BlastEnvError: If the charge may be anywhere on a line or area, or the places are not
+            equally likely: their mean would not be the scenario's expected value.
     """
     charges: list[AnyCharge] = []
     shares = []
@@ -159,17 +159,17 @@ def every_place(scenario: Scenario) -> tuple[Threat, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ItemResult:
-    """What was found in a scenario.
+    """Results of the study of a scenario.
 
     Attributes:
         scenario: The scenario.
-        effort: What it cost at most.
+        effort: Limits on the number of blasts.
         places: The places of the charge.
-        task: The rows of the table: all of them met all places.
-        finalists: What the search thought best, one after the other.
-        of_places: For each place what its own search found.
-        buys: What each rule of the table buys.
-        searched_blasts: Blasts that the search spent.
+        task: The rows of the table, each judged at all places.
+        finalists: Successive best layouts of the search.
+        of_places: Best layouts of the searches for single places.
+        buys: Purchase of each rule of the table.
+        searched_blasts: Blasts used by the search.
     """
 
     scenario: Scenario
@@ -183,16 +183,16 @@ class ItemResult:
 
     @property
     def best(self) -> WayOutcome:
-        """What reduces most of all that was found."""
+        """The layout with the largest reduction, of the rules and the search."""
         return self.task.best
 
     @cached_property
     def over_rules(self) -> float:
-        """By how much the best found reduces more than the best rule, at least 0."""
+        """Lead in reduction of the best found over the best rule, at least 0."""
         return self.best.reduction.value - self.task.best_rule.reduction.value
 
     def rule_loss(self, name: str) -> float | None:
-        """Return by how much a rule falls short of the best found; `None` if it is not there."""
+        """Return the shortfall of a rule against the best found; `None` if the rule is missing."""
         for row in self.task.rules:
             if row.name == name:
                 return self.best.reduction.value - row.reduction.value
@@ -208,7 +208,7 @@ class ItemResult:
     def elsewhere(self) -> FloatArray:
         """Reduction by the best layout for one place at another one (places, places).
 
-        The best layout for a place is the one that reduces most there of all that were judged.
+        The best layout for a place has the largest reduction there of all layouts judged.
         """
         rows = (self.task.random, *self.task.rules, self.finalists, self.of_places)
         impulse = np.concatenate([each.impulse_pa_s for each in rows])
@@ -217,12 +217,12 @@ class ItemResult:
 
     @property
     def loss_elsewhere(self) -> float:
-        """The most by which the best layout for one place falls short at another one."""
+        """Largest shortfall of the best layout for one place at another one."""
         return float((np.diag(self.elsewhere) - self.elsewhere).max())
 
     @cached_property
     def purchases(self) -> Mapping[Purchase, float]:
-        """The reduction of the best rule that buys one thing, by what that is."""
+        """Reduction by the best rule with a single purchase, by purchase."""
         found: dict[Purchase, float] = {}
         for row, buys in zip(self.task.rules, self.buys, strict=True):
             if buys is not None:
@@ -231,17 +231,17 @@ class ItemResult:
 
     @property
     def better_buy(self) -> Purchase:
-        """What the budget is best spent on, if it is on one thing."""
+        """The single purchase with the largest reduction."""
         return max(self.purchases, key=lambda each: self.purchases[each])
 
 
 def cost_of(scenario: Scenario, layout: Layout) -> float:
-    """Return what a layout costs."""
+    """Return the cost of a layout."""
     return Placement.of(scenario, layout).cost
 
 
 def pieces_text(layout: Layout) -> str:
-    """Return how many pieces of which items a layout has, the most frequent first."""
+    """Return the number of pieces of each item in a layout, the most frequent first."""
     counts = Counter(each.item for each in layout if isinstance(each, Piece))
     return ", ".join(f"{count} {item}" for item, count in counts.most_common()) or "-"
 
@@ -251,14 +251,14 @@ class ItemStudy:
 
     Args:
         scenario: The scenario.
-        effort: How much it may cost.
+        effort: Limits on the number of blasts.
         engine: Name of the engine, or an engine.
         processes: Worker processes.
-        progress: Called with the share of the blasts that is done.
-        cache: Folder in which blasts are kept, so that a study goes on where it was interrupted.
+        progress: Called with the finished share of the blasts.
+        cache: Folder of stored blasts, with which an interrupted study continues.
 
     Attributes:
-        evaluator: Runs the blasts and remembers them.
+        evaluator: Runs the blasts and caches them.
         places: The places of the charge.
 
     Raises:
@@ -283,7 +283,7 @@ class ItemStudy:
         self._rules = rules_of(scenario)
 
     def result(self) -> ItemResult:
-        """Return what was found."""
+        """Run the study and return its results."""
         scenario, effort = self._scenario, self._effort
         bare = self._impulses([()])
         check_something_arrives([Case(scenario, self.places)], bare)
@@ -319,9 +319,9 @@ class ItemStudy:
         )
 
     def _searched(self, starts: tuple[Layout, ...]) -> tuple[list[Layout], int]:
-        """Return the last best layouts of the search for all places, and the blasts it spent."""
+        """Return the last improvements of the search for all places, and its number of blasts."""
         effort = self._effort
-        # The first and the last place: those between are known to the judge alone.
+        # Evenly spaced places, the first and last included; the search does not see the others.
         chosen = np.linspace(0, len(self.places) - 1, min(effort.tried, len(self.places)))
         tried = [self.places[round(each)] for each in chosen]
         case = Case(self._scenario, tuple(tried))
@@ -332,7 +332,7 @@ class ItemStudy:
         return history or [result.layout], result.blasts
 
     def _for_place(self, place: Threat) -> Layout:
-        """Return what a search finds that knows the place of the charge."""
+        """Return the best layout of a search for a single place of the charge."""
         scenario = self._scenario
         starts = tuple(each.rule(scenario, place.charge) for each in self._rules.values())
         problem = LayoutProblem(self.evaluator, Case(scenario, (place,)), self._processes)
@@ -349,12 +349,12 @@ class ItemStudy:
         return impulses.reshape(len(layouts), len(self.places))
 
     def _report(self, _: float) -> None:
-        """Report the share of all blasts that is done, whatever share of a batch that is."""
+        """Report the finished share of all blasts, regardless of the share of a batch."""
         if self._progress is not None:
             done = self.evaluator.blasts + self.evaluator.cache_hits
             self._progress(min(done / self._effort.blasts(self._scenario), 1.0))
 
 
 def _distinct(layouts: Sequence[Layout]) -> tuple[Layout, ...]:
-    """Return layouts without those that are there twice or have nothing."""
+    """Return the layouts without duplicates and empty ones."""
     return tuple({tuple(sorted(each)): each for each in layouts if each}.values())

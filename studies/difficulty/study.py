@@ -1,7 +1,7 @@
-"""What hand-made, random and searched layouts take off the impulse in a scenario.
+"""Reduction of the impulse in a scenario by rule, random and searched layouts.
 
-Two tasks. Where the charge is *hidden*, one layout meets every threat that the scenario draws.
-Where it is *visible*, every charge gets a layout of its own. Layouts are chosen on training seeds
+There are two tasks. With a *hidden* charge, one layout serves for every threat drawn from the
+scenario. With a *visible* charge, every charge has its layout. Layouts are chosen on training seeds
 and compared on held-out seeds, all on the same threats.
 """
 
@@ -30,16 +30,16 @@ from blast_env.statistics import (
 
 @dataclass(frozen=True, eq=False)
 class WayOutcome:
-    """What one way to place a barrier leaves of the impulse.
+    """Impulse with the layouts of one way to place a barrier.
 
     Impulses are those of `BlastLoads.protected_impulse_pa_s`. In the visible task a threat is a
     charge, with the mean over its realisations.
 
     Attributes:
         name: The way, in words.
-        layouts: What was built: one layout for all threats, one for each, or random ones.
-        impulse_pa_s: Impulse of layouts that each meet all threats (layouts, threats); a single row
-            where every threat has a layout of its own.
+        layouts: The layouts: one for all threats, one for each, or random ones.
+        impulse_pa_s: Impulse of each layout for all threats (layouts, threats); a single row if
+            every threat has its layout (1, threats).
         unprotected_pa_s: Impulse without a barrier (threats,).
     """
 
@@ -88,7 +88,7 @@ class WayOutcome:
         return float(np.mean(tails))
 
     def better_by(self, other: "WayOutcome") -> Estimate:
-        """Return by how much more than another one this reduces, on the same threats."""
+        """Return the difference of the reductions, this one less the other, on the same threats."""
         gained = other.impulse_pa_s.mean(axis=0) - self.impulse_pa_s.mean(axis=0)
         return reduction_estimate(self.unprotected_pa_s - gained, self.unprotected_pa_s)
 
@@ -99,9 +99,9 @@ class TaskResult:
 
     Attributes:
         bare: Without a barrier.
-        random: Random layouts, as they come.
-        rules: Layouts by hand; without a catalogue the wall at `STAND_OFFS`.
-        searched: The best that was searched.
+        random: Random layouts, unselected.
+        rules: Layouts by rules; without a catalogue, walls at `STAND_OFFS`.
+        searched: The best layouts of the search.
     """
 
     bare: WayOutcome
@@ -111,22 +111,22 @@ class TaskResult:
 
     @property
     def rows(self) -> tuple[WayOutcome, ...]:
-        """All of them in the order of the table."""
+        """All outcomes in the order of the table."""
         return (self.bare, self.random, *self.rules, self.searched)
 
     @property
     def best_rule(self) -> WayOutcome:
-        """The best of the layouts by hand."""
+        """The rule with the largest reduction."""
         return max(self.rules, key=lambda outcome: outcome.reduction.value)
 
     @property
     def best(self) -> WayOutcome:
-        """What reduces most."""
+        """The outcome with the largest reduction, of the rules and the search."""
         return max(self.best_rule, self.searched, key=lambda outcome: outcome.reduction.value)
 
 
 STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
-"""Shares of the way through the build zone at which the hand-made walls stand."""
+"""Positions of the rules' walls as shares of the way through the build zone."""
 
 _BARE: Final = "no barrier"
 _RANDOM: Final = "random layouts (mean)"
@@ -134,18 +134,18 @@ _RANDOM: Final = "random layouts (mean)"
 
 @dataclass(frozen=True)
 class Effort:
-    """How many blasts a study may cost.
+    """Settings that determine the number of blasts of a study.
 
     Attributes:
-        layouts: Random layouts of which the best is searched.
+        layouts: Random layouts among which the search selects.
         seeds: Held-out threats of the hidden task.
-        charges: Charges of the visible task; the first round of both searches has them as well.
+        charges: Charges of the visible task, used in the first round of both searches.
         realisations: Held-out seeds of fan and air for each charge of the visible task.
-        finalists: Layouts that reach the second round of a search.
+        finalists: Layouts in the second round of a search.
         hidden_round: Training threats of that round in the hidden task.
-        visible_round: Training seeds a charge of that round in the visible task.
-        random_hidden: Random layouts that are compared as they are, in the hidden task.
-        random_visible: Likewise in the visible task.
+        visible_round: Training seeds per charge of that round in the visible task.
+        random_hidden: Unselected random layouts compared in the hidden task.
+        random_visible: Unselected random layouts compared in the visible task.
     """
 
     layouts: int = 500
@@ -160,7 +160,7 @@ class Effort:
 
     @property
     def blasts(self) -> int:
-        """How many blasts a study costs, unless some ways give the same layout."""
+        """Number of blasts of a study; fewer if some ways give the same layout."""
         others = 2 + len(STAND_OFFS)  # no barrier, the walls, the best
         return (
             self.charges * self.layouts
@@ -174,15 +174,15 @@ class DifficultyStudy:
     """Runs the blasts of both tasks in a scenario.
 
     Args:
-        scenario: The scenario; it has a build zone and names a calibration.
-        effort: How much it may cost.
+        scenario: The scenario, with a build zone and a calibration.
+        effort: Settings that determine the number of blasts.
         engine: Name of an engine.
         processes: Worker processes.
-        progress: Called with the share of the blasts that is done.
+        progress: Called with the finished share of the blasts.
 
     Attributes:
-        evaluator: Runs the blasts and remembers them.
-        held_out: The threats that layouts are compared on in the hidden task.
+        evaluator: Runs the blasts and caches them.
+        held_out: Threats for the comparison of layouts in the hidden task.
     """
 
     def __init__(
@@ -204,7 +204,7 @@ class DifficultyStudy:
         self._tried = draw_threats(scenario, SeedRange.SEARCH.seeds(0, effort.charges))
 
     def hidden(self) -> TaskResult:
-        """Return the outcomes where one layout has to do for all threats."""
+        """Return the outcomes with one layout for all threats."""
         effort, scenario = self._effort, self._scenario
         more = draw_threats(scenario, SeedRange.SEARCH.seeds(effort.charges, effort.hidden_round))
         searched = self._best_of_pool(self._first_round, more)
@@ -226,7 +226,7 @@ class DifficultyStudy:
         )
 
     def visible(self) -> TaskResult:
-        """Return the outcomes where every charge has a layout of its own."""
+        """Return the outcomes with one layout per charge."""
         effort, scenario = self._effort, self._scenario
         charges = [threat.charge for threat in self._tried]
         bare = np.stack([self._on_charge([()], charge)[0] for charge in charges])
@@ -267,11 +267,11 @@ class DifficultyStudy:
         return tuple(Threat(charge, seed) for seed in seeds)
 
     def _best_of_pool(self, first: FloatArray, more: Sequence[Threat]) -> Layout:
-        """Return the random layout that does best in two rounds on training threats.
+        """Return the random layout with the least impulse in two rounds on training threats.
 
         Args:
             first: Impulses of the first round (layouts, threats).
-            more: The threats of the second round, which only the best ones reach.
+            more: Threats of the second round, for the finalists only.
         """
         order = np.argsort(first.mean(axis=1), kind="stable")[: self._effort.finalists]
         second = self._impulses([self._pool[index] for index in order], more)
@@ -294,6 +294,6 @@ class DifficultyStudy:
         return impulses.reshape(len(layouts), len(threats))
 
     def _report(self, _: float) -> None:
-        """Report the share of all blasts that is done, whatever share of a batch that is."""
+        """Report the finished share of all blasts, regardless of the share of a batch."""
         if self._progress is not None:
             self._progress(self.evaluator.blasts / self._effort.blasts)

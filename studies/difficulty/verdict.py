@@ -1,4 +1,4 @@
-"""Whether scenarios are worth solving: whether it matters where what stands."""
+"""Criteria for scenarios worth solving: the choice of layout must matter."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from studies.difficulty.study import TaskResult, WayOutcome
 from studies.noise import Noise
 
 LEAST_REDUCTION, MOST_REDUCTION = 0.15, 0.85
-"""Between these the best layout does something and leaves something to do."""
+"""Bounds of the best reduction: it must be noticeable, and leave room for improvement."""
 LEAST_GAIN: Final = 0.10
-"""What the best layout takes off beyond a random one, as a share of the impulse."""
+"""Lead in reduction of the best layout over random ones, as a share of the impulse."""
 THREATS: Final = 16
 """Threats over which the environment averages where the charge is hidden."""
 LEAST_SIGNAL: Final = 2.0
-"""Spread between random layouts over the scatter of their comparison on `THREATS` threats."""
+"""Ratio of the spread between random layouts to the scatter of their comparison on `THREATS`."""
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """One thing that a scenario must have.
+    """A requirement of a scenario.
 
     Attributes:
-        text: What.
-        finding: What it has.
-        met: Whether that is enough.
+        text: The requirement.
+        finding: The value found.
+        met: Whether the value satisfies the requirement.
     """
 
     text: str
@@ -35,11 +35,11 @@ class Criterion:
 
 
 def difficulty_criteria(hidden: TaskResult, visible: TaskResult) -> tuple[Criterion, ...]:
-    """Return what a scenario must have, and whether it has it.
+    """Return the criteria of a scenario without a catalogue.
 
     Args:
-        hidden: Where one layout has to do for all threats.
-        visible: Where every charge has a layout of its own.
+        hidden: Outcomes with one layout for all threats.
+        visible: Outcomes with one layout per charge.
     """
     tasks = (hidden, visible)
     best = [result.best.reduction.value for result in tasks]
@@ -96,21 +96,21 @@ def _in_tasks(findings: Iterable[str]) -> str:
 
 
 LEAST_WORTH: Final = 0.35
-"""What the best layout of items takes off at least."""
+"""Least reduction by the best layout of items."""
 LEAST_ITEM_GAIN: Final = 0.15
-"""What it takes off beyond a random one."""
+"""Least lead of that reduction over the mean of random layouts."""
 LEAST_SPREAD: Final = 0.10
-"""From the 10th to the 90th percentile of random layouts of items."""
+"""Least difference of the 90th and 10th percentiles of the reduction by random layouts."""
 RULE_LOSS: Final = 0.05
-"""By how much every rule falls short somewhere."""
+"""Least shortfall against the best found that every rule has in some scenario."""
 LEAST_OVER_RULES: Final = 0.03
-"""By how much the best found exceeds every rule in some scenarios."""
+"""Least lead of the best found over every rule, in some scenarios."""
 ELSEWHERE_LOSS: Final = 0.05
-"""By how much the best layout for one place falls short at another one in some scenarios."""
+"""Least shortfall of the best layout for one place at another one, in some scenarios."""
 
 
 def item_criteria(result: ItemResult) -> tuple[Criterion, ...]:
-    """Return what a scenario with a catalogue must have by itself, and whether it has it."""
+    """Return the criteria of a single scenario with a catalogue."""
     best, random = result.best.reduction.value, result.task.random.reduction.value
     low, high = result.random_percentiles
     return (
@@ -134,7 +134,7 @@ def item_criteria(result: ItemResult) -> tuple[Criterion, ...]:
 
 
 def joint_criteria(results: Sequence[ItemResult]) -> tuple[Criterion, ...]:
-    """Return what the scenarios with a catalogue must have together, and whether they have it."""
+    """Return the joint criteria of the scenarios with a catalogue."""
     losses = {
         name: max(
             (loss, result.scenario.name)

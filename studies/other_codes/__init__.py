@@ -1,1 +1,1 @@
-"""The gas engine against other codes on the same scene."""
+"""Comparisons of the gas engine with other codes on the same scene."""

@@ -1,4 +1,4 @@
-"""The gas solver beside other codes, same cells, same state: docs/engineers/gas.md."""
+"""Compare the gas solver with other codes from the same cells and state: docs/engineers/gas.md."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,10 +26,10 @@ def compare_openfoam(
     until: Annotated[float, typer.Option(help="Simulated time to end at, s.")] = 0.06,
     out: Path = Path("out/gas_openfoam.png"),
 ) -> None:
-    """Hold a wall of finite height before a building against rhoCentralFoam.
+    """Compare with rhoCentralFoam: a wall of finite height before a building.
 
-    Needs OpenFOAM's programs (Debian: `apt install openfoam`). Cells of 0.25 m take it some
-    minutes.
+    Needs OpenFOAM's programs (Debian: `apt install openfoam`). OpenFOAM takes some minutes with
+    cells of 0.25 m.
     """
     with user_errors():
         make_folder(out.parent)
@@ -50,7 +50,7 @@ def compare_pyclaw(
     until: Annotated[float, typer.Option(help="Simulated time to end at, s.")] = 0.06,
     out: Path = Path("out/gas_pyclaw.png"),
 ) -> None:
-    """Hold a plane scene with a wall and a building against PyClaw's Euler equations with walls."""
+    """Compare with PyClaw's Euler equations with walls: a plane scene, a wall and a building."""
     names = tuple(pyclaw.GAUGES_M)
     with user_errors():
         make_folder(out.parent)
@@ -65,7 +65,7 @@ def compare_pyclaw(
 def _print(
     names: Sequence[str], cell_m: float, own: Histories, other: tuple[str, Histories]
 ) -> None:
-    """Print peaks and impulses of both codes, and what a cell update cost each."""
+    """Print the peaks, impulses and rates of cell updates of both codes."""
     code, found = other
     rows = [
         (

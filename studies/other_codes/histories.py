@@ -1,4 +1,4 @@
-"""Overpressures over time that two codes computed at the same places, side by side."""
+"""Overpressure histories of two codes at the same places, side by side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _KPA = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Histories:
-    """Overpressures that a code computed.
+    """Overpressures computed by a code.
 
     Attributes:
         time_s: Times (steps,).
@@ -49,14 +49,14 @@ class Histories:
 def histories_figure(
     title: str, names: Sequence[str], codes: Sequence[tuple[str, Histories]]
 ) -> "Figure":
-    """Draw the histories of all codes over each other, a panel for each place.
+    """Draw the histories of all codes over each other, one panel per place.
 
     Args:
-        title: Above all.
-        names: Of the places.
+        title: Title of the figure.
+        names: Names of the places.
         codes: Name and histories of each code; the histories have the places as columns.
     """
-    # Here, because pictures need the extra `render`, and whoever imports the codes draws none.
+    # Imported here, because it needs the extra `render`, and running the codes does not.
     with import_extra("render", "pictures"):
         import matplotlib.pyplot as plt
     rows = -(-len(names) // _COLUMNS)

@@ -1,9 +1,9 @@
 """The gas solver against rhoCentralFoam of OpenFOAM, on one scene with a barrier of finite height.
 
-Both codes get the same cells, the same gas (gamma 1.4, no burning) and the same state to begin
-with, and record the overpressure in the same cells. What differs is the scheme: MUSCL-Hancock with
-HLLC here, central-upwind fluxes of Kurganov and Tadmor there. OpenFOAM is called as a program
-(Debian's package `openfoam`); nothing of it is part of this project.
+Both codes have the same cells, the same gas (gamma 1.4, no burning) and the same initial state,
+and record the overpressure in the same cells. Only the scheme differs: MUSCL-Hancock with HLLC
+here, central-upwind fluxes of Kurganov and Tadmor there. OpenFOAM runs as a separate program
+(Debian's package `openfoam`); it is not part of this project.
 """
 
 import os
@@ -32,10 +32,10 @@ from studies.other_codes.histories import Histories
 
 PROGRAMS: Final = ("blockMesh", "topoSet", "subsetMesh", "rhoCentralFoam")
 BALLOON: Final = Explosive(1630.0, 4.52e6, 0.0, 1.0, 2.0)
-"""A charge that any code can do: its energy at once, nothing burns afterwards."""
+"""A charge that every code can model: all its energy at once, no afterburning."""
 
 _GAS_CONSTANT: Final = 287.0  # J/(kg K); only turns density into OpenFOAM's temperature
-_MOST_COURANT: Final = 0.2  # what rhoCentralFoam's tutorials take
+_MOST_COURANT: Final = 0.2  # as in rhoCentralFoam's tutorials
 _SIZE_M: Final = (20.0, 16.0, 8.0)
 _CHARGE_KG: Final = 20.0
 _CHARGE_M: Final = (4.0, 8.0, 0.0)
@@ -59,12 +59,12 @@ FACADE: Final = "facade, mean"
 
 @dataclass(frozen=True, eq=False)
 class WallScene:
-    """A charge, a wall of finite height and a building, as cells.
+    """A wall of finite height and a building as cells, with gauges.
 
     Attributes:
         grid: The grid.
         names: Names of the gauges; the last one is the mean over the facade.
-        gauges: Their cells, and those before the facade (n, 3).
+        gauges: Cells of all gauges but the last, then those before the facade (n, 3).
     """
 
     grid: GasGrid
@@ -72,14 +72,14 @@ class WallScene:
     gauges: NDArray[np.int64]
 
     def named(self, overpressure_pa: FloatArray) -> FloatArray:
-        """Return overpressures of all cells (steps, n) as those of the names (steps, names)."""
+        """Reduce the overpressures of the cells (steps, n) to the names (steps, names)."""
         own = len(self.names) - 1
         mean = overpressure_pa[:, own:].mean(axis=1, keepdims=True)
         return np.concatenate((overpressure_pa[:, :own], mean), axis=1)
 
 
 def scene(cell_m: float) -> WallScene:
-    """Return the scene with cells of a size.
+    """Return the scene on cells of a given side.
 
     Raises:
         BlastEnvError: If 0.5 m is not a whole number of cells.
@@ -104,7 +104,7 @@ def scene(cell_m: float) -> WallScene:
 
 
 def started(scene: WallScene, gauges: Gauges) -> GasSolver:
-    """Return our solver with the charge laid onto the grid, its front at the wall."""
+    """Return the project's solver with the charge set on the grid, its front at the wall."""
     charge = GasCharge(_CHARGE_KG, _CHARGE_M, BALLOON)
     solver = GasSolver(
         scene.grid, recorders=[gauges], with_fuel=True, burning=charge.burning, threads=1
@@ -114,7 +114,7 @@ def started(scene: WallScene, gauges: Gauges) -> GasSolver:
 
 
 def ours(scene: WallScene, until_s: float) -> Histories:
-    """Run the scene with the project's own solver."""
+    """Run the scene with the project's solver."""
     gauges = Gauges(scene.grid, scene.gauges)
     solver = started(scene, gauges)
     begin = process_time()
@@ -126,12 +126,12 @@ def ours(scene: WallScene, until_s: float) -> Histories:
 
 
 def rho_central_foam(scene: WallScene, until_s: float, folder: Path) -> Histories:
-    """Write the case into a folder, run it with OpenFOAM, and read what it recorded.
+    """Write the case into a folder, run it with OpenFOAM, and read its records.
 
     Args:
         scene: The scene.
         until_s: Simulated time to end at.
-        folder: Where the case goes; must be empty or new.
+        folder: Folder of the case; must be empty or new.
 
     Raises:
         BlastEnvError: If OpenFOAM is not installed, the folder is not empty, or a program fails.
@@ -163,7 +163,7 @@ def rho_central_foam(scene: WallScene, until_s: float, folder: Path) -> Historie
 
 
 def _run(command: tuple[str, ...], folder: Path) -> str:
-    # Debian's programs do not find their own settings unless told; other installations say it.
+    # Debian's programs need the path of their settings; other installations set the variable.
     settings = {"WM_PROJECT_DIR": "/usr/share/openfoam"} | os.environ
     done = subprocess.run(
         command, cwd=folder, env=settings, capture_output=True, text=True, check=False
@@ -178,7 +178,7 @@ def _run(command: tuple[str, ...], folder: Path) -> str:
 
 
 def _write_case(scene: WallScene, solver: GasSolver, until_s: float, folder: Path) -> None:
-    """Write everything but the fields, which need the mesh without the solids."""
+    """Write the case without the fields, which need the mesh without the solids."""
     for name in ("system", "constant", "0"):
         make_folder(folder / name)
     centres_m = scene.grid.cell_m * (scene.gauges + 0.5)

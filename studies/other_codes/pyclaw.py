@@ -1,9 +1,9 @@
 """The gas solver against PyClaw's Euler equations with walls, on one plane scene.
 
-A cylinder of hot compressed air bursts beside a wall and a building, both endlessly high. The same
-cells and the same state to begin with; the schemes differ: HLLC and MUSCL-Hancock here, HLLE and
-limited waves, split by dimension, there. PyClaw runs in an interpreter of its own, so that what it
-needs does not mix with what this project needs.
+A cylinder of compressed air bursts beside a wall and a building, both infinitely high. The cells
+and the initial state are the same; the schemes differ: HLLC and MUSCL-Hancock here, HLLE and
+limited waves, split by dimension, there. PyClaw runs in a separate interpreter, to keep its
+dependencies apart from this project's.
 """
 
 import subprocess
@@ -37,12 +37,12 @@ _SOLIDS_M: Final = (((7.0, 4.0), (7.5, 12.0)), ((12.5, 6.0), (14.5, 10.0)))
 _CENTRE_M: Final = (4.0, 8.0)
 _RADIUS_M: Final = 0.8
 _RATIO: Final = 10.0
-"""Of the pressure in the cylinder to that of still air, and of the densities."""
+"""Ratio of the pressure in the cylinder to that of still air; the same for the densities."""
 _WORKER: Final = Path(__file__).with_name("pyclaw_worker.py")
 
 
 def plane_grid(cell_m: float) -> GasGrid:
-    """Return the scene as one layer of cells between two mirrors.
+    """Return the scene as one layer of cells between two mirror planes.
 
     Raises:
         BlastEnvError: If 0.5 m is not a whole number of cells.
@@ -59,7 +59,7 @@ def plane_grid(cell_m: float) -> GasGrid:
 
 
 def _started(grid: GasGrid, gauges: Gauges) -> GasSolver:
-    """Return our solver with the cylinder in it; its edge is smooth, so that cells resolve it."""
+    """Return the project's solver with the cylinder; its smooth edge is resolved by the cells."""
     x_m, y_m = grid.centres_m(0)[:, None, None], grid.centres_m(1)[None, :, None]
     away = np.hypot(x_m - _CENTRE_M[0], y_m - _CENTRE_M[1]) / _RADIUS_M
     ratio = 1.0 + (_RATIO - 1.0) * np.exp(-(away**4))
@@ -74,7 +74,7 @@ def _gauges(grid: GasGrid) -> Gauges:
 
 
 def ours(cell_m: float, until_s: float) -> Histories:
-    """Run the scene with the project's own solver; one layer of cells uses it at its worst."""
+    """Run the scene with the project's solver, for which one layer is the least efficient grid."""
     gauges = _gauges(plane_grid(cell_m))
     solver = _started(plane_grid(cell_m), gauges)
     begin = process_time()
@@ -92,7 +92,7 @@ def by_pyclaw(cell_m: float, until_s: float, python: Path) -> Histories:
         python: An interpreter with clawpack.
 
     Raises:
-        BlastEnvError: If it cannot be run, or fails.
+        BlastEnvError: If the interpreter cannot be run, or fails.
     """
     grid = plane_grid(cell_m)
     gauges = _gauges(grid)

@@ -1,7 +1,7 @@
-"""Runs one scene with PyClaw; for an interpreter that has clawpack and nothing of this project.
+"""Run one scene with PyClaw, in an interpreter with clawpack and without this project.
 
 `python pyclaw_worker.py IN.npz OUT.npz`: IN holds `state` (4, nx, ny) of density, momenta and
-energy in units of still air, `air` (nx, ny), `cell_m`, `gauges` (n, 2) and `until`; OUT gets
+energy in units of still air, `air` (nx, ny), `cell_m`, `gauges` (n, 2) and `until`; OUT holds
 `times` (steps,), `overpressure` (steps, n) over still air's pressure, and `cpu_s`.
 """
 
@@ -37,7 +37,7 @@ def _run(
     field.q[:], field.aux[0] = state, air
     solution = pyclaw.Solution(field, domain)
     solver.setup(solution)
-    # What is in the walls must not matter, but PyClaw moves it on as well, until it is no gas.
+    # PyClaw also advances the state inside the walls, which would become unphysical; reset it.
     solid = ~air
     still = np.array([1.0, 0.0, 0.0, 1.0 / (GAMMA - 1.0)])
 
