@@ -12,7 +12,7 @@ __all__ = ["FittedBuilding", "ImportOptions", "ImportedSite", "import_site"]
 
 
 def __getattr__(name: str) -> object:
-    """Import what needs the extra `maps` when it is asked for: the options need no extra."""
+    """Import the names that need the extra `maps` on first use; the options need no extra."""
     if name in ("ImportedSite", "import_site"):
         from blast_env.importing import convert
 

@@ -1,4 +1,4 @@
-"""Outlines as cells of the grid of modules, and cells as few rectangles."""
+"""Conversion of outlines to cells of the module grid, and of cells to few rectangles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,25 +17,25 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 LEAST_SHARE: Final = 0.5
-"""Share of a cell that must be covered for it to be a module."""
+"""Least covered share of a cell that becomes a module."""
 
 COARSER: Final = (1, 2, 3, 4, 6, 8)
-"""Sides of the blocks that an outline is cut into, in modules; the first that will do is taken."""
+"""Candidate sides of the blocks of an outline, in modules; the first within the limits is used."""
 
 MOST_CROSSED: Final = 2_000_000
-"""Cells that outlines together may run through: 1,000 km of walls."""
+"""Most cells along all outlines together: 1,000 km of walls."""
 
 MOST_COVERED: Final = 64_000_000
-"""Cells that the rectangles around outlines may have together: four sites of the largest size."""
+"""Most cells in the bounding boxes of all outlines together: four sites of the largest size."""
 
 MOST_CROSSINGS: Final = 1000
-"""How often an outline that is to be put right may cross itself."""
+"""Most self-intersections of an outline that can be repaired."""
 
 _SHARE_STEPS: Final = 2.0**20  # so that equal shares are equal, and 32 bits hold them
 _ROUNDING: Final = 1e-9
 _BAND_CELLS: Final = 2**20
 _PAIRS: Final = 2**21
-_LINE_STEP_M: Final = 0.1  # of outlines: how densely their distances are measured
+_LINE_STEP_M: Final = 0.1  # sampling step for distances between outlines
 _LINE_POINTS: Final = 50_000
 Shares = NDArray[np.float32]
 
@@ -47,8 +47,8 @@ class CellRectangle:
     Attributes:
         row: Lowest row.
         column: Leftmost column.
-        rows: How many rows.
-        columns: How many columns.
+        rows: Number of rows.
+        columns: Number of columns.
     """
 
     row: int
@@ -63,7 +63,7 @@ class CellRectangle:
 
     @property
     def cells(self) -> tuple[slice, slice]:
-        """What of a grid it covers."""
+        """Slices of rows and columns of the rectangle in a grid."""
         return (
             slice(self.row, self.row + self.rows),
             slice(self.column, self.column + self.columns),
@@ -78,14 +78,14 @@ class CellRectangle:
 
 
 def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
-    """Refuse outlines that take too long to be cut into cells, before anything is cut.
+    """Refuse outlines that would take too long to convert to cells.
 
     Args:
-        outlines: In metres, sound, on the site.
-        what: What they are, for the error.
+        outlines: Valid outlines on the site, m.
+        what: Description of the outlines, for the error.
 
     Raises:
-        BlastEnvError: If they are too long, or lie over each other too often.
+        BlastEnvError: If they are too long, or their bounding boxes have too many cells.
     """
     starts, ends = _edges(outlines)
     crossed = float(np.abs(ends - starts).sum()) / MODULE_SIDE_M
@@ -104,14 +104,14 @@ def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
 
 
 def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
-    """Return an outline, or several, that does not cross itself.
+    """Return an outline without self-intersections, possibly in several parts.
 
     Args:
         outline: Any outline.
-        what: What it is, for the error.
+        what: Description of the outline, for the error.
 
     Raises:
-        BlastEnvError: If it crosses itself too often.
+        BlastEnvError: If it crosses itself more than `MOST_CROSSINGS` times.
     """
     if shapely.is_valid(outline):
         return outline
@@ -124,14 +124,14 @@ def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
 
 
 def _crosses_often(outline: BaseGeometry) -> bool:
-    """Whether an outline crosses itself too often, found without all of its crossings."""
+    """Return whether an outline crosses itself too often, without finding all crossings."""
     walls = _walls(outline)
     tree = shapely.STRtree(walls)
     step = max(_PAIRS // max(len(walls), 1), 1)
     pairs = 0
     for first in range(0, len(walls), step):
         some = walls[first : first + step]
-        # Each wall meets itself, and its neighbours at both ends.
+        # Each wall intersects itself and its neighbours at both ends.
         pairs += tree.query(some, "intersects").shape[1] - 3 * len(some)
         if pairs > 2 * MOST_CROSSINGS:
             return True
@@ -154,13 +154,13 @@ def _edges(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
 def covered_shares(
     outline: BaseGeometry, shape: tuple[int, int]
 ) -> tuple[tuple[slice, slice], Shares]:
-    """Return which part of each cell an outline covers.
+    """Return the share of each cell that an outline covers.
 
-    Every edge adds to each row the height that it climbs there, from its place to the right; what
-    both sides of an outline add up to is the area between them.
+    Every edge adds, in each row, its rise to all cells on its right; the signed sum over both
+    sides of an outline is the area between them.
 
     Args:
-        outline: In metres from the grid's lower left corner; it does not cross itself.
+        outline: Outline without self-intersections, m from the grid's lower left corner.
         shape: Rows and columns of the grid.
 
     Returns:
@@ -195,9 +195,9 @@ def _pieces(
     """Return the edges of an outline in pieces, each in one cell of a window.
 
     Returns:
-        The row and the column of each piece in the window, how far it climbs and how far its
-        middle is from the left side of its cell, in cells. What lies to the left of the window
-        climbs at its left side, what lies to the right beside it.
+        Row and column of each piece in the window, its rise, and the distance of its middle from
+        the left side of its cell, in cells. A piece left of the window moves to the window's left
+        side, one to the right moves to its right side.
     """
     parts = shapely.get_parts(outline)
     turned = shapely.normalize(parts[shapely.get_type_id(parts) == 3])  # holes the other way
@@ -224,7 +224,7 @@ def _pieces(
 
 
 def _lines_between(starts: FloatArray, ends: FloatArray, most: int) -> tuple[IntArray, FloatArray]:
-    """Return which edges cross which lines of the grid, from 0 to `most`, along an axis."""
+    """Return pairs of an edge and a grid line that it crosses, 0 to `most`, along an axis."""
     low = np.clip(np.floor(np.minimum(starts, ends)) + 1.0, 0, most + 1).astype(np.int64)
     high = np.clip(np.ceil(np.maximum(starts, ends)), 0, most + 1).astype(np.int64)
     counts = np.maximum(high - low, 0)
@@ -234,10 +234,10 @@ def _lines_between(starts: FloatArray, ends: FloatArray, most: int) -> tuple[Int
 
 
 def owners(outlines: Sequence[BaseGeometry], shape: tuple[int, int]) -> NDArray[np.int32]:
-    """Return which outline each cell belongs to, -1 where there is none (rows, columns).
+    """Return the index of each cell's outline, -1 where there is none (rows, columns).
 
-    A cell is built on if outlines together cover half of it, and belongs to the one that covers
-    most, so that houses wall to wall leave no gap; of equal ones, to the first.
+    A cell is built on if the outlines together cover half of it, so that adjoining houses leave no
+    gap. It belongs to the outline that covers most of it, or the first of equal ones.
     """
     owner = np.full(shape, -1, dtype=np.int32)
     most = np.zeros(shape, dtype=np.float32)
@@ -253,7 +253,7 @@ def owners(outlines: Sequence[BaseGeometry], shape: tuple[int, int]) -> NDArray[
 
 
 def in_blocks(cells: BoolArray, side: int, least: float = LEAST_SHARE) -> BoolArray:
-    """Return cells cut into blocks of side x side cells: whole ones, where this share is there."""
+    """Return cells in whole blocks of side x side: those of which a share `least` is set."""
     if side == 1:
         return cells
     rows, columns = (-(-count // side) * side for count in cells.shape)
@@ -265,13 +265,13 @@ def in_blocks(cells: BoolArray, side: int, least: float = LEAST_SHARE) -> BoolAr
 
 
 def rectangles_of(cells: BoolArray) -> IntArray:
-    """Return few rectangles that together are the cells, none over another.
+    """Return few disjoint rectangles that cover exactly the cells.
 
-    Rows are cut into runs, and equal runs above each other are one rectangle; or columns, where
-    that gives fewer. So every rectangle has two walls that no other one hides.
+    Rows are split into runs, and equal runs above each other form one rectangle; columns instead,
+    if that gives fewer. So two walls of every rectangle are hidden by no other.
 
     Returns:
-        A table (rectangles, 4), see `CellRectangle.each`: there may be very many.
+        A table (rectangles, 4); see `CellRectangle.each`.
     """
     by_rows, by_columns = stacked_runs(cells), stacked_runs(cells.T)
     return by_rows if len(by_rows) <= len(by_columns) else by_columns[:, [1, 0, 3, 2]]
@@ -284,10 +284,10 @@ def outline_of(rectangles: Sequence[CellRectangle]) -> BaseGeometry:
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far modules are from an outline.
+    """Deviation of modules from an outline.
 
     Attributes:
-        area_share: Area that only one of the two covers, as a share of the outline's.
+        area_share: Area of the symmetric difference, as a share of the outline's area.
         outline_m: Hausdorff distance of the two boundaries: the largest distance of a point of
             one to the nearest point of the other.
     """
@@ -297,7 +297,7 @@ class Deviation:
 
     @classmethod
     def between(cls, outline: BaseGeometry, modules: BaseGeometry) -> "Deviation":
-        """Return how far modules are from an outline."""
+        """Return the deviation of modules from an outline."""
         area = shapely.area(shapely.symmetric_difference(outline, modules))
         outline_m = max(_farthest_m(outline, modules), _farthest_m(modules, outline))
         return cls(float(area / outline.area), outline_m)

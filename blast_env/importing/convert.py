@@ -1,4 +1,4 @@
-"""From a map or drawing to a scenario, with a report on what that changed."""
+"""Conversion of a map or drawing to a scenario, with a report on the deviations."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -35,18 +35,18 @@ _MOST_DESCRIPTION: Final = 2000
 _HASH_DIGITS: Final = 12
 _PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf")
 _READ_HERE_BYTES: Final = 100_000
-"""So little is read at once, where nothing unfolds: a process takes half a second to begin."""
+"""Largest unpacked file that is read in this process: starting another takes half a second."""
 
 
 @dataclass(frozen=True)
 class ImportedSite:
-    """A site that was made from a map or drawing.
+    """A site imported from a map or drawing.
 
     Attributes:
         scenario: The scenario.
-        buildings: Its buildings, with how far their modules are from their outlines.
-        site: What the map shows there, in site metres.
-        notes: What was left out or is not known, a sentence each.
+        buildings: Its buildings, with the deviations of their modules from their outlines.
+        site: The objects of the map in site metres.
+        notes: Omissions and missing data, one sentence each.
     """
 
     scenario: Scenario
@@ -56,20 +56,20 @@ class ImportedSite:
 
 
 def import_site(path: str | Path, options: ImportOptions | None = None) -> ImportedSite:
-    """Return the site that a map or drawing shows.
+    """Return the site of a map or drawing.
 
-    The site is turned to the direction of most walls, its grid laid where most walls are, and the
-    buildings are cut into modules. What is large or packed is read in a process of its own, which
-    may take only so much time and memory; see `ReadingLimits`.
+    The site is turned to the direction of most walls, its grid is aligned with most walls, and the
+    buildings are cut into modules. Large and packed files are read in a separate process with
+    limits on time and memory; see `ReadingLimits`.
 
     Args:
         path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`) or DXF (`.dxf`).
-        options: What the user decides.
+        options: Options of the import.
 
     Raises:
         BlastEnvError: If the file cannot be read, the site cannot be placed, a building deviates
             too far from its outline, none is protected, there is no place for a charge, the
-            scenario would not be sound (`ScenarioError`), or all this takes too much time or
+            scenario would be invalid (`ScenarioError`), or the import takes too much time or
             memory (`ReadingError`).
     """
     path, options = path_of(path), options or ImportOptions()
@@ -142,7 +142,7 @@ _READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = Mappin
 
 
 def _read(path: Path, options: ImportOptions) -> SiteMap:
-    """Return what a file shows, read as its suffix says."""
+    """Return the map of a file, read by its suffix."""
     name = path.name.lower()
     for suffix, reader in _READERS.items():
         if name.endswith(suffix):
@@ -156,7 +156,7 @@ def _refuse(value: object, option: str, what: str) -> None:
 
 
 def _selectors(site_map: SiteMap, options: ImportOptions) -> Selectors:
-    """Return what the user chose; an empty choice leaves it to the usual tags."""
+    """Return the selectors of the user; roles without any follow the usual tags."""
     is_drawing = any("layer" in each.tags for each in site_map.features)
     chosen = {
         Role.ZONE: options.zone_from,
@@ -172,10 +172,10 @@ def _selectors(site_map: SiteMap, options: ImportOptions) -> Selectors:
 
 
 def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
-    """Return a building's rectangles as structures that together weigh as much as one.
+    """Return a building's rectangles as structures with a total weight of 1.
 
-    The load on a building is the mean over its walls: each rectangle weighs as much as its share
-    of them. One that other walls hide on all sides has no load, and does not count.
+    The load on a building is the mean over its walls, so the weight of a rectangle is its share of
+    them. A rectangle hidden on all sides has no load and is not protected.
     """
     parts = []
     for name, each, share in zip(
@@ -207,7 +207,7 @@ def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
 def _description(
     path: Path, site: PlacedSite, buildings: tuple[FittedBuilding, ...], options: ImportOptions
 ) -> str:
-    """Return where the site comes from and what the import did to it."""
+    """Return the description of the site: source, buildings, rotation and deviations."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
     worst = max(buildings, key=lambda each: each.deviation.area_share)
     farthest = max(buildings, key=lambda each: each.deviation.outline_m)

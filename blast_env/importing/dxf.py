@@ -1,4 +1,4 @@
-"""Reading drawings: what is drawn on each layer of a DXF file."""
+"""Reading of DXF drawings."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -56,29 +56,29 @@ _CODES: Final = {
     units.DM: "dm",
 }
 MOST_LINES: Final = 2_000_000
-"""Of the file: each number of an entity is one, and one says what it is."""
+"""Most lines of a file: each number of an entity takes one line, and its group code another."""
 
 MOST_ENTITIES: Final = 50_000
-"""Of a drawing once its blocks are taken apart."""
+"""Most entities of a drawing with all blocks expanded."""
 
 _MOST_NESTED: Final = 50
 _MOST_TEXT: Final = 1000
-_SAG_M: Final = 0.02  # of arcs made straight
-_LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not ask for ever more points
+_SAG_M: Final = 0.02  # largest deviation of the chords of an arc
+_LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not add ever more points
 
 
 def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
-    """Return what is drawn in the model space of a DXF file, blocks taken apart.
+    """Return the content of the model space of a DXF file, blocks expanded.
 
-    Closed lines are outlines, texts are points; each has its `layer` as a tag, a text its `text`,
-    and what has a thickness that as its `height`, in metres.
+    Closed lines are outlines, texts are points. All have the tag `layer`, texts `text`, and
+    entities with a thickness `height`, m: elevation plus thickness.
 
     Args:
         path: The file.
-        unit: One of `UNITS_M`; without it, what the file says.
+        unit: One of `UNITS_M`; the unit of the file unless given.
 
     Raises:
-        BlastEnvError: If it cannot be read, or nobody says its unit.
+        BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
     """
     skipped: Counter[str] = Counter()
     lines = checked_file(path).read_bytes().count(b"\n")
@@ -102,12 +102,12 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
 
 @dataclass(frozen=True)
 class _Unfolded:
-    """How many entities there are once all blocks are taken apart, counted without doing so.
+    """Counter of the entities of a drawing with all blocks expanded, without expanding them.
 
     Attributes:
         path: The file.
-        document: What is in it.
-        counts: Entities of the blocks that are counted already, by their names in small letters.
+        document: The drawing.
+        counts: Entities of the blocks counted so far, by their names in lower case.
     """
 
     path: Path
@@ -115,10 +115,11 @@ class _Unfolded:
     counts: dict[str, int] = field(default_factory=dict)
 
     def check(self) -> None:
-        """Refuse a drawing that unfolds to too much, or has a number beyond all bounds.
+        """Refuse a drawing with too many entities or a number out of bounds.
 
         Raises:
-            BlastEnvError: If there are too many, or blocks in blocks too deeply, or in themselves.
+            BlastEnvError: If there are more than `MOST_ENTITIES` entities, a number is beyond
+                `MOST_COORDINATE`, or a block is nested too deeply or in itself.
         """
         count = self._count(self.document.modelspace(), ())
         if count > MOST_ENTITIES:
@@ -128,7 +129,7 @@ class _Unfolded:
             )
 
     def _count(self, entities: Iterable[DXFEntity], above: tuple[str, ...]) -> int:
-        """Return how many entities there are, with those of the blocks that they stand for."""
+        """Return the number of entities, including those of the blocks that they insert."""
         total = 0
         for entity in entities:
             self._check_numbers(entity)
@@ -157,7 +158,7 @@ class _Unfolded:
 
 
 def _block_of(entity: DXFEntity) -> tuple[str, int]:
-    """Return the block that an entity stands for, if any, and how often."""
+    """Return the name of the block that an entity inserts, or an empty string, and the count."""
     if entity.dxftype() == "INSERT":
         times = max(entity.dxf.row_count, 1) * max(entity.dxf.column_count, 1)
         return str(entity.dxf.get("name", "")).lower(), times
@@ -205,7 +206,7 @@ def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
 def _features(
     path: Path, document: Drawing, sag: float, metres: float, skipped: Counter[str]
 ) -> Iterator[MapFeature]:
-    """Yield what is drawn; `skipped` counts what has no line."""
+    """Yield the features; `skipped` counts entities without a line by type."""
     left = MOST_POINTS
     for number, entity in enumerate(recursive_decompose(document.modelspace())):
         tags: dict[str, str | float | bool] = {"layer": str(entity.dxf.get("layer", "0"))}
@@ -249,10 +250,10 @@ def _text(entity: Text | MText, tags: dict[str, str | float | bool], place: str)
 def _places(
     path: Path, place: str, entity: DXFEntity, sag: float, skipped: Counter[str], most: int
 ) -> list[tuple[float, float]] | None:
-    """Return the points of a line, its arcs made straight; `None` for what has no line.
+    """Return the points of a line, arcs as chords; `None` for an entity without a line.
 
     Raises:
-        BlastEnvError: If there are more than `most` of them, or a coordinate is too large.
+        BlastEnvError: If there are more than `most` points, or a coordinate is too large.
     """
     try:
         line = make_path(entity)
@@ -274,7 +275,7 @@ def _places(
 
 
 def _closes(places: list[tuple[float, float]]) -> bool:
-    """Whether a line ends where it starts, but for rounding."""
+    """Return whether a line ends at its start, within rounding."""
     size = max(abs(value) for place in places for value in place) or 1.0
     return all(
         isclose(first, last, rel_tol=0.0, abs_tol=1e-9 * size)

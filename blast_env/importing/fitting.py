@@ -1,4 +1,4 @@
-"""Buildings of a map as rectangles of modules on the grid of a site."""
+"""Fitting of a map's buildings with rectangles of modules on the grid of a site."""
 
 import re
 import unicodedata
@@ -31,9 +31,9 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 MOST_STRUCTURES: Final = 100
-"""As many as a scenario may have."""
+"""Most structures of a scenario."""
 
-_MOST_NAME: Final = 34  # letters, which leaves room for the letters of parts
+_MOST_NAME: Final = 34  # characters, which leaves room for the letters of parts
 _BARRIER: Final = "barrier"
 _QUARTER_SIDES: Final = 4
 """A circle is a polygon of 16 sides."""
@@ -45,18 +45,17 @@ class FittedBuilding:
 
     Attributes:
         name: Its name in the scenario.
-        title: What the map calls it, or an empty string.
-        place: Where in the file it is.
+        title: Its name on the map, or an empty string.
+        place: Its place in the file.
         outline: Its outline in site metres, cut at the site's border.
         rectangles: The modules.
-        wall_shares: Which part of the building's walls that look at air each rectangle has.
-        height_m: Its height; `None` for as high as the air.
-        base_m: How high it begins above the ground.
+        wall_shares: Share of each rectangle in the building's exposed wall area.
+        height_m: Its height, m; `None` for the height of the air.
+        base_m: Height of its underside above the ground, m.
         protected: Whether its load counts.
         carries: Whether it is a terrace.
-        deviation: How far the modules are from the outline.
-        block_m: Side of the blocks it was cut into; a module's side, unless that takes too many
-            rectangles.
+        deviation: Deviation of the modules from the outline.
+        block_m: Side of its blocks, m; a module's side, unless that takes too many rectangles.
         is_cut: Whether the site's border cuts it.
     """
 
@@ -76,7 +75,7 @@ class FittedBuilding:
 
     @property
     def part_names(self) -> tuple[str, ...]:
-        """Names of the rectangles: the building's, with letters where there are several."""
+        """Names of the rectangles: the building's name, with letters if there are several."""
         if len(self.rectangles) == 1:
             return (self.name,)
         joint = "" if self.name[-1].isdigit() else "_"
@@ -98,7 +97,7 @@ class FittedBuilding:
 def fit_buildings(
     site: PlacedSite, options: ImportOptions
 ) -> tuple[tuple[FittedBuilding, ...], tuple[str, ...]]:
-    """Return the buildings of a site as modules, and notes on what was left out.
+    """Return the buildings of a site as modules, and notes on omissions.
 
     Raises:
         BlastEnvError: If there is no building, one deviates too far from its outline, or they
@@ -161,10 +160,10 @@ def fit_buildings(
 def protected_as_asked(
     buildings: Sequence[FittedBuilding], site: PlacedSite, options: ImportOptions
 ) -> tuple[FittedBuilding, ...]:
-    """Return the buildings, protected those that the user named, or that the file marks.
+    """Return the buildings, with those protected that the user named, or else the file marks.
 
     Raises:
-        BlastEnvError: If a name is none, or no building is protected.
+        BlastEnvError: If there is no building of a name, or no building is protected.
     """
     chosen = {_found(buildings, name) for name in options.protect}
     if options.protect_near is not None:
@@ -181,10 +180,11 @@ def protected_as_asked(
 
 
 def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[str]]:
-    """Return the buildings on the site, cut at its border and large enough, and notes.
+    """Return the large enough buildings on the site, cut at its border, and notes.
 
     Raises:
-        BlastEnvError: If an outline is not sound, or there are too many buildings, or too long.
+        BlastEnvError: If an outline is invalid, there are too many buildings, or their outlines
+            are too long.
     """
     things = site.of_role(Role.BUILDING)
     outlines = np.array(list(map(_outline, things)), dtype=object)
@@ -241,10 +241,10 @@ def _too_many(site: PlacedSite, what: str) -> BlastEnvError:
 
 
 def _put_right(site: PlacedSite, thing: Thing, options: ImportOptions) -> BaseGeometry:
-    """Return an outline that crosses itself as one that does not.
+    """Return an outline without its self-intersections.
 
     Raises:
-        BlastEnvError: If it is not to be put right, or crosses itself too often.
+        BlastEnvError: If `repair` is off, or it crosses itself too often.
     """
     words = f" ({shortened(thing.name)})" if thing.name else ""
     what = f"{site.path}: {thing.place}{words}: the outline"
@@ -255,7 +255,7 @@ def _put_right(site: PlacedSite, thing: Thing, options: ImportOptions) -> BaseGe
 
 
 def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
-    """Return the only text that stands in an outline of a drawing, or an empty string."""
+    """Return the text inside an outline of a drawing; an empty string unless it is unique."""
     texts = site.of_role(Role.NAME)
     shapely.prepare(outline)
     inside = shapely.covers(outline, [each.geometry for each in texts])
@@ -272,8 +272,8 @@ def _cut(
 ) -> tuple[tuple[CellRectangle, ...], int]:
     """Return a building as rectangles, and the side of its blocks in modules.
 
-    The blocks are as fine as `most_rectangles` allows. What coarser ones leave of a building's
-    own cells is air; cells of other buildings they never take.
+    The blocks are as fine as `most_rectangles` allows. Cells of the building outside its blocks
+    become air; blocks take no cells of other buildings.
 
     Raises:
         BlastEnvError: If the outline covers no module, or takes too many rectangles.
@@ -302,10 +302,10 @@ def _cut(
 
 
 def _check_deviation(site: PlacedSite, building: FittedBuilding, options: ImportOptions) -> None:
-    """Refuse a building that its modules do not stand for.
+    """Refuse a building whose modules deviate too far from its outline.
 
     Raises:
-        BlastEnvError: If area or outline are too far off.
+        BlastEnvError: If the deviation of area or outline is above its limit.
     """
     deviation = building.deviation
     words = f"{site.path}: {building.place}: {shortened(building.title) or building.name}"
@@ -323,13 +323,13 @@ def _check_deviation(site: PlacedSite, building: FittedBuilding, options: Import
 
 
 def _height_m(thing: Thing, options: ImportOptions) -> float | None:
-    """Return the height of a building in whole modules; `None` where nobody knows one."""
+    """Return the height of a building, m, in whole modules; `None` if it is unknown."""
     height_m = thing.height_m or options.default_height_m
     return None if height_m is None else max(round(height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
 
 
 def _base_m(thing: Thing, height_m: float | None) -> float:
-    """Return how high a building begins, in whole modules; a module below its top at most."""
+    """Return the base of a building, m, in whole modules, at least one module below its top."""
     base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
     return base_m if height_m is None else max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
 
@@ -339,11 +339,11 @@ def _wall_areas(
     heights: Sequence[float | None],
     shape: tuple[int, int],
 ) -> list[tuple[float, ...]]:
-    """Return which share of its building's walls that look at air each rectangle has.
+    """Return the share of each rectangle in its building's exposed wall area.
 
-    A wall beside a lower building looks at air above that one's roof.
+    A wall beside a lower building is exposed above that building's roof.
     """
-    # Nothing is higher than what is as high as the air.
+    # A building as high as the air is the highest.
     known = [height_m for height_m in heights if height_m is not None]
     tops_m = [max(known, default=0.0) + 1.0 if each is None else each for each in heights]
     height = np.zeros((shape[0] + 2, shape[1] + 2), dtype=np.float32)
@@ -359,12 +359,13 @@ def _wall_areas(
 
 
 def _open_m2(each: CellRectangle, top_m: float, height: NDArray[np.float32]) -> float:
-    """Return how much of a rectangle's walls looks at air, in modules' sides times metres.
+    """Return the exposed wall area of a rectangle, in module sides times metres.
 
     Args:
         each: The rectangle.
-        top_m: Its height.
-        height: Of what stands on each cell, and on a frame of cells around all (rows, columns).
+        top_m: Its height, m.
+        height: Height of the buildings, m, on each cell and on a frame of one cell (rows + 2,
+            columns + 2).
     """
     rows, columns = (slice(each.start + 1, each.stop + 1) for each in each.cells)
     beside = (
@@ -381,7 +382,7 @@ def _touches_border(outline: BaseGeometry, site: PlacedSite) -> bool:
 
 
 def _names(titles: Sequence[str]) -> list[str]:
-    """Return a name for each building that a scenario takes, and each only once."""
+    """Return a valid and unique name for each building."""
     names: list[str] = []
     number = 0
     for title in titles:
@@ -397,7 +398,7 @@ def _names(titles: Sequence[str]) -> list[str]:
 
 
 def plain_name(title: str) -> str:
-    """Return a title as a scenario takes names, as far as that goes; empty if nothing is left."""
+    """Return the characters of a title that are valid in names; an empty string if none are."""
     plain = unicodedata.normalize("NFKD", title.replace("ß", "ss"))
     letters = plain.encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9-]+", "_", letters).lstrip("_-0123456789").rstrip("_")[:_MOST_NAME]
@@ -422,14 +423,14 @@ def _found(buildings: Sequence[FittedBuilding], name: str) -> int:
 
 
 def _listed(buildings: Sequence[FittedBuilding]) -> str:
-    """Return names of buildings, not too many."""
+    """Return the names of up to 20 buildings, and the number of further ones."""
     shown = [each.name for each in buildings[:20]]
     more = len(buildings) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
 def _hint(site: PlacedSite) -> str:
-    """Return what may help where there are no buildings."""
+    """Return advice for a site without buildings."""
     return "".join(_hints(site))
 
 

@@ -1,4 +1,4 @@
-"""Reading GeoJSON, RFC 7946 or the older form with a `crs` member."""
+"""Reading of GeoJSON, RFC 7946 or the older form with a `crs` member."""
 
 import json
 from collections.abc import Mapping
@@ -27,13 +27,13 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 MOST_VALUES: Final = 3_000_000
-"""Numbers, arrays and tables of a file: each takes some hundred bytes once it is read."""
+"""Most numbers, arrays and tables of a file: each takes some hundred bytes in memory."""
 
 LOCAL: Final = "local"
-"""Instead of a reference system: the coordinates are metres of a plane of their own."""
+"""Reference system of coordinates in metres without a place on the Earth."""
 
 _DEFAULT_CRS: Final = "EPSG:4326"
-_LOCAL_WORDS: Final = "local site metres"  # in what blast-env writes of a site without a place
+_LOCAL_WORDS: Final = "local site metres"  # in exports of a site without a georeference
 _KINDS: Final = (
     *("Point", "MultiPoint", "LineString", "MultiLineString"),
     *("Polygon", "MultiPolygon", "GeometryCollection"),
@@ -41,15 +41,15 @@ _KINDS: Final = (
 
 
 def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
-    """Return what a GeoJSON file shows.
+    """Return the map of a GeoJSON file.
 
     Args:
         path: The file.
-        crs: Reference system of the coordinates, `local` for metres of a plane of their own;
-            without it, what the file says, and longitude and latitude where it says nothing.
+        crs: Reference system of the coordinates, `local` for metres without a place on the Earth;
+            that of the file unless given, or longitude and latitude (EPSG:4326) if it has none.
 
     Raises:
-        BlastEnvError: If it cannot be read, or is no GeoJSON.
+        BlastEnvError: If it cannot be read, or is not GeoJSON.
     """
     document = _parsed(checked_file(path))
     listed = _listed_features(path, document)
@@ -57,7 +57,7 @@ def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
         raise too_many(path)
     features, empty = [], 0
     for index in range(len(listed)):
-        item, listed[index] = listed[index], None  # which takes more than what is made of it
+        item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
         feature = _feature(path, f"features[{index}]", item)
         if feature is None:
             empty += 1
@@ -137,7 +137,7 @@ def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
 
 
 def _check_numbers(path: Path, place: str, geometry: dict[str, Any]) -> None:
-    """Refuse a coordinate that is no finite number, or so large that no outline can be made."""
+    """Refuse a coordinate that is not finite or is beyond `MOST_COORDINATE`."""
     left: list[Any] = [geometry]
     while left:
         value = left.pop()
@@ -154,7 +154,7 @@ def _check_numbers(path: Path, place: str, geometry: dict[str, Any]) -> None:
 
 
 def _tags(item: Mapping[str, Any]) -> Tags:
-    """Return the properties that are plain values, and the identifier."""
+    """Return the properties with plain values, and the identifier."""
     properties = item.get("properties")
     tags = dict(properties) if isinstance(properties, dict) else {}
     if "id" in item:
@@ -163,7 +163,7 @@ def _tags(item: Mapping[str, Any]) -> Tags:
 
 
 def _coordinates(path: Path, document: Mapping[str, Any], crs: str | None) -> SourceCoordinates:
-    """Return what the coordinates mean: as asked, or as the file says."""
+    """Return the coordinates' system: the one given, or that of the file."""
     if crs is None:
         if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
             return DrawingCoordinates(1.0)

@@ -1,4 +1,4 @@
-"""What a user decides about an import."""
+"""The options of an import."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ CALIBRATIONS: Final[Mapping[str, str]] = MappingProxyType(
 """The stored calibration of each preset of the particle model."""
 
 MOST_SITE_M: Final = 2000.0
-"""The longest side of a site, as scenario files have it."""
+"""Longest side of a site in a scenario file, m."""
 
 _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {
@@ -45,10 +45,10 @@ _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What a user decides about an import; places are in the coordinates of the file.
+    """The options of an import; places are in the coordinates of the file.
 
     Raises:
-        BlastEnvError: If something is out of bounds, or two of them exclude each other.
+        BlastEnvError: If a value is out of bounds, or two options exclude each other.
     """
 
     name: str | None = option(None, "Name of the scenario.")
@@ -112,7 +112,7 @@ class ImportOptions:
     repair: bool = option(False, "Put outlines right that cross themselves.")
 
     def __post_init__(self) -> None:
-        """Check them."""
+        """Check the options; see the class for the errors."""
         for name, (low, high) in _BOUNDS.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
@@ -132,7 +132,7 @@ class ImportOptions:
 
 
 def _option(name: str) -> str:
-    """Return how the command line calls a value."""
+    """Return the command-line option of a value."""
     for suffix in ("_m2", "_m", "_deg"):
         name = name.removesuffix(suffix)
     return f"--{name.replace('_', '-')}"

@@ -1,4 +1,4 @@
-"""Reading extracts of OpenStreetMap: XML (`.osm`) and PBF (`.osm.pbf`), offline."""
+"""Offline reading of OpenStreetMap extracts: XML (`.osm`) and PBF (`.osm.pbf`)."""
 
 import bz2
 import gzip
@@ -35,7 +35,7 @@ with import_extra("maps", "maps and drawings"):
 SUFFIXES: Final = (".osm", ".pbf", ".osm.bz2", ".osm.gz")
 
 MOST_UNPACKED_BYTES: Final = 100_000_000
-"""Of a packed file, once it is unpacked."""
+"""Most bytes of an unpacked file."""
 
 _PACKED: Final[Mapping[str, Callable[[Path, str], Any]]] = MappingProxyType(
     {".gz": gzip.open, ".bz2": bz2.open}
@@ -47,10 +47,10 @@ _LEAST_RING: Final = 4  # points, the first one again at the end
 
 
 def read_osm(path: Path) -> SiteMap:
-    """Return what an extract of OpenStreetMap shows: tagged ways, areas and nodes.
+    """Return the map of an OpenStreetMap extract: tagged ways, areas and nodes.
 
-    Closed ways with no `highway` are outlines. Relations are outlines where they are complete
-    multipolygons; ways that the extract cuts through are left out, and the notes say so.
+    Closed ways without `highway` and complete multipolygon relations are outlines. Ways with
+    missing nodes and incomplete relations are left out and counted in the notes.
 
     Raises:
         BlastEnvError: If it cannot be read.
@@ -69,7 +69,7 @@ def read_osm(path: Path) -> SiteMap:
 
 @contextmanager
 def _unpacked(path: Path) -> Iterator[Path]:
-    """Give the file that a packed one holds, or the file itself if it is none.
+    """Yield the path of the unpacked file; the file itself if it is not packed.
 
     Raises:
         BlastEnvError: If it cannot be unpacked, or would be too large.
@@ -106,7 +106,7 @@ def _copy(packed: IO[bytes], plain: IO[bytes], path: Path) -> None:
 
 @dataclass
 class _Skipped:
-    """How many things of which kind were left out, and why."""
+    """Counter of the omitted objects by reason."""
 
     counts: Counter[str] = field(default_factory=Counter)
 
@@ -116,7 +116,7 @@ class _Skipped:
 
 
 def _features(path: Path, skipped: _Skipped) -> Iterator[MapFeature]:
-    """Yield everything with tags; ways of multipolygons without tags are only in those."""
+    """Yield all tagged objects; untagged member ways occur only in their multipolygons."""
     processor = osmium.FileProcessor(str(path)).with_areas()
     processor.with_filter(osmium.filter.EmptyTagFilter())
     for item in processor:

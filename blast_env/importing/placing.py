@@ -1,6 +1,6 @@
-"""Where on a map the site lies: its rectangle, its direction, and what is on it.
+"""Placement of the site on a map: its rectangle, its direction and its objects.
 
-The direction is the one that most walls have; the grid's lines lie where they fit best.
+The site has the direction of most walls; the grid is aligned with as many walls as possible.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -32,10 +32,10 @@ _SHORTEST_M: Final = 1e-6
 
 
 def dominant_direction_deg(outlines: Sequence[BaseGeometry]) -> float:
-    """Return the direction of most walls, by their length, from the x axis: -45 to 45.
+    """Return the direction of most walls, weighted by length, from the x axis: -45 to 45.
 
-    Walls at right angles count together. It is the median of the walls near the direction that most
-    metres of wall have, so that a few houses of another direction do not pull it away.
+    Walls at right angles count together. The result is the median over the walls near the most
+    frequent direction, so that a few houses in another direction have no influence.
     """
     starts, ends = _walls(outlines)
     step = ends - starts
@@ -45,9 +45,9 @@ def dominant_direction_deg(outlines: Sequence[BaseGeometry]) -> float:
 
 
 def grid_offset_m(outlines: Sequence[BaseGeometry]) -> tuple[float, float]:
-    """Return where grid lines best lie, x and y from 0 to a module's side.
+    """Return the offset in x and y, 0 to a module's side, at which most walls lie on grid lines.
 
-    There most metres of wall along the grid lie on them.
+    Walls along the grid count, by their length.
     """
     starts, ends = _walls(outlines)
     step = ends - starts
@@ -73,7 +73,7 @@ def _walls(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
 
 
 def _densest(values: FloatArray, weights: FloatArray, period: float, near: float) -> float:
-    """Return where on a circle most weight lies, 0 to `period`; 0 without any weight."""
+    """Return the position of most weight on a circle, 0 to `period`; 0 without values."""
     if len(values) == 0:
         return 0.0
     values = values % period
@@ -96,12 +96,12 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 _HAIR_M: Final = 0.01
-_ROUNDING: Final = 0.1  # of a module: no row of modules for a map's rounding
+_ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
 
 
 @dataclass(frozen=True)
 class PlacedSite:
-    """A site on a map; what is on it is in metres from the site's lower left corner.
+    """A site on a map, with its objects in metres from the site's lower left corner.
 
     Attributes:
         path: The file.
@@ -109,7 +109,7 @@ class PlacedSite:
         rotation_deg: From the plane's x axis to the site's, counterclockwise.
         corner_m: The site's lower left corner in the turned plane.
         shape: Rows and columns of modules.
-        things: What is on the site or near it.
+        things: Objects on the site or near it.
         layers: Layers of a drawing.
     """
 
@@ -123,7 +123,7 @@ class PlacedSite:
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Its extents along x and y."""
+        """Extents along x and y, m."""
         return self.shape[1] * MODULE_SIDE_M, self.shape[0] * MODULE_SIDE_M
 
     @cached_property
@@ -133,7 +133,7 @@ class PlacedSite:
 
     @property
     def georeference(self) -> AnyGeoreference:
-        """Where on the map it lies."""
+        """The georeference of the site."""
         corner = rotated(np.array([self.corner_m]), self.rotation_deg)[0]
         return self.plane.georeference((float(corner[0]), float(corner[1])), self.rotation_deg)
 
@@ -148,11 +148,11 @@ class PlacedSite:
 
 
 def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOptions) -> PlacedSite:
-    """Return the site that the user asked for, or around everything that is on the map.
+    """Return the site that the options specify, or one around all objects of the map.
 
     Raises:
-        BlastEnvError: If the map has nothing to put it around, the place is not on the Earth, or
-            the site would be too large.
+        BlastEnvError: If the map has no objects, the place is not on the Earth, or the site would
+            be too large.
     """
     if not things:
         raise BlastEnvError(
@@ -196,7 +196,7 @@ def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOption
 
 
 def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, float]:
-    """Return a place of the map near the site: as asked, or in the middle of everything."""
+    """Return a place of the map near the site: that of the options, or the objects' middle."""
     asked = options.origin or options.centre
     if asked is not None:
         return asked
@@ -206,7 +206,7 @@ def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, 
 
 
 def _chief(things: Sequence[Thing]) -> Sequence[Thing]:
-    """Return what a site is put around: its own outline, or everything but streets and texts."""
+    """Return the objects that fix the site: its outline, or all objects but streets and texts."""
     own = [each for each in things if each.role is Role.SITE]
     if own:
         return own
@@ -225,7 +225,7 @@ def _is_line(geometry: BaseGeometry) -> bool:
 def _near(
     site_map: SiteMap, things: Sequence[Thing], plane: Plane, options: ImportOptions
 ) -> list[Thing]:
-    """Return what may be on the site, in metres of the plane."""
+    """Return the objects that may lie on the site, in metres of the plane."""
     measured = _moved(things, plane.to_metres)
     geometries = [each.geometry for each in measured]
     if options.size_m is None:
@@ -245,7 +245,7 @@ def _near(
 
 
 def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
-    """Yield things, with the rectangles of a building that blast-env wrote as one again."""
+    """Yield things, with the rectangles of an exported building joined again."""
     buildings: dict[str, list[Thing]] = {}
     for thing in things:
         if thing.part_of:
@@ -253,20 +253,20 @@ def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
         else:
             yield thing
     for name, parts in buildings.items():
-        # Coordinates of a file are rounded: rectangles that touched may be a hair apart.
+        # Coordinates of a file are rounded: adjoining rectangles may have a tiny gap.
         outline = shapely.union_all([each.geometry for each in parts], grid_size=_HAIR_M)
         protected = any(each.protected for each in parts)
         yield replace(parts[0], geometry=outline, name=name, protected=protected)
 
 
 def _moved(things: Sequence[Thing], move: Callable[[FloatArray], FloatArray]) -> list[Thing]:
-    """Return things whose coordinates were all moved at once."""
+    """Return things with all coordinates transformed in one call."""
     geometries = shapely.transform([each.geometry for each in things], move)
     return [replace(each, geometry=new) for each, new in zip(things, geometries, strict=True)]
 
 
 def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
-    """Return the direction of the site: as asked, or that of most walls."""
+    """Return the direction of the site: that of the options, or that of most walls."""
     if options.rotation_deg is not None:
         return options.rotation_deg
     own = [each.geometry for each in things if each.role is Role.SITE]
@@ -303,7 +303,7 @@ def _bounds_m(
 
 
 def _outlines(things: Sequence[Thing], bounds_m: tuple[float, float, float, float]) -> list[Thing]:
-    """Return the buildings that the grid's lines are to suit."""
+    """Return the outlines that fix the grid: the site's own, or the buildings on the site."""
     box = shapely.box(*bounds_m)
     own = [each for each in things if each.role is Role.SITE]
     buildings = [each for each in things if each.role is Role.BUILDING]

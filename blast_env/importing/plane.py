@@ -1,4 +1,4 @@
-"""From the coordinates of maps and drawings to the metres of a site, and back."""
+"""Conversion between the coordinates of maps and drawings and the metres of a site."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,8 +27,8 @@ class LocalPlane:
 
     Attributes:
         crs: Reference system of the map, as pyproj reads it.
-        longitude_deg: Where the plane's origin is, WGS 84.
-        latitude_deg: The same.
+        longitude_deg: Longitude of the plane's origin, WGS 84.
+        latitude_deg: Latitude of the plane's origin, WGS 84.
     """
 
     crs: str
@@ -40,8 +40,8 @@ class LocalPlane:
         """Return the plane around a place in the coordinates of a map.
 
         Raises:
-            BlastEnvError: If there is no such reference system, or the place is not on the Earth
-                or far from where the system is used.
+            BlastEnvError: If the reference system is unknown, or the place is not on the Earth, too
+                near a pole, or far outside the system's area of use.
         """
         system = _system(crs)
         longitude, latitude = _transformed(
@@ -79,7 +79,7 @@ class LocalPlane:
         """Return the georeference of a site whose lower left corner lies in this plane.
 
         Args:
-            corner_m: The corner.
+            corner_m: The corner, m.
             rotation_deg: From the plane's x axis to the site's, counterclockwise.
         """
         angle = np.radians(rotation_deg)
@@ -133,7 +133,7 @@ class DrawingPlane:
     def georeference(
         self, corner_m: tuple[float, float], rotation_deg: float
     ) -> DrawingGeoreference:
-        """Return the georeference of a site whose lower left corner lies there."""
+        """Return the georeference of a site from its lower left corner in metres."""
         return DrawingGeoreference(
             x_m=corner_m[0],
             y_m=corner_m[1],
@@ -166,7 +166,7 @@ def to_map(georeference: AnyGeoreference, places_m: FloatArray) -> FloatArray:
     """Return places of a site (n, 2), in metres, in the coordinates of its map or drawing.
 
     Raises:
-        BlastEnvError: If its reference system does not exist, or does not reach there.
+        BlastEnvError: If its reference system is unknown, or a place cannot be transformed.
     """
     turned = rotated(np.asarray(places_m, dtype=np.float64), georeference.rotation_deg)
     if isinstance(georeference, DrawingGeoreference):
@@ -177,7 +177,7 @@ def to_map(georeference: AnyGeoreference, places_m: FloatArray) -> FloatArray:
 
 
 def is_longitude_latitude(crs: str) -> bool:
-    """Whether a reference system is WGS 84 with longitude and latitude, as GeoJSON has it.
+    """Return whether a reference system is WGS 84 in longitude and latitude, that of GeoJSON.
 
     Raises:
         BlastEnvError: If there is no such system.
@@ -198,7 +198,7 @@ def _system(crs: str) -> CRS:
 
 
 def _check_area_of_use(system: CRS, crs: str, words: str, place: tuple[float, float]) -> None:
-    """Refuse a place for which nobody would use a reference system: it is the wrong one."""
+    """Refuse a place outside the area of use of a reference system: a sign of the wrong one."""
     area = system.area_of_use
     if area is None:
         return

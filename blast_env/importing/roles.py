@@ -1,4 +1,4 @@
-"""What the things on a map are to a site: buildings, places of charges, zone, keep-outs."""
+"""Roles of the objects of a map: buildings, places of charges, build zone, keep-outs."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,7 +21,7 @@ with import_extra("maps", "maps and drawings"):
 
 
 class Role(StrEnum):
-    """What a thing on a map is to a site."""
+    """Role of an object of a map in a site."""
 
     SITE = "site"
     BUILDING = "building"
@@ -33,20 +33,20 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Thing:
-    """Something of a map that matters to the site.
+    """An object of a map with a role in the site.
 
     Attributes:
-        role: What it is.
+        role: Its role.
         geometry: Its outline, line or point, in the coordinates of the source.
-        name: What the source calls it, or an empty string.
-        place: Where in the file it is.
-        height_m: Its height, where the source has it.
-        base_m: How high it begins above the ground.
-        protected: Whether the source says that its load counts.
-        tnt_kg: Mass of a charge there, where the source has it.
-        part_of: The building that it is a rectangle of, in what blast-env itself wrote.
-        diameter_m: Of a point that is a round building: a silo, a tank, a column.
-        carries: Whether the source says that it is a terrace.
+        name: Its name in the source, or an empty string.
+        place: Its place in the file.
+        height_m: Its height, m, if the source has one.
+        protected: Whether the source marks it as protected.
+        tnt_kg: Mass of a charge there, if the source has one.
+        part_of: Name of the building of which it is a rectangle, in files of blast-env.
+        base_m: Height of its underside above the ground, m.
+        diameter_m: Diameter of a point that is a round building, m: a silo, a tank, a column.
+        carries: Whether the source marks it as a terrace.
     """
 
     role: Role
@@ -64,11 +64,11 @@ class Thing:
 
 @dataclass(frozen=True)
 class Selector:
-    """Chooses things by a tag: `building`, `usage=school`, `Layer=A-WALL*`; of drawings, a layer.
+    """Selects objects by a tag: `building`, `usage=school`, `Layer=A-WALL*`; or by a layer.
 
     Attributes:
         key: Key of the tag.
-        pattern: What its value must be, with `*` and `?`, whatever the case; `None` for anything
+        pattern: Pattern of its value with `*` and `?`, regardless of case; `None` for any value
             but `no`.
     """
 
@@ -77,7 +77,7 @@ class Selector:
 
     @classmethod
     def parsed(cls, text: str, is_drawing: bool) -> "Selector":
-        """Return the selector that a text stands for.
+        """Return the selector of a text.
 
         Raises:
             BlastEnvError: If a part of it is empty.
@@ -91,7 +91,7 @@ class Selector:
         return cls("layer", text) if is_drawing else cls(key, None)
 
     def chooses(self, tags: Tags) -> bool:
-        """Whether something with these tags is meant."""
+        """Return whether it selects an object with these tags."""
         value = tags.get(self.key)
         if value is None or value is False:
             return False
@@ -101,7 +101,7 @@ class Selector:
 
 
 Selectors = Mapping[Role, tuple[Selector, ...]]
-"""What the user chose, by role; what is not in it is found by the usual tags."""
+"""Selectors of the user by role; the usual tags decide for other roles."""
 
 _OWN_STRUCTURES: Final = ("structure", "protected_structure", "terrace")
 
@@ -116,14 +116,14 @@ _KINDS: Final[Mapping[str, Role]] = MappingProxyType(
         "charge_place": Role.CHARGE,
     }
 )
-"""Kinds, and in small letters layers, of what blast-env itself writes."""
+"""Roles of the kinds, and of the layers in lower case, in files of blast-env."""
 
 _ROADS: Final = frozenset(
     f"{road}{link}"
     for road in ("motorway", "trunk", "primary", "secondary", "tertiary")
     for link in ("", "_link")
 ) | {"unclassified", "residential", "living_street", "service", "road", "track"}
-"""Values of OpenStreetMap's `highway` on which motor vehicles go."""
+"""Values of OpenStreetMap's `highway` for motor vehicles."""
 
 _HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height")
 _BASE_KEYS: Final = ("min_height", "building:min_height", "base_m")
@@ -142,13 +142,13 @@ _FOOT_M: Final = 0.3048
 def things_of(
     site_map: SiteMap, selectors: Selectors, level_height_m: float, height_key: str | None = None
 ) -> tuple[tuple[Thing, ...], tuple[str, ...]]:
-    """Return what on a map matters to a site, and notes on what was not clear.
+    """Return the objects of a map with a role in a site, and notes on unclear ones.
 
     Args:
         site_map: The map.
-        selectors: What the user chose.
-        level_height_m: Height of a storey, where only their number is known.
-        height_key: The tag with the height; without it, the usual ones.
+        selectors: Selectors of the user.
+        level_height_m: Height of a storey, m, for buildings with a number of storeys only.
+        height_key: Key of the tag with the height; the usual keys unless given.
     """
     is_drawing = isinstance(site_map.coordinates, DrawingCoordinates)
     found: list[Thing] = []
@@ -158,7 +158,7 @@ def things_of(
         if role is None:
             continue
         if is_drawing and role is not Role.NAME and feature.tags.get("text"):
-            role = Role.NAME  # a text on the layer of what it names
+            role = Role.NAME  # a text on the layer of the object that it names
         height_m, note = _height_m(feature, level_height_m, height_key)
         notes += [note] if note else []
         base_m = _base_m(feature, level_height_m)
@@ -171,7 +171,7 @@ def things_of(
 
 
 def _role(feature: MapFeature, selectors: Selectors) -> Role | None:
-    """Return what something is: as the user chose, or by its tags."""
+    """Return the role of a feature, by the selectors or else by its tags."""
     for role, chosen in selectors.items():
         if any(selector.chooses(feature.tags) for selector in chosen):
             return role
@@ -216,7 +216,7 @@ def _thing(feature: MapFeature, role: Role, height_m: float | None) -> Thing:
 def _height_m(
     feature: MapFeature, level_height_m: float, key: str | None
 ) -> tuple[float | None, str | None]:
-    """Return the height of something, and a note if it has one that cannot be read."""
+    """Return the height of a feature, m, and a note if its height cannot be read."""
     lower = {str(name).lower(): value for name, value in feature.tags.items()}
     keys = _HEIGHT_KEYS if key is None else (key.lower(),)
     given = next((lower[name] for name in keys if name in lower), None)
@@ -231,7 +231,7 @@ def _height_m(
 
 
 def _base_m(feature: MapFeature, level_height_m: float) -> float:
-    """Return how high something begins: 0 where nothing says it."""
+    """Return the base of a feature, m; 0 if it has none."""
     lower = {str(name).lower(): value for name, value in feature.tags.items()}
     for keys, unit_m in ((_BASE_KEYS, 1.0), (_BASE_LEVEL_KEYS, level_height_m)):
         given = next((lower[name] for name in keys if name in lower), None)
@@ -242,7 +242,7 @@ def _base_m(feature: MapFeature, level_height_m: float) -> float:
 
 
 def _diameter_m(feature: MapFeature) -> float | None:
-    """Return the diameter of a point, where the source has one."""
+    """Return the diameter of a point, m, if the source has one."""
     if feature.geometry.geom_type != "Point":
         return None
     given = next((feature.tags[key] for key in _DIAMETER_KEYS if key in feature.tags), None)
@@ -250,7 +250,7 @@ def _diameter_m(feature: MapFeature) -> float | None:
 
 
 def _length_m(value: str | float | bool) -> float | None:
-    """Return a length above 0 in metres, or `None` if the value is none."""
+    """Return a length above 0 in metres, or `None` if the value is not one."""
     if isinstance(value, str):
         match = _LENGTH.fullmatch(value[:MAX_TEXT].strip())
         try:
@@ -262,7 +262,7 @@ def _length_m(value: str | float | bool) -> float | None:
 
 
 def _untagged_outlines(site_map: SiteMap) -> list[Thing]:
-    """Return all outlines as buildings, for a map of which nothing says what is what."""
+    """Return all outlines as buildings, for a map without any tag of a role."""
     known = ("kind", "building", "highway", "layer")
     if any(key in feature.tags for feature in site_map.features for key in known):
         return []
@@ -274,9 +274,9 @@ def _untagged_outlines(site_map: SiteMap) -> list[Thing]:
 
 
 def _closed(things: Iterable[Thing]) -> Iterator[Thing]:
-    """Yield things, with the open lines of an outline that was drawn side by side as one.
+    """Yield things, with outlines drawn as separate open lines joined.
 
-    Places of charges may be lines, and stay them.
+    Places of charges may be lines, and remain so.
     """
     loose: dict[Role, list[Thing]] = {}
     for thing in things:

@@ -1,4 +1,4 @@
-"""What the readers of maps and drawings give: outlines and lines with their tags."""
+"""Common form of maps and drawings: outlines, lines and points with their tags."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,16 +16,16 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 MOST_BYTES: Final = 50_000_000
-"""Larger files are refused before they are read: an extract of a town has a few megabytes."""
+"""Most bytes of a file; an extract of a town has a few megabytes."""
 
 MOST_FEATURES: Final = 100_000
-"""Outlines and lines that are taken from a file."""
+"""Most outlines and lines of a file."""
 
 MOST_POINTS: Final = 500_000
-"""Points of all of them."""
+"""Most points of all outlines and lines."""
 
 MOST_COORDINATE: Final = 1e12
-"""In whatever the coordinates are; with millimetres the Earth's circumference is 4e10."""
+"""Largest coordinate in any unit; in millimetres the Earth's circumference is 4e10."""
 
 Tags = Mapping[str, str | float | bool]
 
@@ -57,12 +57,12 @@ SourceCoordinates = MapCoordinates | DrawingCoordinates
 
 @dataclass(frozen=True)
 class MapFeature:
-    """One thing on a map.
+    """An object of a map.
 
     Attributes:
         geometry: Its outline, line or point, in the coordinates of the source.
-        tags: What the source says of it: properties, tags, or its layer.
-        place: Where in the file it is, for messages: `features[12]`, `way 4711`.
+        tags: Its properties, tags or layer in the source.
+        place: Its place in the file, for messages: `features[12]`, `way 4711`.
     """
 
     geometry: BaseGeometry
@@ -72,13 +72,13 @@ class MapFeature:
 
 @dataclass(frozen=True)
 class SiteMap:
-    """A map or drawing as it was read.
+    """A map or drawing.
 
     Attributes:
         path: The file.
-        coordinates: What the numbers mean.
-        features: Everything that has an outline or a line, and texts as points.
-        notes: What was left out, a sentence each.
+        coordinates: System of the coordinates.
+        features: All outlines, lines and points; texts are points.
+        notes: Omissions, one sentence each.
     """
 
     path: Path
@@ -87,10 +87,11 @@ class SiteMap:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a map with more, or larger, than can be worked on.
+        """Refuse a map with too many points or too large coordinates.
 
         Raises:
-            BlastEnvError: If it has too many points, or a coordinate too large.
+            BlastEnvError: If it has more than `MOST_POINTS` points, or a coordinate beyond
+                `MOST_COORDINATE`.
         """
         geometries = [each.geometry for each in self.features]
         coordinates, owners = shapely.get_coordinates(geometries, return_index=True)
@@ -107,10 +108,10 @@ class SiteMap:
 
 
 def checked_file(path: Path) -> Path:
-    """Return the path of a file that can be read.
+    """Return a path after checking that its file exists and is not too large.
 
     Raises:
-        BlastEnvError: If there is none, or it is too large.
+        BlastEnvError: If there is no such file, or it has more than `MOST_BYTES` bytes.
     """
     if not path.exists():
         raise BlastEnvError(f"{path}: there is no such file")
@@ -126,18 +127,18 @@ def checked_file(path: Path) -> Path:
 
 @contextmanager
 def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
-    """Turn what a library raises in the block into the error of a file that cannot be read.
+    """Convert any exception of a library in the block to the error of an unreadable file.
 
-    A library says what is wrong with a file in errors of many kinds, wherever it comes to it. One
-    that does not come out of it is a mistake here, and stays what it is.
+    Libraries report faults of a file with exceptions of many types. An exception without the
+    library in its traceback is a fault of this package, and passes unchanged.
 
     Args:
         package: Name of the library.
         path: The file.
-        kind: What it was read as.
+        kind: Format of the file, for the message.
 
     Raises:
-        BlastEnvError: If the library raises anything.
+        BlastEnvError: If the library raises an exception.
     """
     try:
         yield
@@ -151,7 +152,7 @@ def errors_of(package: str, path: Path, kind: str) -> Iterator[None]:
 
 
 def too_many_points(path: Path) -> BlastEnvError:
-    """Return the error of a file whose outlines and lines have more points than are taken."""
+    """Return the error of a file with more than `MOST_POINTS` points."""
     return BlastEnvError(
         f"{path}: has more than {MOST_POINTS:,} points, must have at most that many: cut a smaller "
         "extract"
@@ -159,7 +160,7 @@ def too_many_points(path: Path) -> BlastEnvError:
 
 
 def too_many(path: Path) -> BlastEnvError:
-    """Return the error of a file with more things than are taken."""
+    """Return the error of a file with more than `MOST_FEATURES` features."""
     return BlastEnvError(
         f"{path}: has more than {MOST_FEATURES:,} outlines and lines, must have at most that many: "
         "cut a smaller extract"

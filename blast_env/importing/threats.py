@@ -1,4 +1,4 @@
-"""Where charges may be on an imported site."""
+"""Places of charges on an imported site."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,13 +25,13 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 MOST_SOURCES: Final = 100
-"""As many as a scenario may have."""
+"""Most charges of a scenario."""
 
-_SIMPLER_M: Final = (0.1, 0.25, 0.5, 1.0, 2.0)  # by how much curves of streets are made straight
+_SIMPLER_M: Final = (0.1, 0.25, 0.5, 1.0, 2.0)  # tolerances of the simplification of streets
 _LEAST_LENGTH_M: Final = 1.0
 _CLEAR_M: Final = 0.01  # more than the charge's radius, for rounding
 _DIGITS: Final = 3
-_AREA_BLOCK: Final = 4  # modules: places of charges in an area are cut no finer
+_AREA_BLOCK: Final = 4  # modules: scale of the blocks of an area, per m of tolerance
 _POINT_SHARE_M: Final = 5.0
 
 
@@ -41,17 +41,17 @@ def charge_sources(
     radius_m: float,
     options: ImportOptions,
 ) -> list[dict[str, Any]]:
-    """Return where charges may be, as the charges of a scenario.
+    """Return the places of charges, as the charges of a scenario.
 
-    Streets become segments, their weights their lengths, so that every metre is as likely; areas
-    become rectangles; points stay points and weigh as much as 5 m of street. All keep clear of
-    the buildings and the border by the charge's radius.
+    Streets become segments weighted by length, so that every metre is equally likely; areas become
+    rectangles weighted by area; points remain points with the weight of 5 m of street. All keep
+    clear of buildings and border by the charge's radius.
 
     Args:
         site: The site.
-        buildings: What stands on it.
-        radius_m: Radius of the charge.
-        options: Masses, and places that the user adds.
+        buildings: Its buildings.
+        radius_m: Radius of the charge, m.
+        options: Mass of the charges, and further places.
 
     Raises:
         BlastEnvError: If there is no place for a charge, or there are too many.
@@ -80,10 +80,10 @@ def charge_sources(
 
 
 def _without_crossings(site: PlacedSite) -> list[Thing]:
-    """Return the places of charges, the outlines of areas put right.
+    """Return the places of charges, with the outlines of areas repaired.
 
     Raises:
-        BlastEnvError: If they are too long, or one crosses itself too often.
+        BlastEnvError: If the outlines are too long, or one crosses itself too often.
     """
     things, areas = [], []
     for thing in site.of_role(Role.CHARGE):
@@ -97,7 +97,7 @@ def _without_crossings(site: PlacedSite) -> list[Thing]:
 
 
 def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float) -> BaseGeometry:
-    """Return where the middle of a charge may be."""
+    """Return the area of possible centres of a charge."""
     width_m, height_m = site.size_m
     gap_m = radius_m + _CLEAR_M
     inside = shapely.box(gap_m, gap_m, width_m - gap_m, height_m - gap_m)
@@ -114,7 +114,7 @@ def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
 def _asked(
     site: PlacedSite, free: BaseGeometry, options: ImportOptions
 ) -> Iterator[dict[str, Any]]:
-    """Yield the points that the user named."""
+    """Yield the points of `charge_at`."""
     for place in options.charge_at:
         x_m, y_m = site.to_site(np.array([place]))[0]
         if not shapely.intersects(free, shapely.Point(x_m, y_m)):
@@ -159,7 +159,7 @@ def _segments(
 def _areas(
     area: BaseGeometry, free: BaseGeometry, tolerance_m: float, tnt_kg: float
 ) -> Iterator[dict[str, Any]]:
-    """Yield the blocks of an area; they are coarser where curves are made straighter."""
+    """Yield the blocks of an area; their side grows with the tolerance."""
     inside = shapely.intersection(area, free)
     if inside.is_empty or inside.area == 0.0:
         return
@@ -167,7 +167,7 @@ def _areas(
     shape = (int(np.ceil(2.0 * top)) + 1, int(np.ceil(2.0 * right)) + 1)
     (rows, columns), shares = covered_shares(inside, shape)
     cells = np.zeros(shape, dtype=bool)
-    # Whole cells only: their edges keep as clear as the area does.
+    # Whole cells only, so that the blocks keep as clear as the area does.
     cells[rows, columns] = shares > 1.0 - 1e-6
     blocks = in_blocks(cells, 1 + int(_AREA_BLOCK * tolerance_m)) & cells
     for each in CellRectangle.each(rectangles_of(blocks)):

@@ -1,4 +1,4 @@
-"""Where barriers may be built on an imported site."""
+"""The build zone of an imported site."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,26 +31,26 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 MOST_KEEP_OUTS: Final = 100
-"""As many as a scenario may have."""
+"""Most keep-outs of a scenario."""
 
 MOST_AREAS: Final = 1000
-"""Outlines of a zone, or of what must stay empty."""
+"""Most outlines of a zone, or of keep-outs."""
 
 _MOST_REASON: Final = 200
-_ANY: Final = 1e-3  # of a block: a single cell of it is enough
-_TOUCHED: Final = 0.05  # of a cell: less is a map's rounding
+_ANY: Final = 1e-3  # of a block: a single cell suffices
+_TOUCHED: Final = 0.05  # of a cell: a smaller share is rounding of the map
 _OUTSIDE: Final = "outside the build zone of the map"
 
 
 def build_zone(
     site: PlacedSite, buildings: Sequence[FittedBuilding], options: ImportOptions
 ) -> dict[str, Any] | None:
-    """Return the build zone as a scenario has it, `None` if nobody said where it is.
+    """Return the build zone in the form of a scenario; `None` if neither map nor options have one.
 
-    A zone that is no rectangle is the one around it, and what lies outside it must stay empty.
+    A zone that is not a rectangle becomes its bounding box, with keep-outs for the rest.
 
     Raises:
-        BlastEnvError: If it is not on the site, or must stay empty in too many pieces.
+        BlastEnvError: If it is not on the site, or takes too many keep-outs.
     """
     inside = np.zeros(site.shape, dtype=bool)
     if options.zone_m is not None:
@@ -87,7 +87,7 @@ def build_zone(
 def _keep_outs(
     site: PlacedSite, inside: BoolArray, window: tuple[slice, slice]
 ) -> list[dict[str, Any]]:
-    """Return what must stay empty, in as fine pieces as a scenario can have."""
+    """Return the keep-outs, in the finest blocks within the limit of a scenario."""
     corner = (window[0].start, window[1].start)
     empty = [_Empty(corner, ~inside[window], _OUTSIDE)]
     for thing, outline in _on_site(site, Role.KEEP_OUT):
@@ -112,12 +112,12 @@ def _keep_outs(
 
 @dataclass(frozen=True)
 class _Empty:
-    """Cells of a zone that must stay empty, cut out of the site.
+    """A window of the site with cells that must stay empty.
 
     Attributes:
-        corner: Row and column of the lower left one on the site.
-        cells: Which of them (rows, columns).
-        reason: Why.
+        corner: Row and column of the window's lower left cell on the site.
+        cells: Whether each cell must stay empty (rows, columns).
+        reason: The reason.
     """
 
     corner: tuple[int, int]
@@ -132,9 +132,9 @@ class _Empty:
         cells: BoolArray,
         reason: str,
     ) -> "Iterator[_Empty]":
-        """Yield what of some cells of a site is in the window of the zone, if anything is.
+        """Yield the part of some cells of a site in the window of the zone, unless it is empty.
 
-        It is cut out where blocks of any size begin and end.
+        Its bounds lie on multiples of all sizes of blocks.
         """
         cut = tuple(map(_in_whole_blocks, window, touched))
         if any(each.start >= each.stop for each in cut):
@@ -156,7 +156,7 @@ class _Empty:
 
 
 def _in_whole_blocks(window: slice, touched: slice) -> slice:
-    """Return what is touched of a window, in whole blocks of any of the sizes from its start."""
+    """Return the touched part of a window, in whole blocks of every size from its start."""
     block = lcm(*COARSER)
     first = max(touched.start - window.start, 0) // block * block
     after = -(-(touched.stop - window.start) // block) * block
@@ -173,7 +173,7 @@ def _area(each: CellRectangle, empty: _Empty) -> dict[str, Any]:
 
 
 def _covered(site: PlacedSite, role: Role, least: float) -> BoolArray:
-    """Return the cells of which outlines of a role cover a share."""
+    """Return the cells of which an outline of a role covers at least a share (rows, columns)."""
     cells = np.zeros(site.shape, dtype=bool)
     for _, outline in _on_site(site, role):
         window, shares = covered_shares(outline, site.shape)
@@ -182,7 +182,7 @@ def _covered(site: PlacedSite, role: Role, least: float) -> BoolArray:
 
 
 def _on_site(site: PlacedSite, role: Role) -> list[tuple[Thing, BaseGeometry]]:
-    """Return the areas of a role, each with what of its outline is on the site.
+    """Return the areas of a role, each with the part of its outline on the site.
 
     Raises:
         BlastEnvError: If they are too many or too long, or one crosses itself too often.
@@ -224,7 +224,7 @@ def _window(site: PlacedSite, area_m: Rectangle, option: str) -> tuple[slice, sl
 def _window_around(
     site: PlacedSite, buildings: Sequence[FittedBuilding], reach_m: float
 ) -> tuple[slice, slice]:
-    """Return the rows and columns around the protected buildings, as far as the site goes."""
+    """Return the rows and columns around the protected buildings, within the site."""
     chosen = [each.rectangle_m for own in buildings if own.protected for each in own.rectangles]
     around = Rectangle(
         min(each.left for each in chosen),
