@@ -1,7 +1,7 @@
-"""Blasts for the page: a film that begins at once, loads, pictures, all on one colour scale.
+"""Blasts for the page: a film that starts early, loads and pictures, on one colour scale.
 
-The scale of everything on a site is that of the blast without a barrier under the same threat: it
-does not change when a layout is added, and what was drawn before stays comparable.
+All colour scales of a site come from the blast without a barrier under the same threat, so that
+earlier pictures stay comparable when a layout is added.
 """
 
 from collections import Counter
@@ -67,7 +67,7 @@ SEEDS: Final = range(8)
 """Seeds of the particle blasts whose mean a load is."""
 
 FRAMES: Final = 48
-_FIRST_FRAMES: Final = 4  # after so many a film can begin; then it is told of every few more
+_FIRST_FRAMES: Final = 4  # playback can start after these; the count then grows in larger steps
 _MORE_FRAMES: Final = 16
 _FILM_PX: Final = 640
 _PLAN_HEIGHT_M: Final = 1.5
@@ -81,7 +81,7 @@ class Scale(Kept):
 
     Attributes:
         film_kpa: End of the films' scale.
-        until_s: When the films end, so that all show the same moments: when no more is to be seen.
+        until_s: End of all films: the last visible overpressure, so that all share their moments.
         levels: Contours of the maps, by quantity.
         walls: Ends of the walls' scales, by structure and quantity.
     """
@@ -97,29 +97,29 @@ _QUANTITIES: Final[tuple[Quantity, ...]] = ("peak", "impulse")
 
 
 def warm_engines() -> None:
-    """Load compiled code by small blasts, so that the next ones begin at once."""
+    """Load the compiled code of the engines, so that the next blasts start at once."""
     scenario = load_scenario("courtyard")
     Blast(scenario, (), 0, "event").run()
     GasEngine()
 
 
 def run_blasts(task: BlastTask, tell: Tell) -> None:
-    """Run the blasts of a layout, one a threat, and what they are held against.
+    """Run one blast per threat with the layout, and one without a barrier for comparison.
 
-    Blasts that are there already are not run again. First comes the film of the first threat.
+    Blasts with a complete record are not run again. The film of the first threat comes first.
 
     Args:
-        task: What to run.
-        tell: Called with the share that is done.
+        task: The site, layout, threats and engine.
+        tell: Called with the completed share, 0 to 1.
 
     Raises:
-        BlastEnvError: If they cannot be run.
+        BlastEnvError: If a blast cannot be run.
     """
     scenario = task.site
     layout = met_by_blasts(placing.layout_from(scenario, task.layout))
     work: list[tuple[NamedThreat, Layout]] = []
     for threat in task.threats:
-        # Gas has its scale from the blast without a barrier; particles are looked at first.
+        # Gas needs the scale of the blast without a barrier; particles show the layout first.
         both = [(threat, ()), (threat, layout)]
         work += both[::-1] if task.engine.is_first_look else both
     work = list(dict.fromkeys(work))
@@ -254,7 +254,7 @@ def _gas(
 
 
 def _scale(shot: PressureShot, kept: Path) -> Scale:
-    """Return the scale that was kept with the blast without a barrier; this one's without it."""
+    """Return the scale stored with the blast without a barrier; if none, that of this shot."""
     known = read_kept(Scale, kept)
     if known is not None:
         return known
@@ -272,7 +272,7 @@ def _scale(shot: PressureShot, kept: Path) -> Scale:
 
 
 def _last_seen_s(shot: PressureShot, film_kpa: float) -> float:
-    """Return when the last overpressure is gone that the colours of a film show."""
+    """Return the time of the last overpressure that the colours of a film show, s."""
     least_pa = _LEAST_SHOWN * film_kpa * PA_PER_KPA
     frames = shot.planes[0].frames
     seen = [each.time_s for each in frames if np.nanmax(each.overpressure_pa) >= least_pa]
@@ -280,7 +280,7 @@ def _last_seen_s(shot: PressureShot, film_kpa: float) -> float:
 
 
 def _facades_of(result: GasResult) -> list[str]:
-    """Return the buildings whose walls are drawn: the protected ones."""
+    """Return the names of the protected buildings, whose walls are drawn."""
     table = result.buildings
     return [str(name) for name in table[table["protected"]]["building"]]
 
@@ -347,7 +347,7 @@ def _waves(result: GasResult) -> Iterator[Wave]:
 
 
 def _telling_points(values: Any) -> list[int]:
-    """Return which points of a history to keep: the extremes of its parts, so that no peak goes."""
+    """Return the indices of a thinned history: the extremes of each part, so that peaks stay."""
     if len(values) <= _MOST_POINTS:
         return list(range(len(values)))
     chosen = set()
@@ -362,7 +362,7 @@ def _telling_points(values: Any) -> list[int]:
 def _write_film(
     frames: Iterator[Frame], times_s: Sequence[float], folder: Path, tell: Tell
 ) -> None:
-    """Write frames one by one; the film can be watched from the first few on."""
+    """Write the frames one by one; playback can start after the first few."""
     film = read_kept(Film, folder / FILM)
     if film is not None and film.count == len(film.time_ms):
         return

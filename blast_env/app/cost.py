@@ -1,4 +1,4 @@
-"""What work by gas dynamics costs, told before it begins; see `physics.gas.cost`."""
+"""The cost of work by gas dynamics, estimated before it starts; see `physics.gas.cost`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ _DRAWING_S: Final = 2.5
 
 @dataclass(frozen=True)
 class ReportCost:
-    """What a report costs, part by part.
+    """The cost of a report, part by part.
 
     Attributes:
-        parts: What `run_study` says when it does a part, and its blasts.
-        drawn: How many blasts there are pictures of.
+        parts: The label by which `run_study` reports each part, and the costs of its blasts.
+        drawn: Number of blasts with pictures.
     """
 
     parts: tuple[tuple[str, tuple[CostGuess, ...]], ...]
@@ -30,12 +30,12 @@ class ReportCost:
 
     @classmethod
     def of(cls, scenario: Scenario, layout: Layout, options: "StudyOptions") -> "ReportCost":
-        """Return what a report costs, about; nothing is run for it.
+        """Return the estimated cost of a report; nothing is run for it.
 
         Raises:
             BlastEnvError: If there are too many threats, or a front cannot be read.
         """
-        # Here, because reports need an extra.
+        # Imported here, because reports need an extra.
         from blast_env.reporting.study import blasts_of, threats_of
 
         threats = threats_of(scenario, options)
@@ -48,16 +48,16 @@ class ReportCost:
 
     @property
     def words(self) -> str:
-        """The cost for people."""
+        """The cost in words."""
         return cost_words(self.blasts, self.drawn)
 
     @property
     def blasts(self) -> tuple[CostGuess, ...]:
-        """What every blast costs."""
+        """The cost of every blast."""
         return tuple(each for _, costs in self.parts for each in costs)
 
     def share(self, label: str, share: float) -> float | None:
-        """Return the share of the whole that is done at a share of a part; `None` of no part."""
+        """Return the completed share of the whole at a share of a part; `None` of no part."""
         costs_s = {name: sum(each.seconds for each in costs) for name, costs in self.parts}
         if label not in costs_s:
             return None
@@ -67,11 +67,11 @@ class ReportCost:
 
 
 def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
-    """Return what some blasts cost one after the other, for people.
+    """Return the cost of blasts one after the other, in words.
 
     Args:
-        costs: Of each.
-        drawn: Of how many of them film, maps or walls are drawn.
+        costs: The cost of each.
+        drawn: Number of blasts with a film, maps or walls.
     """
     if not costs:
         return "nothing to run: all of it is there"
@@ -82,7 +82,7 @@ def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
 
 
 def time_words(seconds: float) -> str:
-    """Return a time as people say it."""
+    """Return a time in words, rounded."""
     if seconds < 10.0:
         return f"{max(ceil(seconds), 1)} s"
     if seconds < 100.0:

@@ -23,7 +23,7 @@ class Design:
     Attributes:
         scenario: The site.
         layouts: One for each of `SLOTS`.
-        active: Number of the layout that is edited.
+        active: Number of the active layout, which edits change.
     """
 
     scenario: Scenario
@@ -31,11 +31,11 @@ class Design:
     active: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what is no design.
+        """Check the layouts.
 
         Raises:
             LayoutError: If a layout is not legal.
-            BlastEnvError: If there are not as many as slots, or the active one is none of them.
+            BlastEnvError: If their number is not that of `SLOTS`, or `active` is out of bounds.
         """
         if len(self.layouts) != len(SLOTS):
             raise BlastEnvError(f"layouts: there are {len(self.layouts)}, must be {len(SLOTS)}")
@@ -46,11 +46,11 @@ class Design:
 
     @property
     def layout(self) -> Layout:
-        """The layout that is edited."""
+        """The active layout."""
         return self.layouts[self.active]
 
     def with_layout(self, layout: Layout, slot: int | None = None) -> "Design":
-        """Return the design with another layout in a slot, the active one unless named.
+        """Return the design with another layout in a slot, by default the active one.
 
         Raises:
             LayoutError: If it is not legal.
@@ -61,7 +61,7 @@ class Design:
         return replace(self, layouts=tuple(layouts))
 
     def with_scenario(self, scenario: Scenario) -> tuple["Design", tuple[str, ...]]:
-        """Return the design on a changed site, and what of its layouts fell away and why."""
+        """Return the design on a changed site, and notes on the elements removed from layouts."""
         layouts, notes = [], []
         for name, layout in zip(SLOTS, self.layouts, strict=True):
             kept, reasons = placing.what_still_stands(scenario, layout)
@@ -84,10 +84,10 @@ class Design:
 
         Args:
             record: Plain data, as `record` gives it.
-            source: Where it comes from, for the error.
+            source: Source of the record, for the error.
 
         Raises:
-            BlastEnvError: If it is none; the message says why.
+            BlastEnvError: If it is no design; the message says why.
         """
         try:
             scenario = Scenario.from_document(record["scenario"], source)
@@ -101,7 +101,7 @@ class Design:
 
 @dataclass(frozen=True)
 class DesignStep:
-    """A design and what made it."""
+    """A design and the label of the step that made it."""
 
     label: str
     design: Design
@@ -109,12 +109,12 @@ class DesignStep:
 
 @dataclass(frozen=True)
 class History:
-    """A design with what came before it and what was undone; immutable.
+    """A design with its earlier and its undone steps; immutable.
 
     Attributes:
         past: Earlier steps, the oldest first.
-        present: The design as it is.
-        future: What was undone, what comes next first.
+        present: The current step.
+        future: Undone steps, the next first.
     """
 
     present: DesignStep
@@ -123,29 +123,29 @@ class History:
 
     @property
     def design(self) -> Design:
-        """The design as it is."""
+        """The current design."""
         return self.present.design
 
     def then(self, label: str, design: Design) -> "History":
-        """Return the history with one more step; one that changes nothing is none."""
+        """Return the history with one more step; the same history if nothing changes."""
         if design == self.design:
             return self
         past = (*self.past, self.present)[-MOST_STEPS:]
         return History(DesignStep(label, design), past)
 
     def showing(self, active: int) -> "History":
-        """Return the history with another layout before the user: no step, nothing to undo."""
+        """Return the history with another active layout: no step, nothing to undo."""
         shown = replace(self.present, design=replace(self.design, active=active))
         return replace(self, present=shown)
 
     def undone(self) -> "History":
-        """Return the history one step back; at its beginning, as it is."""
+        """Return the history one step back; unchanged at its beginning."""
         if not self.past:
             return self
         return History(self.past[-1], self.past[:-1], (self.present, *self.future))
 
     def redone(self) -> "History":
-        """Return the history with the last undone step; where there is none, as it is."""
+        """Return the history with the last undone step; unchanged if there is none."""
         if not self.future:
             return self
         return History(self.future[0], (*self.past, self.present), self.future[1:])
@@ -173,7 +173,7 @@ class History:
         """Return the history of a record.
 
         Raises:
-            BlastEnvError: If it is none; the message says why.
+            BlastEnvError: If it is no history; the message says why.
         """
 
         def step_of(part: Mapping[str, Any]) -> DesignStep:

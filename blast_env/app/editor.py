@@ -1,6 +1,6 @@
-"""The hand on the plan: tools, what is selected, what is dragged, and why it cannot stand there.
+"""The editor of the plan: tools, selection, dragging, and the reasons against a place.
 
-Takes places in metres, and knows nothing of the page. Each stroke is one step of the design.
+Works in metres, independently of the page. Each stroke is one step of the design.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from blast_env.units import MODULE_SIDE_M
 
 
 class Tool(StrEnum):
-    """What the mouse does."""
+    """The tools of the mouse."""
 
     SELECT = "select and move"
     PLACE = "place"
@@ -42,18 +42,17 @@ _DRAWN: Final = {
     Tool.GAUGE: ThingKind.GAUGE,
 }
 
-_HANDLE_M: Final = 0.6  # how near to the upper right corner one takes hold of the size
+_HANDLE_M: Final = 0.6  # reach of the handle for the size, at the upper right corner
 
 
 @dataclass(frozen=True)
 class Ghost:
-    """What would stand where the mouse is.
+    """The preview of an element or thing at the mouse.
 
     Attributes:
-        rectangle_m: Where.
-        reason: Why it cannot; empty if it can.
-        is_line: Whether it is the diagonal of the rectangle, from `line_m[0]` to `line_m[1]`.
-        line_m: The ends of a line.
+        rectangle_m: Its rectangle.
+        reason: The reason why it cannot stand there; empty if it can.
+        line_m: The ends of a line, a diagonal of the rectangle; `None` for an area.
     """
 
     rectangle_m: Rectangle
@@ -63,7 +62,7 @@ class Ghost:
 
 @dataclass
 class _Stroke:
-    """What goes on while the button is down."""
+    """The state of a stroke while the button is down."""
 
     start_m: PointM
     layout: Layout
@@ -76,19 +75,19 @@ class _Stroke:
 
 @dataclass
 class Editor:
-    """The hand of one page on a design.
+    """The editor of one page for a design.
 
     Attributes:
         session: The design.
-        tool: What the mouse does.
-        item: Name of what is placed.
-        turned: Whether it is turned.
-        new_height_m: Height of a structure that is drawn; `None` for as high as the air.
-        selected: What is selected.
-        cursor: The cell that the keyboard is at; `None` before it was used.
-        ghost: What would stand where the mouse is.
-        pending: The layout as it is under a stroke that is not over; `None` without one.
-        message: What there is to say, and has not been said yet.
+        tool: The current tool.
+        item: Name of the item to place.
+        turned: Whether it is placed turned.
+        new_height_m: Height of a structure to draw; `None` for the height of the air.
+        selected: The selected thing.
+        cursor: The cell of the keyboard; `None` before its first use.
+        ghost: The preview at the mouse.
+        pending: The layout under an unfinished stroke; `None` without one.
+        message: A message not yet shown.
     """
 
     session: Session
@@ -106,18 +105,18 @@ class Editor:
 
     @property
     def scenario(self) -> Scenario:
-        """The site, with what is being dragged where it is dragged to, if it can be there."""
+        """The site, with a dragged thing at its new place if it can be there."""
         stroke = self._stroke
         return self.session.scenario if stroke is None or stroke.made is None else stroke.made
 
     @property
     def layout(self) -> Layout:
-        """The layout, with what the stroke has done so far."""
+        """The layout, with the changes of the stroke so far."""
         return self.session.design.layout if self.pending is None else self.pending
 
     @property
     def holds_something(self) -> bool:
-        """Whether the stroke that is under way moves or draws anything."""
+        """Whether the current stroke moves or draws anything."""
         stroke = self._stroke
         return stroke is not None and (stroke.thing is not None or stroke.lifted is not None)
 
@@ -140,7 +139,7 @@ class Editor:
             self._draw(x_m, y_m)
 
     def move(self, x_m: float, y_m: float, erase: bool = False) -> bool:
-        """Follow the mouse; return whether anything looks different now."""
+        """Follow the mouse; return whether the plan must be drawn again."""
         if self.tool is Tool.SELECT or self.tool in _DRAWN:
             place: Cell | PointM | None = (edits.snapped(x_m), edits.snapped(y_m))
         else:
@@ -159,7 +158,7 @@ class Editor:
         return True
 
     def release(self) -> None:
-        """End the stroke: one step, or the reason why it is none."""
+        """End the stroke: make one step, or set the message to the reason against it."""
         stroke, self._stroke = self._stroke, None
         pending, self.pending = self.pending, None
         ghost, self.ghost, self._last = self.ghost, None, None
@@ -180,13 +179,13 @@ class Editor:
             self._keep_layout(f"{verb} {max(count, 1)}", pending)
 
     def leave(self) -> None:
-        """The mouse has left the plan: what it holds is put back."""
+        """Abandon the stroke when the mouse leaves the plan."""
         self.ghost, self._stroke, self.pending, self._last = None, None, None, None
 
     # The keyboard.
 
     def step_cursor(self, rows: int, columns: int) -> None:
-        """Move the cell that the keyboard is at; it stays in the zone."""
+        """Move the cell of the keyboard within the zone."""
         zone = self.session.scenario.build_zone
         if zone is None:
             self.message = "there is no build zone: draw one first"
@@ -198,7 +197,7 @@ class Editor:
         self._show_at(self.cursor)
 
     def toggle_at_cursor(self) -> None:
-        """Place at the cell that the keyboard is at, or take away what stands there."""
+        """Place the item at the cell of the keyboard, or remove the element there."""
         if self.cursor is None:
             self.step_cursor(0, 0)
             return
@@ -216,7 +215,7 @@ class Editor:
         self.ghost = None
 
     def nudge(self, x_m: float, y_m: float) -> None:
-        """Move what is selected by so much, if it can be there."""
+        """Move the selected thing by a distance, if it can be there."""
         if self.selected is None:
             return
         selected = self.selected
@@ -224,7 +223,7 @@ class Editor:
         self.attempt(label, lambda scenario: edits.moved(scenario, selected, (x_m, y_m)))
 
     def delete(self) -> None:
-        """Take away what is selected, if the site can be without it."""
+        """Remove the selected thing, if the site can do without it."""
         if self.selected is None:
             self.message = "nothing is selected"
             return
@@ -233,7 +232,7 @@ class Editor:
             self.selected = None
 
     def attempt(self, label: str, edit: Callable[[Scenario], Scenario]) -> bool:
-        """Make an edit of the site a step, or say why it cannot be; return whether it was made."""
+        """Make an edit of the site a step, or set the message; return whether it was made."""
         try:
             scenario = edit(self.session.scenario)
         except BlastEnvError as error:
@@ -242,7 +241,7 @@ class Editor:
         self._keep(label, scenario)
         return True
 
-    # What the strokes do.
+    # The strokes.
 
     def _take_hold(self, x_m: float, y_m: float, stroke: _Stroke) -> None:
         scenario, layout = self.session.scenario, self.session.design.layout
@@ -321,7 +320,7 @@ class Editor:
             new = placing.element(scenario, self.item, cell, self.turned)
             self.pending = (*layout, new)
         elif there is not None:
-            self.ghost = None  # a stroke over what stands already is no mistake
+            self.ghost = None  # a stroke over an existing element is no mistake
 
     def _draw(self, x_m: float, y_m: float) -> None:
         stroke = self._stroke
@@ -365,7 +364,7 @@ class Editor:
         return self.ghost != before
 
     def _show_at(self, cell: Cell) -> None:
-        """Show what would stand on a cell."""
+        """Preview the item on a cell."""
         scenario = self.session.scenario
         new = placing.element(scenario, self.item, cell, self.turned)
         reason = placing.reason_against(scenario, self.layout, new)
@@ -387,7 +386,7 @@ class Editor:
 
 
 def reason_of(error: BlastEnvError) -> str:
-    """Return what is wrong in one sentence: the first problem of a scenario, how many more."""
+    """Return an error in one sentence: the first problem, and the number of others."""
     if not isinstance(error, ScenarioError):
         return str(error)
     first, more = error.problems[0], len(error.problems) - 1

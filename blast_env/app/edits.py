@@ -1,7 +1,7 @@
-"""Edits of a scenario: each gives another sound scenario, or the library's reasons why not.
+"""Edits of a scenario: each returns another valid scenario, or raises the library's reasons.
 
-Everything is put on the grid of the modules. No rule about what may stand where is here: a changed
-scenario goes through `Scenario.from_document`, which says all that is wrong with it.
+All positions snap to the grid of the modules. Placement rules are not repeated here: a changed
+scenario goes through `Scenario.from_document`, which reports all its faults.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -29,7 +29,7 @@ _HALF: Final = MODULE_SIDE_M / 2.0
 
 
 class ThingKind(StrEnum):
-    """What can be selected on a site."""
+    """The kinds of things on a site that can be selected."""
 
     SITE = "site"
     ZONE = "build zone"
@@ -43,7 +43,7 @@ class ThingKind(StrEnum):
 
 
 class SiteThing(NamedTuple):
-    """One thing on a site: what it is, and its number among its kind."""
+    """One thing on a site: its kind, and its number within the kind."""
 
     kind: ThingKind
     number: int = 0
@@ -64,13 +64,13 @@ _PATHS: Final[Mapping[ThingKind, tuple[str, ...]]] = {
 
 _SINGLE: Final = (ThingKind.SITE, ThingKind.ZONE)
 NOWHERE: Final = (ThingKind.SITE, ThingKind.ITEM, ThingKind.MEASURE)
-"""Kinds without a place of their own on the plan."""
+"""Kinds without a place on the plan."""
 
 _DRAWN: Final = (
     *(ThingKind.GAUGE, ThingKind.CHARGE, ThingKind.STRUCTURE),
     *(ThingKind.KEEP_OUT, ThingKind.COST_AREA, ThingKind.ZONE),
 )
-"""The other kinds, what is drawn on top first."""
+"""The other kinds, topmost first."""
 
 _BETTER_GLASS: Final = "window_laminated_6"
 
@@ -81,7 +81,7 @@ def snapped(value_m: float) -> float:
 
 
 def document_of(scenario: Scenario) -> Document:
-    """Return a scenario as plain data that may have every key."""
+    """Return a scenario as plain data, without empty fields and with the schema version."""
     document: Document = scenario.model_dump(mode="json", exclude_none=True)
     return {**document, "schema_version": SCHEMA_VERSION}
 
@@ -90,7 +90,7 @@ def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
     """Return a scenario with an edit of its document.
 
     Raises:
-        ScenarioError: If it would not be sound; all that is wrong is in the error.
+        ScenarioError: If the result is invalid; the error lists all faults.
     """
     document = document_of(scenario)
     edit(document)
@@ -101,7 +101,7 @@ def changed(scenario: Scenario, edit: Callable[[Document], None]) -> Scenario:
 
 
 def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
-    """Yield everything on the site with what people call it."""
+    """Yield everything on the site with its label."""
     yield (
         SiteThing(ThingKind.SITE),
         f"site, {scenario.site.width_m:g} x {scenario.site.height_m:g} m",
@@ -127,14 +127,14 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
 
 
 def has(scenario: Scenario, thing: SiteThing) -> bool:
-    """Return whether a thing is (still) there."""
+    """Return whether a thing is (still) on the site."""
     return any(each == thing for each, _ in things(scenario))
 
 
 def rectangle_of(scenario: Scenario, thing: SiteThing) -> Rectangle:
-    """Return the smallest rectangle around a thing; of a point, one without extent.
+    """Return the smallest rectangle around a thing, m; around a point, one without extent.
 
-    Items and measures are nowhere, or everywhere in the build zone: that is their rectangle.
+    Items and measures have no place: theirs is the rectangle of the build zone.
 
     Raises:
         BlastEnvError: If there is no such thing.
@@ -159,13 +159,13 @@ def rectangle_of(scenario: Scenario, thing: SiteThing) -> Rectangle:
 
 
 def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> SiteThing | None:
-    """Return what is at a place, what is drawn on top first; the site itself is nothing.
+    """Return the topmost thing at a place, or `None`; the site itself does not count.
 
     Args:
         scenario: The scenario.
         x_m: The place.
         y_m: The place.
-        reach_m: How far beside a point or a line one may point.
+        reach_m: Greatest distance from a point or a line that still selects it.
     """
     for thing in _from_the_top(scenario):
         grown_m = reach_m if thing.kind in (ThingKind.GAUGE, ThingKind.CHARGE) else 0.0
@@ -180,7 +180,7 @@ def thing_at(scenario: Scenario, x_m: float, y_m: float, reach_m: float) -> Site
 
 
 def _from_the_top(scenario: Scenario) -> list[SiteThing]:
-    """Return what has a place on the plan, terraces last: they are below what they carry."""
+    """Return the things on the plan, topmost first; terraces last, below their structures."""
 
     def depth(thing: SiteThing) -> tuple[bool, int, int]:
         is_structure = thing.kind is ThingKind.STRUCTURE
@@ -191,7 +191,7 @@ def _from_the_top(scenario: Scenario) -> list[SiteThing]:
 
 
 def _beside(source: AnySource, x_m: float, y_m: float) -> float:
-    """Return how far a place is from where a charge may be."""
+    """Return the distance of a place from a source's point or lines, m; 0 for an area."""
     if isinstance(source, RectangleSource):
         return 0.0
     lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
@@ -207,7 +207,7 @@ def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float
 
 
 def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
-    """Return the scenario with a thing moved by about so much, onto the grid.
+    """Return the scenario with a thing moved by about `by_m`, onto the grid.
 
     Raises:
         ScenarioError: If it cannot be there.
@@ -232,12 +232,12 @@ def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
 
 
 def resized(scenario: Scenario, thing: SiteThing, corner_m: PointM) -> Scenario:
-    """Return the scenario with the upper right corner of a thing at another place of the grid.
+    """Return the scenario with the upper right corner of a thing at another point of the grid.
 
-    Of a line it is the end that goes there; what has no extent stays as it is.
+    Of a line, the end moves there; a thing without extent does not change.
 
     Raises:
-        ScenarioError: If it cannot be so large.
+        ScenarioError: If it cannot have that size.
     """
     old = rectangle_of(scenario, thing)
     width_m = max(snapped(corner_m[0] - old.left), MODULE_SIDE_M)
@@ -266,10 +266,10 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
     Args:
         scenario: The scenario.
         thing: The thing; `None` is the scenario itself.
-        values: By the keys of the scenario file; `None` takes a key away.
+        values: New values by key of the scenario file; `None` removes a key.
 
     Raises:
-        ScenarioError: If it would not be sound.
+        ScenarioError: If the result is invalid.
     """
 
     def edit(document: Document) -> None:
@@ -287,7 +287,7 @@ def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
     """Return the scenario without a thing.
 
     Raises:
-        ScenarioError: If there must be one: the last charge, the last protected structure.
+        ScenarioError: If the site needs it: the last charge, the last protected structure.
         BlastEnvError: If it is the site.
     """
     if thing.kind is ThingKind.SITE:
@@ -311,12 +311,12 @@ def added(
     height_m: float | None = STOREY_M,
     is_area: bool = False,
 ) -> tuple[Scenario, SiteThing]:
-    """Return the scenario with one thing more, drawn from one place to another, on the grid.
+    """Return the scenario with a new thing, drawn from one place of the grid to another, and it.
 
-    A charge is a point where both places are the same, else a line; with `is_area` it may be
-    anywhere between them. A build zone takes the place of the one there is, and keeps what holds in
-    it. A structure is `height_m` high, a storey unless said otherwise; `None` for as high as the
-    air. It stands on the terrace that it is drawn on.
+    A charge is a point if both places coincide, else a line; with `is_area` it may be anywhere in
+    the rectangle between them. A build zone replaces the old one and keeps its other values. A
+    structure is `height_m` high, one storey by default, `None` for the height of the air; it stands
+    on the terrace below it.
 
     Raises:
         ScenarioError: If it cannot be there.
@@ -367,11 +367,11 @@ def added(
 
 
 def _fit_catalogue(document: Document, whole: int | None) -> None:
-    """Let the stock of a zone be no more than its catalogue has, and an empty one be none.
+    """Limit the stock of a zone to the pieces of its catalogue; remove an empty catalogue.
 
     Args:
         document: The scenario.
-        whole: The stock before, if it was all that the catalogue had: it goes on to be that.
+        whole: The former stock if it was the whole catalogue, and so remains; else `None`.
     """
     zone = document.get("build_zone") or {}
     if "items" not in zone:
@@ -386,7 +386,7 @@ def _fit_catalogue(document: Document, whole: int | None) -> None:
 
 
 def _place_of(document: Document, kind: ThingKind) -> tuple[Document, str]:
-    """Return the table that a kind is in, and its key there."""
+    """Return the table that holds a kind, and its key there."""
     *above, key = _PATHS[kind]
     table = document
     for part in above:
@@ -395,7 +395,7 @@ def _place_of(document: Document, kind: ThingKind) -> tuple[Document, str]:
 
 
 def section_of(scenario: Scenario, thing: SiteThing) -> Document:
-    """Return what the scenario's file says of a thing."""
+    """Return the section of the scenario file on a thing."""
     return _own(document_of(scenario), thing)
 
 
@@ -406,7 +406,7 @@ def _own(document: Document, thing: SiteThing) -> Document:
 
 
 def _free_name(word: str, things: Iterable[Any]) -> str:
-    """Return a name with a number that nothing has yet."""
+    """Return an unused name: the word and a number."""
     names = {each.name for each in things}
     return next(name for name in (f"{word}{n}" for n in range(1, 200)) if name not in names)
 

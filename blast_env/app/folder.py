@@ -1,4 +1,4 @@
-"""The work folder: designs, the blasts that were run for them, and who has it open.
+"""The work folder: designs, their blasts, and the server that holds it.
 
 Every file is written as a whole, so that nothing is lost when a page is reloaded, a browser closed
 or the server stopped.
@@ -37,13 +37,13 @@ _OPEN: Final = "open.json"
 
 @dataclass(frozen=True)
 class DesignEntry:
-    """A design in the list of those that can be opened again.
+    """A design in the list of saved designs.
 
     Attributes:
         design_id: Its name in the folder.
         title: Name of its site.
-        changed_s: When it was changed last, seconds since 1970.
-        problem: Why it cannot be opened; empty if it can.
+        changed_s: Time of the last change, seconds since 1970.
+        problem: The reason why it cannot be opened; empty if it can.
     """
 
     design_id: str
@@ -56,7 +56,7 @@ class DesignFolder:
     """The folder of one design.
 
     Args:
-        path: The folder; it is there.
+        path: The folder; it must exist.
 
     Attributes:
         path: As given.
@@ -73,16 +73,16 @@ class DesignFolder:
 
     @property
     def jobs(self) -> Path:
-        """Where work that was asked for is."""
+        """Folder of the requested work."""
         return self.path / "jobs"
 
     @property
     def blasts(self) -> Path:
-        """Where blasts are."""
+        """Folder of the blasts."""
         return self.path / "blasts"
 
     def save(self, history: History) -> None:
-        """Keep a design with its steps.
+        """Save a design with its steps.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -100,7 +100,7 @@ class DesignFolder:
         return History.from_record(self._content(), str(self.path / _DESIGN))
 
     def entry(self) -> DesignEntry:
-        """Return the design for a list, without reading all of it anew."""
+        """Return the entry of the design for a list, without checking the whole design."""
         try:
             changed_s = (self.path / _DESIGN).stat().st_mtime
             content = self._content()
@@ -110,20 +110,20 @@ class DesignFolder:
             return DesignEntry(self.design_id, "damaged", 0.0, str(error))
 
     def blast_of(self, key: str) -> Path:
-        """Return the folder of a blast, which need not be there."""
+        """Return the folder of a blast, which need not exist."""
         return self.blasts / check_key(key)
 
     def blasts_there(self) -> frozenset[str]:
-        """Return the keys of the blasts that were run to their end."""
+        """Return the keys of the complete blasts."""
         return frozenset(path.parent.name for path in self.blasts.glob(f"*/{RECORD}"))
 
     def record_of(self, key: str) -> BlastRecord | None:
-        """Return what is kept of a blast, or `None` if it was not run to its end."""
+        """Return the record of a blast, or `None` if it is not complete."""
         if key not in self._records:
             record = read_record(self.blast_of(key))
             if record is None:
                 return None
-            self._records[key] = record  # it never changes any more
+            self._records[key] = record  # it never changes again
         return self._records[key]
 
     def _content(self) -> Any:
@@ -138,13 +138,13 @@ class WorkFolder:
     """The folder of all designs.
 
     Args:
-        path: The folder; it is made if need be.
+        path: The folder; created if it is missing.
 
     Attributes:
         path: As given, absolute.
 
     Raises:
-        BlastEnvError: If it cannot be made.
+        BlastEnvError: If it cannot be created.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -153,12 +153,12 @@ class WorkFolder:
 
     @property
     def cache(self) -> Path:
-        """Where loads of blasts are kept for every design."""
+        """Folder of the loads of blasts, shared by all designs."""
         return self.path / "cache"
 
     def designs(self) -> list[DesignEntry]:
-        """Return the designs, the one changed last first."""
-        # A process that is killed while it makes one leaves a folder without a design.
+        """Return the designs, the latest changed first."""
+        # A process killed while it creates a design leaves a folder without one.
         folders = [each for each in self._designs.iterdir() if (each / _DESIGN).exists()]
         entries = [DesignFolder(each).entry() for each in folders]
         return sorted(entries, key=lambda each: -each.changed_s)
@@ -168,7 +168,7 @@ class WorkFolder:
 
         Args:
             scenario: Its site.
-            label: Where that comes from.
+            label: Label of the first step: the source of the site.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -183,7 +183,7 @@ class WorkFolder:
         """Return the folder of a design.
 
         Raises:
-            BlastEnvError: If there is none of that name.
+            BlastEnvError: If no design has that name.
         """
         folder = DesignFolder(self._designs / check_key(design_id))
         if not (folder.path / _DESIGN).is_file():
@@ -195,7 +195,7 @@ class WorkFolder:
         """Hold the folder in this block: two servers would overwrite each other's designs.
 
         Args:
-            url: Where this server is, for the message to others.
+            url: Address of this server, for the message of others.
 
         Raises:
             BlastEnvError: If another process holds it.
@@ -227,7 +227,7 @@ class _Holder(Kept):
 
 
 def _holder(mark: Path) -> str | None:
-    """Return where the server is that holds a folder, or `None` if none does any more."""
+    """Return the address of the server that holds a folder, or `None` if none does."""
     try:
         holder = checked_as(_Holder, parse_json(read_text(mark)))
     except DocumentError:
@@ -238,6 +238,6 @@ def _holder(mark: Path) -> str | None:
         os.kill(holder.process, 0)
     except ProcessLookupError:
         return None
-    except OSError:  # it is there, but another user's
+    except OSError:  # the process runs, but belongs to another user
         return holder.url
     return holder.url

@@ -1,8 +1,8 @@
-"""Who may use the page: the person who has the address that was printed, and nobody's other pages.
+"""Access control of the page: only the holder of the printed address, and no other web page.
 
-A server at this computer's own address is within reach of every page that is open in a browser
-here. So it answers only to its own names (a name that is made to lead here is refused), only to
-requests of its own pages, and only to those who have the token of the printed address.
+Every page open in a browser on this computer can reach a server at its loopback address. So the
+server answers only under its known names (which defeats DNS rebinding), only to requests from its
+own pages, and only with the token of the printed address.
 """
 
 import asyncio
@@ -26,10 +26,10 @@ with import_extra("app", "page to design on"):
     from starlette.websockets import WebSocketClose
 
 MOST_BYTES: Final = 100_000_000
-"""Larger requests are refused before they are read."""
+"""Largest request; larger ones are refused before they are read."""
 
 MOST_SECONDS: Final = 120.0
-"""So long may a file take to arrive."""
+"""Longest time that a file may take to arrive."""
 
 TOKEN: Final = "token"
 """Name of the token in the printed address."""
@@ -45,7 +45,7 @@ _METHODS: Final = ("GET", "HEAD", "POST")
 _POLICY: Final = MappingProxyType(
     {
         "default-src": "'none'",
-        # NiceGUI's pages carry their program inline, and compile what they show in the browser.
+        # NiceGUI's pages carry inline scripts, and compile their templates in the browser.
         "script-src": "'self' 'unsafe-inline' 'unsafe-eval'",
         "style-src": "'self' 'unsafe-inline'",
         "img-src": "'self' data: blob:",
@@ -63,27 +63,27 @@ HEADERS: Final[Mapping[str, str]] = MappingProxyType(
         "Content-Security-Policy": "; ".join(f"{key} {value}" for key, value in _POLICY.items()),
         "X-Frame-Options": "DENY",
         "X-Content-Type-Options": "nosniff",
-        # Not "no-referrer": with it, browsers say of no form where it comes from.
+        # Not "no-referrer": with it, browsers send no origin with a form.
         "Referrer-Policy": "same-origin",
         "Cross-Origin-Opener-Policy": "same-origin",
         "Cross-Origin-Resource-Policy": "same-origin",
     }
 )
-"""What every answer says to browsers."""
+"""Headers of every response."""
 
 
 @dataclass(frozen=True)
 class Entrance:
-    """Where the page is, and what one needs to use it.
+    """The address of the page, and its secret.
 
     Attributes:
         host: Address to listen at.
         port: Port to listen at.
-        more_names: Names under which the server may be asked as well, with a port or without.
+        more_names: Further names under which the server answers, with a port or without.
         token: The secret of the printed address.
 
     Raises:
-        BlastEnvError: If a name is none.
+        BlastEnvError: If a name is invalid.
     """
 
     host: str = "127.0.0.1"
@@ -92,7 +92,7 @@ class Entrance:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(_TOKEN_BYTES), repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse names that are none."""
+        """Check the names."""
         for name in self.more_names:
             if _NAME.fullmatch(name.lower()) is None:
                 raise BlastEnvError(
@@ -118,13 +118,13 @@ class Entrance:
 
     @property
     def authorities(self) -> frozenset[str]:
-        """What may stand in the header `Host`, and behind the scheme in `Origin`."""
+        """The values allowed in the header `Host`, and after the scheme in `Origin`."""
         own = _OWN_NAMES if self.host in _EVERYWHERE else (*_OWN_NAMES, _bracketed(self.host))
         named = [each.lower() for each in self.more_names]
         with_port = {each for each in named if _has_port(each)}
         without = {*own, *named} - with_port
         found = with_port | {f"{name}:{self.port}" for name in without}
-        # Behind a server of another kind, which has the port that is not named.
+        # Behind a reverse proxy on its scheme's default port.
         found |= {name for name in named if not _has_port(name)}
         return frozenset(found | (without if self.port == 80 else set()))
 
@@ -138,11 +138,11 @@ def _has_port(name: str) -> bool:
 
 
 class Guard:
-    """Stands before an application, and lets only those in who may be; as ASGI, websockets too.
+    """ASGI middleware that admits only allowed requests and websockets to an application.
 
     Args:
         app: The application.
-        entrance: Where it is, and what one needs.
+        entrance: The address of the page, and its secret.
         most_bytes: Largest request.
         most_s: Longest time that a request with content may take.
     """
@@ -183,7 +183,7 @@ class Guard:
             await self._pass_on(scope, receive, answered)
 
     def _refusal(self, asked: HTTPConnection, reason: str) -> Response | None:
-        """Return the answer to what does not reach the application."""
+        """Return the response to a request that must not reach the application, or `None`."""
         method = asked.scope["method"]
         if reason:
             return _refused(403, reason)
@@ -199,7 +199,7 @@ class Guard:
         return None
 
     def _foreign(self, asked: HTTPConnection) -> str:
-        """Return why a request is none of the page's own; empty if it may be."""
+        """Return the reason why a request is foreign to the page; empty if it is not."""
         hosts = asked.headers.getlist("host")
         if len(hosts) != 1 or hosts[0].lower() not in self._authorities:
             return (
@@ -215,7 +215,7 @@ class Guard:
             if scheme not in ("http", "https") or authority not in self._authorities:
                 return f"origin {origin!r} is not this page: other pages may not use it"
         site, place = (asked.headers.get(f"sec-fetch-{each}", "") for each in ("site", "dest"))
-        # Following a link to here is all that others may ask for; a frame has another place.
+        # Other pages may only link here; a frame has another destination than "document".
         if site not in ("", "none", "same-origin") and place != "document":
             return "other pages may not use this page, nor show it in a frame"
         return ""
@@ -227,9 +227,9 @@ class Guard:
         return secrets.compare_digest(given.encode(), self._entrance.token.encode())
 
     def _welcome(self, asked: HTTPConnection) -> Response:
-        """Return a page that keeps the token as a cookie, and goes on to the address without it.
+        """Return a page that stores the token in a cookie and goes on to the address without it.
 
-        Not a redirection: a browser that came from another page would send no cookie there.
+        Not an HTTP redirect: a browser that came from another page would send no cookie with it.
         """
         path = quote("/" + asked.scope["path"].lstrip("/\\"))
         rest = urlencode([each for each in asked.query_params.multi_items() if each[0] != TOKEN])
@@ -260,7 +260,7 @@ class Guard:
         return None
 
     async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let the application answer; content may arrive for a while, but not forever."""
+        """Let the application answer, within the time limit for requests with content."""
         begun = False
 
         async def noted(message: Message) -> None:
@@ -276,7 +276,7 @@ class Guard:
                 words = f"the content took more than {self._most_s:g} s to arrive"
                 await _refused(408, words)(scope, receive, send)
         except RuntimeError as error:
-            # Starlette misses an answer to a browser that was closed before it had one.
+            # Starlette raises this if the browser closed before the application answered.
             if str(error) != _UNANSWERED or not await _is_gone(receive):
                 raise
 
@@ -301,7 +301,7 @@ def _refused(status: int, reason: str) -> Response:
 
 
 def _with_headers(send: Send) -> Send:
-    """Return what sends answers with the headers that all have."""
+    """Return a `send` that adds the common headers to responses."""
 
     async def sent(message: Message) -> None:
         if message["type"] == "http.response.start":

@@ -1,4 +1,4 @@
-"""Processes that do the work of all designs: started beforehand, given work, stopped."""
+"""Worker processes for all designs: started in advance, given work, stopped."""
 
 import asyncio
 import os
@@ -17,7 +17,7 @@ from blast_env.app.work import Status, Task, read_status, write_status, write_ta
 from blast_env.files import make_folder
 
 _GRACE_S: Final = 5.0
-"""How long work may take to stop with the server before its process is ended."""
+"""Time allowed for work to stop with the server before its process is killed."""
 
 _MOST_READINGS: Final = 2
 _COMMAND: Final = (sys.executable, "-m", "blast_env.app.worker")
@@ -25,7 +25,7 @@ _COMMAND: Final = (sys.executable, "-m", "blast_env.app.worker")
 
 @dataclass
 class _Process:
-    """A worker, and what it does."""
+    """A worker process and its task."""
 
     popen: "subprocess.Popen[str]"
     folder: Path | None = None
@@ -41,7 +41,7 @@ class _Process:
                 stdout=subprocess.DEVNULL,
                 stderr=log,
                 text=True,
-                start_new_session=True,  # Ctrl-C is for the server, which then tells the workers
+                start_new_session=True,  # Ctrl-C is for the server, which stops the workers
             )
         )
 
@@ -50,7 +50,7 @@ class _Process:
         return self.popen.poll() is None
 
     def send(self, line: str) -> bool:
-        """Send a line; return whether the process could still take it."""
+        """Send a line; return whether the process accepted it."""
         assert self.popen.stdin is not None
         try:
             self.popen.stdin.write(f"{line}\n")
@@ -66,7 +66,7 @@ class _Process:
         self.hang_up()
 
     def hang_up(self) -> None:
-        """Close the process's standard input, which is what it ends by."""
+        """Close the process's standard input, which ends it."""
         if self.popen.stdin is not None:
             with suppress(OSError):
                 self.popen.stdin.close()
@@ -74,13 +74,13 @@ class _Process:
 
 @dataclass
 class Workers:
-    """Some processes, and the work that waits for them.
+    """The worker processes, and the queue of work.
 
-    `tick` does what is due; call it from time to time. Work is known by its folder.
+    Call `tick` regularly to hand out work. Work is identified by its folder.
 
     Attributes:
-        most: Most processes that work at the same time.
-        readings: What reads the files that are handed over takes one of these: each is a process.
+        most: Most worker processes at the same time.
+        readings: Limits the processes that read uploaded files: each holds it while it runs.
     """
 
     most: int = field(default_factory=lambda: min(max(os.cpu_count() or 1, 1), 4))
@@ -91,17 +91,17 @@ class Workers:
     _waiting: deque[Path] = field(default_factory=deque, init=False)
 
     def prepare(self) -> None:
-        """Start one process that waits for work, so that the first blast need not wait for it."""
+        """Start one idle process, so that the first blast need not wait for it."""
         if not self._processes:
             self._processes.append(_Process.started())
 
     def begin(self, task: Task, jobs: Path, title: str) -> Path:
-        """Put work in line.
+        """Queue work.
 
         Args:
             task: The work.
-            jobs: Where its folder is made.
-            title: What it is, for people.
+            jobs: Parent of its folder.
+            title: Its title on the page.
 
         Returns:
             The folder of the work.
@@ -128,11 +128,11 @@ class Workers:
                 process.send("stop")
 
     def is_known(self, folder: Path) -> bool:
-        """Return whether work is waiting or under way here."""
+        """Return whether work is queued or running here."""
         return folder in self._waiting or any(each.folder == folder for each in self._processes)
 
     def tick(self) -> None:
-        """Look after the processes: who is done, who has died, who can take more."""
+        """Check the processes for finished work and deaths, and hand out queued work."""
         for process in [*self._processes]:
             self._look_at(process)
         while self._waiting:
@@ -150,7 +150,7 @@ class Workers:
                 self._processes.remove(idle)
 
     def close(self) -> None:
-        """Stop all work, let searches keep what they have, and end the processes."""
+        """Stop all work, let searches keep their best layouts, and end the processes."""
         for folder in [*self._waiting]:
             self.stop(folder)
         for process in self._processes:
@@ -184,7 +184,7 @@ class Workers:
 
 
 def jobs_of(folder: Path, most: int | None = None) -> list[tuple[Path, Status]]:
-    """Return the work that was asked for, the last first; the last few, if `most` says so."""
+    """Return the requested work, the latest first, at most `most` of it."""
     folders = sorted((each for each in folder.iterdir() if each.is_dir()), reverse=True)
     return [(each, read_status(each)) for each in folders[:most]]
 
@@ -195,7 +195,7 @@ def _put(folder: Path, state: str, text: str) -> None:
 
 
 def settle(jobs: Path, workers: Workers) -> None:
-    """Say of work that no process does any more, after a server was killed, that it stopped."""
+    """Mark as stopped the unfinished work without a process, as after a killed server."""
     for folder, status in jobs_of(jobs):
         if not status.is_over and not workers.is_known(folder):
             _put(folder, "stopped", "the server stopped meanwhile")

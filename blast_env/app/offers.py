@@ -1,4 +1,4 @@
-"""What can propose a layout on the page: the proposers of the package, by name."""
+"""The proposers that the page offers, by name."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
@@ -12,14 +12,14 @@ from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.vehicles import source_of
 
 PACKAGED: Final = "package"
-"""What `blast-env propose` gives: weights or a surrogate, the best rule where neither can."""
+"""The proposer of `blast-env propose`: weights or a surrogate, or the best rule without either."""
 
 
 def offered(scenario: Scenario, runs: Iterable[str] = ()) -> Mapping[str, str]:
-    """Return what proposes a layout for a site, the best first, by "kind name", with a label.
+    """Return the labels of the proposers for a site by "kind name", the best first.
 
-    Of the kind "rule" is what needs no settings, of "run" the agent of a run folder, and of
-    "search" what needs a budget. There is nothing without a build zone.
+    The kinds are "rule" (needs no settings), "run" (the agent of a run folder) and "search" (needs
+    a budget). The result is empty without a build zone.
 
     Args:
         scenario: The scenario.
@@ -46,10 +46,10 @@ def rules(scenario: Scenario) -> tuple[str, ...]:
 
 
 def title_of(name: str) -> str:
-    """Return what people call a proposer: of a run folder its name.
+    """Return the title of a proposer; that of a run folder is its name.
 
     Args:
-        name: Of the proposer, or a path.
+        name: Name of the proposer, or a path.
     """
     known = proposers()
     return known[name].title if name in known else name.rpartition("/")[2]
@@ -61,7 +61,7 @@ def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Lay
     Args:
         name: The rule.
         scenario: The scenario; it has a build zone.
-        charges: One is known; of more of them, each may be the one.
+        charges: A single one is known; of several, any may be the one.
 
     Raises:
         UnknownNameError: If there is no such rule for the scenario; the message names the nearest.
@@ -76,6 +76,6 @@ def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Lay
     assert isinstance(rule, RuleProposer)
     told = charges[0] if len(charges) == 1 else None
     sources = tuple(source_of(each) for each in charges)
-    if Need.VEHICLE in proposer_row(name).needs:  # it is against all vehicles of the site
+    if Need.VEHICLE in proposer_row(name).needs:  # it plans for all vehicles of the site
         return rule.rule(scenario, told)
     return rule.rule(scenario.model_copy(update={"charge": sources}), told)

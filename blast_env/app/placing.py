@@ -1,7 +1,7 @@
-"""What can be placed on a site, and what stands in a layout, for whoever edits or draws one.
+"""The elements that can be placed on a site, and those of a layout, for editing and drawing.
 
-The single place of the page that knows what the elements of a layout are; whether one may stand
-somewhere is for `Placement` to say.
+Only this module of the page handles the elements of a layout; `Placement` decides whether one may
+stand at a place.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,13 +21,13 @@ PlainLayout = tuple[tuple[Any, ...], ...]
 
 
 class Placeable(NamedTuple):
-    """Something of which a layout can be made.
+    """An item from which a layout can be made.
 
     Attributes:
         name: Its name; empty for the single module.
-        label: What people call it.
+        label: Its label.
         can_turn: Whether it can be turned by a right angle.
-        left: How many of them are left.
+        left: Number of them left.
     """
 
     name: str
@@ -37,12 +37,12 @@ class Placeable(NamedTuple):
 
 
 class Measurable(NamedTuple):
-    """A measure that hardens facades, which a layout takes or not.
+    """An optional measure of a layout: it hardens facades or removes structures.
 
     Attributes:
         name: Its name.
-        label: What people call it, with its cost.
-        words: What it puts where.
+        label: Its label, with its cost.
+        words: Its effect and its place.
         is_taken: Whether the layout takes it.
     """
 
@@ -58,10 +58,10 @@ def plain(layout: Iterable[Element]) -> PlainLayout:
 
 
 def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
-    """Return the layout of data, whether or not it may stand.
+    """Return the layout of data, whether or not it is legal.
 
     Raises:
-        LayoutError: If it is none for this site.
+        LayoutError: If the data are no layout for this site.
     """
     if scenario.build_zone is None:
         if data:
@@ -71,7 +71,7 @@ def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
 
 
 def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
-    """Return what can be placed; nothing without a build zone."""
+    """Return the items that can be placed; none without a build zone."""
     zone = scenario.build_zone
     if zone is None:
         return ()
@@ -93,7 +93,7 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
 
 
 def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
-    """Return what may be taken or not; nothing without a build zone that has some."""
+    """Return the measures that a layout may take; none without a build zone."""
     zone = scenario.build_zone
     known = {**catalogue(), **scenario.components}
     return tuple(
@@ -108,7 +108,7 @@ def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
 
 
 def _words_of(measure: AnyMeasure, known: Components) -> str:
-    """Return what a measure puts where: `window, 12 mm laminated on office, west, storey 1`."""
+    """Return a measure in words: `window, 12 mm laminated on office, west, storeys 1`."""
     if isinstance(measure, Removable):
         return f"takes away {', '.join(measure.structures)}: needs a blast of its own"
     names = [each for each in (measure.glazing, measure.wall) if each]
@@ -122,10 +122,9 @@ def _words_of(measure: AnyMeasure, known: Components) -> str:
 
 
 def element(scenario: Scenario, item: str, cell: Cell, turned: bool = False) -> Element:
-    """Return the element that an item is with its lower left cell there.
+    """Return the element of an item with its lower left cell at `cell`.
 
-    An item that there is none of is taken for the first one, one that cannot be turned for not
-    turned.
+    An unknown item stands for the first of the catalogue; one that cannot be turned is not turned.
     """
     items = {each.name: each for each in scenario.zone.items}
     if not items:
@@ -143,7 +142,7 @@ def element_at(scenario: Scenario, layout: Layout, cell: Cell) -> Element | None
 
 
 def cell_at(scenario: Scenario, x_m: float, y_m: float) -> Cell | None:
-    """Return the cell of the build zone at a place, perhaps one that does not exist."""
+    """Return the cell of the build zone's grid at a place; it may lie outside the zone."""
     zone = scenario.build_zone
     if zone is None:
         return None
@@ -152,25 +151,25 @@ def cell_at(scenario: Scenario, x_m: float, y_m: float) -> Cell | None:
 
 
 def rectangle_of(scenario: Scenario, new: Element) -> Rectangle:
-    """Return what an element covers, also where there is no such cell."""
+    """Return the rectangle that an element covers, m, also outside the zone."""
     return scenario.zone.element_rectangle_m(new)
 
 
 def moved_to(old: Element, cell: Cell) -> Element:
-    """Return an element with its lower left cell somewhere else."""
+    """Return an element with its lower left cell at `cell`."""
     return old._replace(row=cell[0], column=cell[1]) if isinstance(old, Piece) else cell
 
 
 def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | None:
-    """Return why something cannot stand beside a layout, or `None` if it can."""
+    """Return the reason why an element cannot stand beside a layout, or `None` if it can."""
     return Placement.of(scenario, layout).explain(new)
 
 
 def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple[str, ...]]:
-    """Return what of a layout may stand on a changed site, and why the rest may not.
+    """Return the part of a layout that is legal on a changed site.
 
     Returns:
-        The layout, and a sentence for each element that fell away.
+        The layout, and one reason for each element removed.
     """
     try:
         return Placement.of(scenario, layout).layout, ()
@@ -185,7 +184,7 @@ def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple
 
 
 def counted(scenario: Scenario, layout: Layout) -> str:
-    """Return how many elements a layout has, of how many, and what they cost."""
+    """Return the number of elements of a layout out of the stock, and their cost, in words."""
     zone = scenario.build_zone
     if zone is None:
         return "no build zone"
@@ -196,5 +195,5 @@ def counted(scenario: Scenario, layout: Layout) -> str:
 
 
 def cost_of(scenario: Scenario, layout: Layout) -> float:
-    """Return what a layout costs."""
+    """Return the cost of a layout."""
     return Placement.of(scenario, layout).cost

@@ -1,4 +1,4 @@
-"""The plan of a site as SVG, and where a pixel of it is on the site."""
+"""The plan of a site as SVG, and the conversion between its pixels and the site."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ from blast_env.scenario import Placement, Scenario
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
-_FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, whatever one's colour vision
+_FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, safe for colour-blind readers
 _REFUSED: Final = "#D55E00"
 _SELECTED: Final = "#0072B2"
 _LEAST_CELL_PX: Final = 9.0  # below it cells are not drawn one by one
@@ -55,10 +55,10 @@ def _hex(colour: Colour) -> str:
 
 @dataclass(frozen=True)
 class PixelView:
-    """What part of a site is seen in how many pixels.
+    """The visible part of a site, and its size in pixels.
 
     Attributes:
-        left_m: Left border of what is seen.
+        left_m: Left border of the visible part.
         bottom_m: Lower border.
         pixels_per_m: Scale.
         width_px: Width of the picture.
@@ -92,7 +92,7 @@ class PixelView:
         return self.left_m + x_px / self.pixels_per_m, self.bottom_m + up_px / self.pixels_per_m
 
     def zoomed(self, factor: float) -> "PixelView":
-        """Return the view nearer by a factor, its middle kept."""
+        """Return the view magnified by a factor about its middle."""
         x_m, y_m = self.metres(self.width_px / 2.0, self.height_px / 2.0)
         scale = min(max(self.pixels_per_m * factor, 0.1), _MOST_ZOOM)
         share = self.pixels_per_m / scale
@@ -104,7 +104,7 @@ class PixelView:
         )
 
     def panned(self, across: float, up: float) -> "PixelView":
-        """Return the view moved by shares of what is seen."""
+        """Return the view moved by shares of its width and height."""
         return replace(
             self,
             left_m=self.left_m + across * self.width_px / self.pixels_per_m,
@@ -121,7 +121,7 @@ class PixelView:
 def plan_svg(
     view: PixelView, scenario: Scenario, layout: Layout, selected: SiteThing | None
 ) -> str:
-    """Return what stands on a site; `overlay_svg` goes on top of it."""
+    """Return the plan of a site with a layout; `overlay_svg` goes on top of it."""
     features = _features(scenario, layout)
     cells = [each for each in features if each.kind in (NO_CELL, FREE_CELL)]
     return "".join(
@@ -139,7 +139,7 @@ def plan_svg(
 
 
 def plan_legend(scenario: Scenario, layout: Layout) -> str:
-    """Return what the colours and lines of the plan stand for, as HTML; what is on top first."""
+    """Return the legend of the plan as HTML, the topmost features first."""
     shown = {each.title: each for each in without(_features(scenario, layout), Kinds.SITE)}
     return "".join(
         f'<span><svg width="24" height="14" aria-hidden="true">{"".join(_swatch(each))}</svg>'
@@ -169,7 +169,7 @@ def _swatch(feature: Feature) -> Iterator[str]:
 
 
 def _named(feature: Feature) -> Feature:
-    """Return a feature with its label; zones are named where they are."""
+    """Return a feature with its label; the build zone's is its name."""
     is_zone = feature.kind is Kinds.BUILD_ZONE
     return replace(feature, label=feature.name) if is_zone else feature
 
@@ -177,7 +177,7 @@ def _named(feature: Feature) -> Feature:
 def overlay_svg(
     view: PixelView, scenario: Scenario, ghost: Ghost | None, cursor: Cell | None
 ) -> str:
-    """Return what is on the move: what would stand where, and where the keyboard is."""
+    """Return the moving layer: the ghost of an element, and the cell of the keyboard."""
     parts = []
     if cursor is not None and scenario.build_zone is not None:
         cell = scenario.build_zone.cell_rectangle_m(cursor)
@@ -191,7 +191,7 @@ def overlay_svg(
 
 
 def draw_features(view: PixelView, features: Iterable[Feature]) -> Iterator[str]:
-    """Yield the features by their geometry and their look; areas of a kind are one figure."""
+    """Yield the SVG of features by geometry and look; areas of a kind are one figure."""
     for (kind, look, colour, corners), group in groupby(
         features, key=lambda each: (each.kind, each.look, each.colour, min(len(each.places_m), 3))
     ):
@@ -434,6 +434,6 @@ def _wrapped(view: PixelView, x_px: float, y_px: float, text: str) -> list[str]:
 
 
 def words_of_place(view: PixelView, x_m: float, y_m: float) -> str:
-    """Return a place in words: as exact as a pixel is."""
+    """Return a place in words, as precise as a pixel."""
     digits = 1 if view.pixels_per_m >= 5.0 else 0
     return f"x {floor(x_m * 10.0) / 10.0:.{digits}f} m, y {floor(y_m * 10.0) / 10.0:.{digits}f} m"

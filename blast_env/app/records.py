@@ -1,4 +1,4 @@
-"""What is kept of a blast, and the table in which layouts stand beside each other."""
+"""The record of a blast, and the table that compares layouts."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,19 +26,19 @@ from blast_env.statistics import reductions
 from blast_env.units import PA_PER_KPA
 
 RECORD: Final = "record.json"
-"""Name of the file in the folder of a blast; it is there when all of it is."""
+"""Name of the file in the folder of a blast; written last, it marks a complete blast."""
 
 _DASH: Final = "\N{EN DASH}"
 _TOGETHER: Final = "all protected"
 FILM: Final = "film.json"
 MOST_BYTES: Final = 50_000_000
-"""Most that a file of the work folder may have."""
+"""Largest size of a file of the work folder."""
 
 FRAME: Final = "{:03}.jpg"
 
 
 class Kept(BaseModel):
-    """Base of what is kept in files: frozen, numbers that do not exist are NaN."""
+    """Base of the records in files: frozen; missing numbers are NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
@@ -52,7 +52,7 @@ class EngineRecord(Kept):
     Attributes:
         name: `event` (particles) or `gas`.
         cell_m: Side of the cells of gas dynamics.
-        cells: Whether they grow, see `GasSettings`.
+        cells: Uniform cells, or the name of those that grow; see `GasSettings`.
     """
 
     name: str = "event"
@@ -61,12 +61,12 @@ class EngineRecord(Kept):
 
     @property
     def is_first_look(self) -> bool:
-        """Whether it is quick and has noise, and a calibration turns what it says into loads."""
+        """Whether this is a calibrated (particle) engine."""
         return self.name in CALIBRATED_ENGINES
 
     @property
     def label(self) -> str:
-        """The engine in words, for people who have to know what a number rests on."""
+        """The engine in words, to stand beside each of its numbers."""
         if self.is_first_look:
             return "particles (first look)"
         return f"{self.name}, {self.gas.cell_words}"
@@ -89,7 +89,7 @@ class Load(Kept):
         structure: Its name; empty for all protected ones together, by weight.
         protected: Whether its load counts.
         impulse_pa_s: Impulse, Pa s: with particles the mean over the seeds.
-        low_pa_s: Lower end of its 95 % interval; NaN where there is no noise.
+        low_pa_s: Lower end of its 95 % interval; NaN without noise.
         high_pa_s: Upper end.
         peak_kpa: Largest overpressure, kPa; NaN with particles.
     """
@@ -103,14 +103,14 @@ class Load(Kept):
 
 
 class Wave(Kept):
-    """What a gauge recorded.
+    """The history of a gauge.
 
     Attributes:
         gauge: Its name.
         peak_kpa: Largest overpressure.
         impulse_pa_s: Of all positive phases.
-        time_ms: Times, a thinned history.
-        overpressure_kpa: Overpressure then.
+        time_ms: Times of the thinned history.
+        overpressure_kpa: Overpressure at these times.
     """
 
     gauge: str
@@ -121,21 +121,21 @@ class Wave(Kept):
 
 
 class Picture(Kept):
-    """A picture of a blast: its file, and what it shows."""
+    """A picture of a blast: its file and its label."""
 
     file: str
     label: str
 
 
 class Verdict(Kept):
-    """What a blast does to a building with a facade.
+    """The response of a building with a facade to a blast.
 
     Attributes:
         building: Its name.
         level: Level of protection that it reaches, from 0, below standards, to 4, high.
         level_on_cells: The same by the clipped peaks on the cells alone.
-        panes: Panes that it has.
-        broken: Panes that are expected to break.
+        panes: Number of its panes.
+        broken: Expected number of broken panes.
         condition: Performance condition of its worst pane, GSA.
         damage: Damage of its worst wall panel; empty where it has none.
         total_damage: Damage of all its components, added up.
@@ -154,22 +154,22 @@ class Verdict(Kept):
 
 
 class BlastRecord(Kept):
-    """What is kept of a blast.
+    """The record of a blast.
 
     Attributes:
-        key: What it is found by, see `blast_key`.
+        key: Its key, see `blast_key`.
         threat: Name of the threat.
         engine: The engine.
         layout: The layout.
-        loads: All structures; the first one is of all protected ones together.
-        buildings: Buildings of several structures, where their mean is known.
-        notes: What there is to say about it.
-        unchecked: A building and why a verdict on it is to be distrusted, one each: loads by gas,
-            or walls that stand in no bay.
+        loads: Loads on the structures; the first is that on all protected ones together.
+        buildings: Loads on the buildings of several structures, where their mean is known.
+        notes: Notes on the blast.
+        unchecked: Pairs of a building and a reason to distrust the verdict on it: loads by gas, or
+            walls that stand in no bay.
         pictures: Pictures beside the film.
         waves: Histories of the gauges.
-        seconds: How long it took.
-        repeat: All that is needed to run it again.
+        seconds: Duration of the run, s.
+        repeat: The data to run it again: scenario hash, charge, versions.
     """
 
     key: str
@@ -187,10 +187,10 @@ class BlastRecord(Kept):
 
 
 class Film(Kept):
-    """The frames of a film: how many there are, and when each is.
+    """The frames of a film: their number and their times.
 
     Attributes:
-        count: Frames that are there.
+        count: Number of frames written so far.
         time_ms: Simulated time of every frame, also of those to come.
     """
 
@@ -199,7 +199,7 @@ class Film(Kept):
 
 
 def write_kept(record: Kept, path: Path) -> None:
-    """Write a record; the file is there as a whole or not at all.
+    """Write a record, the whole file or none.
 
     Raises:
         BlastEnvError: If it cannot be written.
@@ -209,7 +209,7 @@ def write_kept(record: Kept, path: Path) -> None:
 
 
 def read_kept(kind: type[AnyKept], path: Path) -> AnyKept | None:
-    """Return a record of a file, or `None` if it is not there or damaged."""
+    """Return the record in a file, or `None` if it is missing or damaged."""
     try:
         return kind.model_validate_json(read_text(path, MOST_BYTES))
     except ValueError:
@@ -217,20 +217,20 @@ def read_kept(kind: type[AnyKept], path: Path) -> AnyKept | None:
 
 
 def read_record(folder: Path) -> BlastRecord | None:
-    """Return the record of a blast, or `None` if it is not there or damaged."""
+    """Return the record of a blast, or `None` if it is missing or damaged."""
     return read_kept(BlastRecord, folder / RECORD)
 
 
 def frames_in(folder: Path) -> int:
-    """Return how many frames of the film of a blast are there."""
+    """Return the number of frames written of the film of a blast."""
     film = read_kept(Film, folder / FILM)
     return 0 if film is None else film.count
 
 
 def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: EngineRecord) -> str:
-    """Return by what a blast is found again: all that its loads and histories depend on.
+    """Return the key of a blast: the digest of all that its loads and histories depend on.
 
-    Measures that harden facades are left out, and so is what stands in bays: no load depends on it.
+    Hardening measures and the panes and walls in the bays are left out: no load depends on them.
     """
     divided = [
         (each.name, each.facade.storey_m, each.facade.bay_m)
@@ -253,11 +253,11 @@ class Row(Kept):
 
     Attributes:
         layout: Name of the layout, or "no barrier".
-        threat: Name of the threat, or what all of them together come to.
+        threat: Name of the threat, or "all" of so many.
         structure: Name of the structure, or "all protected".
         impulse: Impulse in Pa s, with its interval where there is one.
         peak: Peak in kPa.
-        load: What the site's objective counts, in its unit.
+        load: Load by the site's objective, with its unit.
         cost: Cost of the layout.
         reduction: Reduction of the load that counts, against no barrier under the same threat.
         engine: The engine in words.
@@ -275,17 +275,17 @@ class Row(Kept):
 
 
 class VerdictRow(Kept):
-    """A row of the table of buildings: a layout under a threat, or the worst of all threats.
+    """A row of the table of buildings: a layout under one threat, or under the worst of them.
 
     Attributes:
         layout: Name of the layout, or "no barrier".
         threat: Name of the threat, or "worst of" so many.
         building: Name of the building.
         level: Level of protection that it reaches.
-        panes: How many panes are expected to break, of how many.
+        panes: Expected number of broken panes, and the number of panes.
         condition: Performance condition of the worst pane, GSA.
         damage: Damage of the worst wall panel.
-        flags: Why the loads that this rests on are to be distrusted; a dash where they are not.
+        flags: Reasons to distrust its loads; a dash if there are none.
     """
 
     layout: str
@@ -300,7 +300,7 @@ class VerdictRow(Kept):
 
 @dataclass(frozen=True)
 class LoadJudge:
-    """Says what counts of the loads on a site, as rewards, searches and reports do.
+    """Counts the loads on a site by its objective, as rewards, searches and reports do.
 
     Attributes:
         scenario: The site, with its objective and the weights of its structures.
@@ -310,13 +310,13 @@ class LoadJudge:
 
     @property
     def objective(self) -> ObjectiveSection:
-        """What the site's layouts are to lower."""
+        """The objective of the site."""
         return self.scenario.objective
 
     def counted(self, record: BlastRecord, load: Load) -> float:
-        """Return the load that counts of a structure, or of all protected ones, in its unit.
+        """Return the counted load of a structure, or of all protected ones, in its unit.
 
-        NaN where a peak counts and the engine knows none.
+        NaN where a peak counts and the engine has none.
         """
         if not load.structure:
             own = {each.name for each in self.scenario.structures if each.protected}
@@ -328,11 +328,11 @@ class LoadJudge:
         )
 
     def together(self, record: BlastRecord) -> float:
-        """Return the load that counts of all protected structures."""
+        """Return the counted load of all protected structures."""
         return self.counted(record, record.loads[0])
 
     def text(self, load: float) -> str:
-        """Return a load that counts, with its unit; a dash for one that does not exist."""
+        """Return a counted load with its unit; a dash for NaN."""
         return _DASH if load != load else self.objective.text(load)
 
 
@@ -341,10 +341,10 @@ def comparison(
     bare: Mapping[str, BlastRecord],
     scenario: Scenario,
 ) -> list[Row]:
-    """Return the comparison of layouts, threat by threat and structure by structure.
+    """Return the comparison of layouts, one row per layout, threat and structure.
 
-    Where there are several threats, rows at the end have the load that the site's objective makes
-    of all of them, for each layout that was blasted under all.
+    With several threats, the last rows hold the load by the site's objective over all of them, for
+    each layout blasted under all.
 
     Args:
         records: Name, cost and blast of each layout.
@@ -379,7 +379,7 @@ def comparison(
 
 
 def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tuple[Load, ...]]]:
-    """Yield the loads that have a row, with those of their parts: a building is one of them."""
+    """Yield each load that has a row, with those of its parts; a building has one row."""
     known = {each.structure: each for each in record.buildings}
     names = scenario.building_names
     together: dict[str, list[Load]] = {}
@@ -393,7 +393,7 @@ def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tupl
 def _all_threats(
     records: Sequence[tuple[str, float, BlastRecord]], judge: LoadJudge
 ) -> Iterator[Row]:
-    """Yield what the loads of all threats come to, for layouts that met all of them."""
+    """Yield the load over all threats, one row per layout blasted under all of them."""
     threats = dict.fromkeys(record.threat for _, _, record in records)
     if len(threats) < 2:
         return
@@ -435,7 +435,7 @@ def _impulse_text(load: Load) -> str:
 
 
 def _number(value: float) -> str:
-    """Return three digits of a number, a dash for one that does not exist."""
+    """Return a number with three digits; a dash for NaN."""
     if value != value:
         return _DASH
     return f"{float(f'{value:.3g}'):,g}"
@@ -448,10 +448,10 @@ def _percent(share: float) -> str:
 
 
 def check_key(key: str) -> str:
-    """Return the name of a folder that came from outside, if it is one.
+    """Return the name of a folder from outside, once it is checked.
 
     Raises:
-        BlastEnvError: If it could lead anywhere else.
+        BlastEnvError: If it is not 1 to 100 letters, digits, `_` or `-`, and could lead elsewhere.
     """
     if re.fullmatch(r"[A-Za-z0-9_-]{1,100}", key) is None:  # longer ones are no names of folders
         raise BlastEnvError(f"{key[:100]!r} is no name of a design or a blast")

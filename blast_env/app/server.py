@@ -27,16 +27,16 @@ with import_extra("app", "page to design on"):
 
 LOOPBACK: Final = ("127.0.0.1", "localhost", "::1")
 _PAGE_FILES: Final = Path(__file__).parent / "page"
-_PRIMARY: Final = "#005a8c"  # on white and under white it can be read
+_PRIMARY: Final = "#005a8c"  # readable on white, and under white text
 _TICK_S: Final = 0.05
 _RECONNECT_S: Final = 30.0
-"""How long a browser may be silent, as while gas keeps all cores busy, before it loads anew."""
+"""Longest silence of a browser, as when gas keeps all cores busy, before it reloads the page."""
 
 MOST_PAGES: Final = 24
-"""How many pages may be open at the same time; each takes about a megabyte."""
+"""Most pages open at the same time; each takes about a megabyte."""
 
 _UNUSED_S: Final = 30.0
-"""How long a page is kept that no browser has connected to; a busy browser takes a while."""
+"""Lifetime of a page without a connected browser; a busy browser takes a while."""
 
 _MOST_CONNECTIONS: Final = 400
 _MOST_MESSAGE_BYTES: Final = 2_000_000
@@ -48,7 +48,7 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
 
     Args:
         sessions: The designs.
-        runs: Run folders of trained agents that may be asked for layouts.
+        runs: Run folders of trained agents, offered as proposers.
     """
     room = [Depends(_check_room)]
 
@@ -90,7 +90,7 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
         except BlastEnvError as error:
             raise HTTPException(404, str(error)) from error
         finally:
-            sessions.leave(design_id)  # unless a page looks at it
+            sessions.leave(design_id)  # unless a page shows it
         return FileResponse(path, headers=_KEPT_BY_BROWSER)
 
     app.add_static_file(local_file=_PAGE_FILES / "player.js", url_path="/player.js")
@@ -101,10 +101,10 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
 
 
 def _check_room() -> None:
-    """Refuse a page more than may be open.
+    """Refuse a page beyond the limit.
 
     Raises:
-        HTTPException: If there are too many.
+        HTTPException: If `MOST_PAGES` are open.
     """
     if len(Client.instances) >= MOST_PAGES:
         raise HTTPException(
@@ -126,7 +126,7 @@ def _style() -> None:
 
 
 def check_port(host: str, port: int) -> None:
-    """Refuse a port on which nothing can be served, before anything is started.
+    """Refuse an unusable port, before anything is started.
 
     Raises:
         BlastEnvError: If it is in use, or may not be used.
@@ -144,11 +144,11 @@ def check_port(host: str, port: int) -> None:
 
 
 def serve(entrance: Entrance, folder: Path, runs: Sequence[Path] = ()) -> None:
-    """Serve the page until the process is told to end.
+    """Serve the page until the process is terminated.
 
     Args:
-        entrance: Where to listen, and who may come in.
-        folder: Where everything is kept.
+        entrance: The address of the page, and its secret.
+        folder: The work folder.
         runs: Run folders of trained agents.
 
     Raises:
@@ -161,12 +161,12 @@ def serve(entrance: Entrance, folder: Path, runs: Sequence[Path] = ()) -> None:
         held.callback(workers.close)
         add_pages(Sessions(work, workers), runs)
         app.on_startup(workers.prepare)
-        app.on_shutdown(held.close)  # after SIGTERM nothing else is run any more
+        app.on_shutdown(held.close)  # after SIGTERM, code below the server does not run
         outside = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         ui.run_with(
             outside, title="blast-env", show_welcome_message=False, reconnect_timeout=_RECONNECT_S
         )
-        # Not ui.run: what it puts around the pages would be outside of the guard.
+        # Not ui.run: its middleware around the pages would be outside the guard.
         uvicorn.run(
             Guard(outside, entrance), host=entrance.host, port=entrance.port, log_level="warning",
             ws="wsproto", ws_max_size=_MOST_MESSAGE_BYTES, limit_concurrency=_MOST_CONNECTIONS,

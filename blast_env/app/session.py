@@ -1,7 +1,7 @@
-"""A design that is open: edits that are kept at once, work that is under way, results.
+"""An open design: edits saved at once, running work, results.
 
-A session knows nothing of the page. All tabs on one design share its session, and designs have
-nothing to do with each other.
+A session is independent of the page. All tabs on one design share its session, and designs are
+independent of each other.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -42,12 +42,12 @@ from blast_env.scenario import AnyCharge, Scenario
 from blast_env.scenario.build_scene import charge_against
 
 BARE = "no barrier"
-"""What the blast without a layout is called."""
+"""Name of the blast without a layout."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A layout whose blast is shown beside others.
+    """A layout with a blast to show beside others.
 
     Attributes:
         name: Its name.
@@ -62,17 +62,16 @@ class Shown:
 
 @dataclass
 class Session:
-    """A design that is open.
+    """An open design.
 
     Attributes:
-        folder: Where it is kept.
+        folder: Its folder.
         work: The work folder.
-        workers: What does its work.
+        workers: The worker processes.
         history: The design with its steps.
-        engine: The engine that blasts are run with, and whose results are shown.
-        threats: Names of the threats that blasts are run with; those of the site that come first,
-            unless they were chosen.
-        view: The view that was opened last; a page that is loaded again begins with it.
+        engine: The engine of new blasts and of the results shown.
+        threats: Names of the threats of blasts; by default `usual_threats` of the site.
+        view: The view opened last; a reloaded page starts with it.
     """
 
     folder: DesignFolder
@@ -87,7 +86,7 @@ class Session:
 
     @classmethod
     def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
-        """Return the session of a design as it was left.
+        """Return the session of a saved design.
 
         Raises:
             BlastEnvError: If it cannot be read.
@@ -99,7 +98,7 @@ class Session:
 
     @property
     def design(self) -> Design:
-        """The design as it is."""
+        """The current design."""
         return self.history.design
 
     @property
@@ -110,25 +109,25 @@ class Session:
     # Edits.
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call a function after every edit; return what ends that."""
+        """Call a function after every edit; return a function that ends that."""
         self._listeners.append(listener)
         return lambda: self._listeners.remove(listener)
 
     @property
     def is_watched(self) -> bool:
-        """Whether a tab looks at the design."""
+        """Whether a tab shows the design."""
         return bool(self._listeners)
 
     def put(self, label: str, design: Design) -> None:
-        """Make a step, and keep it.
+        """Make a step, and save it.
 
         Raises:
-            BlastEnvError: If it cannot be kept; the step is made all the same.
+            BlastEnvError: If it cannot be saved; the step is made all the same.
         """
         self._set(self.history.then(label, design))
 
     def put_site(self, label: str, scenario: Scenario) -> tuple[str, ...]:
-        """Make a step to a changed site; return what of the layouts fell away, and why.
+        """Make a step to a changed site; return notes on the elements removed from layouts.
 
         Raises:
             BlastEnvError: As for `put`.
@@ -138,7 +137,7 @@ class Session:
         return notes
 
     def harden(self, measure: str, *, taken: bool) -> None:
-        """Take a measure into the layout that is edited, or out of it.
+        """Add a measure to the active layout, or remove it.
 
         Raises:
             LayoutError: If there is no such measure, or the budget does not pay for it.
@@ -150,15 +149,15 @@ class Session:
         self.put(label, self.design.with_layout((*layout, own) if taken else layout))
 
     def show(self, slot: int) -> None:
-        """Take another layout before oneself."""
+        """Make another layout the active one."""
         self._set(self.history.showing(slot))
 
     def undo(self) -> None:
-        """Take the last step back."""
+        """Undo the last step."""
         self._set(self.history.undone())
 
     def redo(self) -> None:
-        """Make the step again that was taken back last."""
+        """Redo the last undone step."""
         self._set(self.history.redone())
 
     def _set(self, history: History) -> None:
@@ -175,14 +174,14 @@ class Session:
     # Work.
 
     def chosen_threats(self) -> tuple[NamedThreat, ...]:
-        """Return the threats that blasts are run with."""
+        """Return the threats of blasts."""
         return tuple(each for each in threats_of(self.scenario) if each.name in self.threats)
 
     def blast(self, slots: Iterable[int]) -> Path:
         """Run the blasts of layouts under the chosen threats; return the folder of the work.
 
         Raises:
-            BlastEnvError: If it cannot be begun.
+            BlastEnvError: If there are no layouts, or the work cannot be started.
         """
         chosen = [*slots]
         names = ", ".join(SLOTS[each] for each in chosen)
@@ -215,7 +214,7 @@ class Session:
         Args:
             method: Name of the method.
             budget: Most blasts.
-            from_layout: Whether to begin with the layout that is edited.
+            from_layout: Whether to start from the active layout.
 
         Raises:
             BlastEnvError: If there is no build zone, or the budget is below 1.
@@ -233,10 +232,10 @@ class Session:
         return self._begin(task, f"{method} search, {budget} blasts, {self.engine.label}")
 
     def film(self, path: Path) -> Path:
-        """Write a film of the layout that is edited beside no barrier, under the first threat.
+        """Write a film of the active layout beside no barrier, under the first threat.
 
         Raises:
-            BlastEnvError: If it cannot be begun.
+            BlastEnvError: If it cannot be started.
         """
         task = FilmTask(
             **self._on_site(),
@@ -249,15 +248,15 @@ class Session:
     def report(
         self, page: Path, pdf: Path | None = None, choice: ReportChoice | None = None
     ) -> Path:
-        """Report on the layout that is edited, by gas dynamics, under the chosen threats.
+        """Report on the active layout, by gas dynamics, under the chosen threats.
 
         Args:
             page: The page to write, .html.
             pdf: The same as PDF.
-            choice: What is to be in it.
+            choice: Its contents.
 
         Raises:
-            BlastEnvError: If the layout is empty, or it cannot be begun.
+            BlastEnvError: If the layout is empty, or the report cannot be started.
         """
         self._check_for_report()
         task = ReportTask(
@@ -270,10 +269,10 @@ class Session:
         return self._begin(task, f"report {page.name if pdf is None else pdf.name}")
 
     def take(self, status: Status, slot: int) -> None:
-        """Take the layout of a proposal or a search as one of the design's.
+        """Put the layout of a proposal or a search into a slot of the design.
 
         Raises:
-            BlastEnvError: If there is none, or the site has changed so that it cannot stand.
+            BlastEnvError: If there is none, or it is not legal on the changed site.
         """
         if status.layout is None:
             raise BlastEnvError(f"{status.title}: there is no layout to take")
@@ -282,19 +281,19 @@ class Session:
         self.put(f"{status.title} into {SLOTS[slot]}", design)
 
     def jobs(self, most: int | None = None) -> list[tuple[Path, Status]]:
-        """Return the work that was asked for, the last first; the last few, if `most` says so."""
+        """Return the requested work, the latest first, at most `most` of it."""
         return jobs_of(self.folder.jobs, most)
 
     @property
     def is_at_work(self) -> bool:
-        """Whether the work that was asked for last is still to be done."""
+        """Whether the latest work is unfinished."""
         return any(not status.is_over for _, status in self.jobs(1))
 
     def _begin(self, task: Task, title: str) -> Path:
         return self.workers.begin(task, self.folder.jobs, title)
 
     def _on_site(self) -> dict[str, Any]:
-        """Return what all work on the site is told."""
+        """Return the parameters common to all work on the site."""
         return {
             "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
             "threats": self.chosen_threats(),
@@ -302,7 +301,7 @@ class Session:
         }
 
     def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
-        """Return what the blasts of layouts cost that are not there yet; nothing with particles."""
+        """Return the costs of the missing blasts of layouts; none with particles."""
         if self.engine.is_first_look:
             return ()
         keys: dict[str, AnyCharge] = {}
@@ -313,7 +312,7 @@ class Session:
         return tuple(self._cost(charge) for key, charge in keys.items() if key not in there)
 
     def cost_of_report(self, choice: ReportChoice) -> ReportCost:
-        """Return what a report on the layout that is edited costs.
+        """Return the cost of a report on the active layout.
 
         Raises:
             BlastEnvError: If the layout is empty, or there are too many threats.
@@ -330,7 +329,7 @@ class Session:
             )
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
-        """Return what the blasts of a search cost; nothing with particles."""
+        """Return the costs of the blasts of a search; none with particles."""
         charges = [each.charge for each in self.chosen_threats()]
         if self.engine.is_first_look or not charges:
             return ()
@@ -345,7 +344,7 @@ class Session:
     def shown(self, threat: NamedThreat) -> tuple[Shown, ...]:
         """Return the layouts with the keys of their blasts under a threat, no barrier first.
 
-        Empty layouts are left out: they are no barrier.
+        Empty layouts are left out: they equal no barrier.
         """
         layouts: list[tuple[str, Layout]] = [(BARE, ())]
         layouts += [
@@ -361,7 +360,7 @@ class Session:
         return blast_key(self.scenario, layout, charge, self.engine)
 
     def comparison(self) -> list[Row]:
-        """Return the table of all blasts that were run for the design as it is now."""
+        """Return the table of all blasts of the current design."""
         records: list[tuple[str, float, BlastRecord]] = []
         bare: dict[str, BlastRecord] = {}
         for threat in self.chosen_threats():
@@ -375,7 +374,7 @@ class Session:
         return comparison(records, bare, self.scenario)
 
     def verdicts(self) -> list[VerdictRow]:
-        """Return what becomes of the buildings in all blasts of the design as it is now."""
+        """Return the verdicts on the buildings in all blasts of the current design."""
         found = [
             (each.name, record, self.verdicts_on(each, threat))
             for threat in self.chosen_threats()
@@ -385,7 +384,7 @@ class Session:
         return [*verdict_rows(found)]
 
     def verdicts_on(self, shown: Shown, threat: NamedThreat) -> tuple[Verdict, ...]:
-        """Return what a blast does to the buildings, with what stands in their facades now."""
+        """Return the verdicts of a blast on the buildings with their current facades."""
         if not any(each.facade for each in self.scenario.structures):
             return ()
         known = shown.key, facades_digest(self.scenario, shown.layout)
@@ -401,10 +400,10 @@ class Session:
         return picture_name(number, facades_digest(self.scenario, shown.layout))
 
     def damage_file(self, key: str, name: str) -> Path:
-        """Return the picture of a building's damage; it is drawn the first time.
+        """Return the picture of a building's damage, drawn at the first request.
 
         Raises:
-            BlastEnvError: If the design shows no such picture (any more).
+            BlastEnvError: If the current design has no such picture.
         """
         path = self.folder.blast_of(key) / name
         if path.is_file():
@@ -432,11 +431,11 @@ class Session:
 
 @dataclass
 class Sessions:
-    """The designs that are open, each once however many tabs look at it.
+    """The open designs, one session per design for all its tabs.
 
     Attributes:
         work: The work folder.
-        workers: What does the work of all.
+        workers: The worker processes for all designs.
     """
 
     work: WorkFolder
@@ -447,7 +446,7 @@ class Sessions:
         """Return the session of a design.
 
         Raises:
-            BlastEnvError: If there is none of that name, or it cannot be read.
+            BlastEnvError: If no design has that name, or it cannot be read.
         """
         if design_id not in self._open:
             folder = self.work.open(design_id)
@@ -455,7 +454,7 @@ class Sessions:
         return self._open[design_id]
 
     def leave(self, design_id: str) -> None:
-        """Let go of the session of a design, unless a tab still looks at it."""
+        """Drop the session of a design, unless a tab still shows it."""
         session = self._open.get(design_id)
         if session is not None and not session.is_watched:
             del self._open[design_id]

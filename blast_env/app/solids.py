@@ -15,7 +15,7 @@ _ZONE_M: Final = 0.04
 _LINE_M: Final = 0.3
 _SIGN_M: Final = 0.6
 SEE_THROUGH: Final = 0.45
-"""Opacity of what has no height."""
+"""Opacity of a structure without a height."""
 
 
 class SolidBox(NamedTuple):
@@ -24,9 +24,9 @@ class SolidBox(NamedTuple):
     Attributes:
         centre_m: Its centre.
         size_m: Its sides.
-        colour: Its colour.
-        opacity: 1, or less where one can look through it: as high as the air.
-        name: What it is.
+        colour: Its colour, `#rrggbb`.
+        opacity: 1, or less for a see-through box: as high as the air, or a place of a charge.
+        name: Its label.
     """
 
     centre_m: tuple[float, float, float]
@@ -37,7 +37,7 @@ class SolidBox(NamedTuple):
 
 
 def boxes(scenario: Scenario, layout: Layout) -> Iterator[SolidBox]:
-    """Yield a site with what stands on it; what has no height goes up to the air, see-through."""
+    """Yield the boxes of a site with a layout; one without height is see-through up to the air."""
     for feature in on_levels(site_features(scenario, layout), scenario.structures):
         bounds_m = feature.bounds_m
         if feature.kind is Kinds.SITE:
@@ -62,7 +62,7 @@ def _standing(feature: Feature, air_m: float) -> SolidBox:
 
 
 def _place(feature: Feature) -> Iterator[SolidBox]:
-    """Yield where a charge may be, or a gauge: a point, a line along an axis, an area."""
+    """Yield the possible places of a charge, or a gauge: a point, a line along an axis, an area."""
     low_m, colour = feature.above_ground_m, feature.kind.look.line or EXPLOSIVE
     name, bounds_m = feature.label or feature.name, feature.bounds_m
     if len(feature.places_m) > 2:

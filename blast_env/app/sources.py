@@ -1,7 +1,7 @@
-"""Where a site comes from: bundled, generated, or a file by its ending.
+"""The sources of a site: bundled, generated, or a file by its suffix.
 
-What reads files runs in a process of its own (`blast_env.reading`), so it is plain functions of a
-path that pickle.
+Files are read in a separate process (`blast_env.reading`), so readers are plain functions of a path
+that pickle.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,35 +19,35 @@ if TYPE_CHECKING:
 Made = TypeVar("Made")
 
 SITES: Final[Mapping[str, Callable[[Path], Scenario]]] = MappingProxyType({".toml": load_scenario})
-"""What makes a site of a file as it is, by its ending."""
+"""Readers of site files that need no options, by suffix."""
 
 MAPS: Final = (".geojson", ".json", ".osm", ".pbf", ".dxf")
-"""Endings of maps and drawings, which take options: `imported_site`."""
+"""Suffixes of maps and drawings, which take options: `imported_site`."""
 
 
 def site_of_file(path: Path) -> Scenario:
     """Return the site of a file.
 
     Raises:
-        BlastEnvError: If it is no site; the message says all that is wrong with it.
+        BlastEnvError: If it is no site; the message lists all its faults.
     """
     return _by_ending(path, SITES, "a site")(path)
 
 
 def is_map(name: str) -> bool:
-    """Return whether a file is a map or a drawing by its name."""
+    """Return whether a file is a map or a drawing by its suffix."""
     return Path(name).suffix.lower() in MAPS
 
 
 def imported_site(path: Path, options: "ImportOptions") -> "ImportedSite":
-    """Return the site that a map or drawing shows, and by how much it deviates.
+    """Return the site of a map or drawing, and its deviations.
 
     Args:
         path: The file.
-        options: What the user decides; a build zone of the map comes before one around buildings.
+        options: The user's choices; a build zone in the map overrides one around buildings.
 
     Raises:
-        BlastEnvError: If it cannot be imported, or a package that this needs is not installed.
+        BlastEnvError: If it cannot be imported, or a required package is not installed.
     """
     from blast_env.importing import import_site  # here, because it needs the extra `maps`
 

@@ -1,6 +1,6 @@
-"""What a worker does: proposals, searches and films; blasts are in `blasts`.
+"""The tasks of a worker: proposals, searches, films and reports; blasts are in `blasts`.
 
-Whatever takes long tells how far it has come through a `Teller`, and may be interrupted anywhere by
+Long work reports its progress through a `Teller`, and may be interrupted anywhere by
 `KeyboardInterrupt`.
 """
 
@@ -38,7 +38,7 @@ _REALISATIONS: Final = 8  # of the particle model, divided among the charges
 
 
 class Teller:
-    """Says in the status of work how far it has come; not more often than anyone can see.
+    """Writes the progress of work into its status, at most every 0.1 s.
 
     Args:
         folder: The folder of the work.
@@ -52,38 +52,38 @@ class Teller:
         self.tell()
 
     def tell(self, **changes: object) -> None:
-        """Say it at once; see `Status` for what there is to say."""
+        """Write changes of the status at once; the keys are the fields of `Status`."""
         self._status = self._status.model_copy(update=changes)
         self._told_s = monotonic()
         write_status(self._status, self.folder)
 
     def share(self, share: float) -> None:
-        """Say what share is done, if the last time is long enough ago."""
+        """Write the completed share, 0 to 1, if an update is due."""
         if self.is_due:
             self.tell(share=min(max(share, 0.0), 1.0))
 
     @property
     def is_due(self) -> bool:
-        """Whether the last time is long enough ago."""
+        """Whether the last update is long enough ago."""
         return monotonic() - self._told_s >= _LEAST_PAUSE_S
 
     @property
     def status(self) -> Status:
-        """What was said last."""
+        """The status written last."""
         return self._status
 
 
 def warm_up() -> None:
-    """Do once what makes first times slow: imports, and loading compiled code."""
+    """Import modules and load compiled code in advance, so that the first task is not slow."""
     warm_engines()
 
 
 def run_task(folder: Path) -> None:
-    """Do the work of a folder.
+    """Run the task of a folder.
 
     Raises:
         BlastEnvError: If it cannot be done; the message is for the user.
-        KeyboardInterrupt: If it was stopped before there was anything to keep.
+        KeyboardInterrupt: If it was stopped before it had any result.
     """
     task, teller = read_task(folder), Teller(folder)
     if isinstance(task, BlastTask):
@@ -108,7 +108,7 @@ def _propose(task: ProposalTask, teller: Teller) -> None:
 
 
 def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[Layout, str]:
-    """Return the layout that is proposed, and what it is expected to gain, in words."""
+    """Return the proposed layout, and its expected gain in words."""
     known = [each.charge for each in task.threats]
     if task.is_run:
         from blast_agents.training import load_agent  # torch takes seconds to import
@@ -161,7 +161,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
 
 
 def practice_case(scenario: Scenario, task: SearchTask) -> Case:
-    """Return what a search may spend its blasts on: the threats, again and again with particles."""
+    """Return the load cases of a search: the threats, with several seeds each for particles."""
     charges = [each.charge for each in task.threats]
     noisy = task.engine.is_first_look
     realisations = max(_REALISATIONS // len(charges), 1) if noisy else 1

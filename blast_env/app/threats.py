@@ -1,4 +1,4 @@
-"""Which charges a design is held against: by name, at places that can be pointed to."""
+"""The charges that a design is tested against, by name, at defined places."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -20,17 +20,17 @@ _NEAREST: Final = ", as near as it comes"
 
 
 class NamedThreat(Kept):
-    """A charge with what people call it, at its place or on its vehicle."""
+    """A charge with its label, at its place or on its vehicle."""
 
     name: str
     charge: AnyCharge
 
 
 def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
-    """Return the charges that a site is held against.
+    """Return the charges that layouts of a site are tested against.
 
-    Of a line its middle and its ends, of an area its middle and its corners. Of a vehicle its worst
-    place, wherever the layout lets it come, and the next ones.
+    Of a line: the middle and the ends; of an area: the middle and the corners; of a vehicle: the
+    nearest place that the layout leaves it, and the next ones by distance.
     """
     named: list[NamedThreat] = []
     for index, source in enumerate(scenario.charge):
@@ -70,9 +70,9 @@ def _of_vehicle(name: str, source: VehicleSource) -> Iterator[NamedThreat]:
 
 
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:
-    """Return the names of the threats that a blast is run with unless others are chosen.
+    """Return the names of the threats that blasts are run with by default.
 
-    Of each source the place that governs by its load in the open; a vehicle's as near as it comes.
+    Of each source, the place that governs by its load in the open; of a vehicle, the nearest one.
     """
     sources: dict[str, list[NamedThreat]] = {}
     for threat in threats_of(scenario):

@@ -1,6 +1,6 @@
-"""What becomes of buildings with facades, from the histories that are kept of a blast.
+"""Verdicts on buildings with facades, from the stored histories of a blast.
 
-Other windows and measures that harden them need no new blast: the loads stay.
+Other windows and hardening measures need no new blast: the loads stay the same.
 """
 
 from collections.abc import Iterator, Sequence
@@ -50,13 +50,13 @@ def keep_histories(result: Any, folder: Path) -> None:
 
 @dataclass(frozen=True, eq=False)
 class FacadeVerdict:
-    """What one blast does to the facades of a site with a layout.
+    """The response of the facades of a site with a layout to one blast.
 
     Attributes:
-        bays: The bays that have a history, with what stands in them behind the layout.
+        bays: The bays with a history, filled as the layout's measures have them.
         time_s: Times of the histories (times,).
         pressure_pa: Mean overpressure on each bay (bays, times).
-        charge: The charge where it went off.
+        charge: The charge at its place.
         scenario: The site.
         cell_m: Side of the cells.
     """
@@ -72,9 +72,9 @@ class FacadeVerdict:
     def read(
         cls, scenario: Scenario, layout: Layout, charge: Charge, cell_m: float, folder: Path
     ) -> "FacadeVerdict | None":
-        """Return the verdict of a blast that is kept; `None` without histories of the facades."""
+        """Return the verdict of a stored blast; `None` without histories of the facades."""
         try:
-            content = BytesIO((folder / _BAYS).read_bytes())  # closed, too, if it is damaged
+            content = BytesIO((folder / _BAYS).read_bytes())  # closes a damaged file, too
             with np.load(content, allow_pickle=False) as kept:
                 names, time_s, pressure = (kept[key] for key in ("names", "time_s", "pressure_pa"))
         except (OSError, ValueError, KeyError, BadZipFile):
@@ -87,13 +87,13 @@ class FacadeVerdict:
         return cls(bays, time_s, pressure[rows].astype(np.float64), charge, scenario, cell_m)
 
     def buildings(self) -> list[BuildingResponse]:
-        """Return what becomes of the buildings."""
+        """Return the response of each building."""
         found = respond(self.bays, self.time_s, self.pressure_pa)
         factor = peak_factor(self.cell_m, self.charge.tnt_kg)
         return by_building(self.scenario, found, self.charge, factor)
 
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Return that in numbers."""
+        """Return the verdict on each building, in numbers."""
         return tuple(map(_verdict, self.buildings()))
 
     def draw(self, number: int, path: Path) -> None:
@@ -113,7 +113,7 @@ class FacadeVerdict:
 
 
 def facades_digest(scenario: Scenario, layout: Layout) -> str:
-    """Return by what a verdict on a blast is found again: all that stands in the bays."""
+    """Return the digest of the contents of all bays, which identifies a verdict on a blast."""
     return sha256(repr(scenario.bays_with(layout)).encode()).hexdigest()[:_HASH_DIGITS]
 
 
@@ -121,8 +121,8 @@ def picture_name(number: int, digest: str) -> str:
     """Return the name of the picture of a building's damage.
 
     Args:
-        number: Of the building.
-        digest: What stands in the bays, see `facades_digest`.
+        number: Number of the building.
+        digest: Digest of the contents of the bays, see `facades_digest`.
     """
     return _NAME.format(number, digest)
 
@@ -145,7 +145,7 @@ def _verdict(building: BuildingResponse) -> Verdict:
 def verdict_rows(
     records: Sequence[tuple[str, BlastRecord, Sequence[Verdict]]],
 ) -> Iterator[VerdictRow]:
-    """Yield what becomes of the buildings, the worst of all threats first where there are more.
+    """Yield the rows of the buildings; with several threats, the worst of them first.
 
     Args:
         records: Name of the layout, the blast, and the verdicts on it.

@@ -1,4 +1,4 @@
-"""Work that a page asks for, as files: what is to be done, how far it has come, what came of it."""
+"""Work requested on the page, as files: the task, its progress and its result."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
-_LEAST_SHARE: Final = 0.05  # before that nobody knows
+_LEAST_SHARE: Final = 0.05  # below it the time left cannot be estimated
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
 
@@ -27,7 +27,7 @@ class SiteTask(Kept):
 
     Attributes:
         scenario: The site as a document.
-        threats: Those that layouts are held against: one is known, more are hidden.
+        threats: Those that layouts are tested against: a single one is known, several are hidden.
         cache: Folder for the loads of blasts.
     """
 
@@ -40,7 +40,7 @@ class SiteTask(Kept):
         """The site.
 
         Raises:
-            ScenarioError: If the document is none.
+            ScenarioError: If the document is no scenario.
         """
         return Scenario.from_document(self.scenario, str(self.scenario.get("name", "the site")))
 
@@ -56,11 +56,11 @@ class LayoutTask(SiteTask):
 
 
 class BlastTask(LayoutTask):
-    """Blasts of one layout, one a threat.
+    """Blasts of one layout, one per threat.
 
     Attributes:
         engine: The engine.
-        blasts: Folder that the blasts are put into, each under its key.
+        blasts: Folder for the blasts, each under its key.
     """
 
     kind: Literal["blast"] = "blast"
@@ -75,7 +75,7 @@ class SearchTask(SiteTask):
         method: Name of the method.
         budget: Most blasts.
         engine: The engine.
-        begin_with: A layout to begin with, for methods that can.
+        begin_with: A layout to start from, for methods that can.
     """
 
     kind: Literal["search"] = "search"
@@ -86,7 +86,7 @@ class SearchTask(SiteTask):
 
 
 class ProposalTask(SiteTask):
-    """A layout that is proposed at once.
+    """A proposal of a layout without a search budget.
 
     Attributes:
         proposer: Name of a rule, or the folder of a trained agent's run.
@@ -112,7 +112,7 @@ class FilmTask(LayoutTask):
 
 
 class ReportChoice(Kept):
-    """What is to be in a report; see `StudyOptions`."""
+    """The contents of a report; see `StudyOptions`."""
 
     cells: tuple[float | str, float | str] = (0.5, 0.25)
     items: bool = True
@@ -122,7 +122,7 @@ class ReportChoice(Kept):
         """Return the options of a report under some charges.
 
         Raises:
-            BlastEnvError: If there are too many.
+            BlastEnvError: If there are too many charges, or an option is out of bounds.
         """
         from blast_env.reporting import StudyOptions  # needs an extra
 
@@ -139,7 +139,7 @@ class ReportTask(LayoutTask):
     """A report on one layout by gas dynamics.
 
     Attributes:
-        choice: What is to be in it.
+        choice: Its contents.
         path: The page, .html.
         pdf: The same as PDF; `None` for none.
     """
@@ -158,17 +158,17 @@ _TASK: Final[TypeAdapter[Task]] = TypeAdapter(Task)
 
 
 class Status(Kept):
-    """How far work has come.
+    """The progress of work.
 
     Attributes:
-        state: Where it is.
-        title: What it is, for people.
-        share: Share that is done.
-        text: What is going on, or what came of it, or what is wrong.
-        layout: The best layout so far, or the one that is proposed; `None` without one.
-        file: A file that was made.
-        began_s: When it began, seconds since 1970; 0 for not yet.
-        grace_s: How long it may take to stop, and to keep what it has, before it is ended.
+        state: Its state.
+        title: Its title on the page.
+        share: Completed share, 0 to 1.
+        text: The current activity, the result or the error.
+        layout: The best layout so far, or the proposed one; `None` without one.
+        file: The file that it wrote.
+        began_s: Its start, seconds since 1970; 0 before it.
+        grace_s: Time allowed to stop and to keep its results, before its process is killed.
     """
 
     state: State = "waiting"
@@ -181,19 +181,19 @@ class Status(Kept):
     grace_s: float = 5.0
 
     def left_s(self, now_s: float) -> float | None:
-        """Return how long it still takes, if it goes on as until now; `None` if that is unknown."""
+        """Return the time left at the present rate, s; `None` if it cannot be estimated."""
         if self.state != "running" or self.share < _LEAST_SHARE or not self.began_s:
             return None
         return (now_s - self.began_s) * (1.0 - self.share) / self.share
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing more will come."""
+        """Whether the work has ended."""
         return self.state in ("done", "failed", "stopped")
 
 
 def write_task(task: Task, folder: Path, title: str) -> None:
-    """Put work into a folder of its own.
+    """Write work and its first status into its folder.
 
     Raises:
         BlastEnvError: If it cannot be written.
@@ -215,12 +215,12 @@ def read_task(folder: Path) -> Task:
 
 
 def write_status(status: Status, folder: Path) -> None:
-    """Say how far work has come."""
+    """Write the progress of work."""
     write_kept(status, folder / STATUS)
 
 
 def read_status(folder: Path) -> Status:
-    """Return how far work has come; where that cannot be read, that it failed."""
+    """Return the progress of work; an unreadable status counts as failed."""
     try:
         return Status.model_validate_json(read_text(folder / STATUS, MOST_BYTES))
     except ValueError as error:

@@ -1,7 +1,7 @@
-"""A process that does work: it waits for the folders of tasks on its standard input.
+"""A worker process, which reads the folders of tasks from its standard input.
 
-`run FOLDER` begins a task, `stop` ends the one that is under way and keeps what it has; when the
-standard input ends, because the server did, the process stops in the same way and ends.
+`run FOLDER` starts a task; `stop` ends the running one and keeps its results so far. When the
+standard input ends, with the server, the process stops its task in the same way and exits.
 """
 
 import _thread
@@ -20,7 +20,7 @@ from blast_env.errors import BlastEnvError
 
 
 class _Inbox:
-    """What the server asks for; a thread reads it, so that `stop` is heard during work."""
+    """The commands of the server; a thread reads them, so that `stop` interrupts a task."""
 
     def __init__(self, lines: IO[str]) -> None:
         self._lines = lines
@@ -30,11 +30,11 @@ class _Inbox:
         threading.Thread(target=self._read, daemon=True).start()
 
     def next(self) -> Path | None:
-        """Return the next task; `None` when there will be no more."""
+        """Return the folder of the next task; `None` when there will be no more."""
         return self._folders.get()
 
     def set_busy(self, busy: bool) -> None:
-        """Say whether there is something that `stop` could end."""
+        """Set whether `stop` has a task to interrupt."""
         with self._lock:
             self._busy = busy
 
@@ -55,7 +55,7 @@ class _Inbox:
 
 
 def do(folder: Path, inbox: _Inbox | None = None) -> None:
-    """Do the work of a folder and say in its status what came of it; no error leaves here."""
+    """Run the task of a folder and write the outcome into its status; raise no error."""
     title = read_status(folder).title
     try:
         if inbox is not None:
@@ -69,7 +69,7 @@ def do(folder: Path, inbox: _Inbox | None = None) -> None:
         _end(folder, "failed", str(error))
     except MemoryError:
         _end(folder, "failed", f"{title}: the memory of this computer does not suffice")
-    except Exception as error:  # a fault of ours must not look like work without an end
+    except Exception as error:  # a fault in the program must not leave the task "running"
         traceback.print_exc()
         _end(folder, "failed", f"{type(error).__name__}: {error}")
     finally:
@@ -85,7 +85,7 @@ def _end(folder: Path, state: str, text: str) -> None:
 
 def main() -> None:
     """Work until the standard input ends."""
-    # A server in the background of a script ignores it, and this process would not hear `stop`.
+    # A shell script's background server ignores SIGINT; inherited, that would disable `stop`.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     inbox = _Inbox(sys.stdin)
     with suppress(KeyboardInterrupt):
@@ -96,7 +96,7 @@ def main() -> None:
             if folder is None:
                 return
             do(folder, inbox)
-        except KeyboardInterrupt:  # it came when the work was done already
+        except KeyboardInterrupt:  # it came after the task was done
             continue
 
 

@@ -1,1 +1,1 @@
-"""The page itself, with NiceGUI: panels, plan, results; all decisions are below."""
+"""The page itself, with NiceGUI: panels, plan, results; the logic is in the layers below."""

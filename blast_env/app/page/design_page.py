@@ -59,7 +59,7 @@ class DesignPage:
         self.session.view = view
 
     def refresh(self) -> None:
-        """Show the design as it is, everywhere."""
+        """Show the current design in all parts of the page."""
         self._site.refresh()
         self._plan.refresh()
         self._solid.refresh()

@@ -1,4 +1,4 @@
-"""What can be changed about a thing on a site, as fields of a form."""
+"""The editable values of a thing on a site, as fields of a form."""
 
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
@@ -14,13 +14,13 @@ class FormField(NamedTuple):
     """A field.
 
     Attributes:
-        label: What it is, with its unit.
+        label: Its label, with its unit.
         key: Its key in the scenario file.
-        form: Kind of the value that it takes.
-        part: Number of the coordinate, where the key holds several.
-        optional: Whether it may be empty: then the rule of the file format holds.
-        inside: Key of the table in which the key is, if it is a further one.
-        hint: What it does, where its label does not say so.
+        form: Kind of its value.
+        part: Number of the coordinate, if the key holds several.
+        optional: Whether it may be empty: then the default of the file format holds.
+        inside: Key of the subtable that holds the key, if there is one.
+        hint: Its effect, if the label does not explain it.
     """
 
     label: str
@@ -139,7 +139,7 @@ _LAST_OF_STRUCTURE: Final = (
 
 
 def fields_of(scenario: Scenario, thing: SiteThing) -> tuple[FormField, ...]:
-    """Return what can be changed about a thing."""
+    """Return the fields of a thing."""
     kind = section_of(scenario, thing).get("kind", "")
     if thing.kind is ThingKind.CHARGE:
         return (*_OF_CHARGES, *_OF_CHARGE[kind])
@@ -150,7 +150,7 @@ def fields_of(scenario: Scenario, thing: SiteThing) -> tuple[FormField, ...]:
 
 
 def value_of(section: Document, field: FormField) -> Any:
-    """Return the value of a field, `None` where the file says nothing."""
+    """Return the value of a field, `None` if the file has none."""
     if field.inside:
         section = section.get(field.inside) or {}
     value = section.get(field.key)
@@ -162,7 +162,7 @@ def value_of(section: Document, field: FormField) -> Any:
 
 
 def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]:
-    """Return what `edits.with_values` is to be given, for what was typed into a field."""
+    """Return the values for `edits.with_values` from the text of a field."""
     value = _of_form(field, typed)
     if field.part is not None:
         coordinates = [*section[field.key]]

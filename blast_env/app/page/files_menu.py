@@ -127,7 +127,7 @@ class FilesMenu:
     def _save_report(self, as_pdf: bool) -> None:
         session = self._session
         try:
-            session.cost_of_report(ReportChoice())  # refuses what cannot be reported on
+            session.cost_of_report(ReportChoice())  # raises if no report is possible
         except BlastEnvError as error:
             complain(error)
             return
@@ -135,11 +135,11 @@ class FilesMenu:
 
 
 class ReportDialog:
-    """What is to be in a report, and what that costs.
+    """Lets the user choose the contents of a report, and shows its cost.
 
     Args:
         session: The design.
-        as_pdf: Whether the report is written as PDF, too.
+        as_pdf: Whether to write the report as PDF, too.
     """
 
     def __init__(self, session: Session, as_pdf: bool) -> None:

@@ -1,4 +1,4 @@
-"""A field for one number, read by one strict parser, with its unit beside it."""
+"""A form field for one number, read by a strict parser, with its unit beside it."""
 
 import re
 from collections.abc import Callable
@@ -15,9 +15,9 @@ _UNIT: Final = re.compile(r" \(([^()]+)\)$")
 class NumberField(ui.input):
     """A text field for a number: number fields of browsers drop characters and keep the rest.
 
-    The number is taken when the field is left or Enter is pressed. The field then shows it as it
-    was taken, beside its unit. A text that is no number stays, with the reason below; where
-    `taken` keeps the number elsewhere, the field shows that number again, and a message says why.
+    The number is read when the field is left or Enter is pressed. The field then shows the number
+    read, beside its unit. A text that is no number stays, with the reason below; if `taken` keeps
+    the number elsewhere, the field shows that number again, and a message gives the reason.
 
     Args:
         label: The quantity, with its unit in parentheses at the end.
@@ -53,7 +53,7 @@ class NumberField(ui.input):
 
     @property
     def number(self) -> float | None:
-        """The number that stands in the field; `None` if it is empty.
+        """The number in the field; `None` if it is empty.
 
         Raises:
             BlastEnvError: If its text is no number, or one out of bounds.
@@ -74,7 +74,7 @@ class NumberField(ui.input):
 
     @property
     def filled(self) -> float:
-        """The number of a field that may not be empty.
+        """The number of a field that must not be empty.
 
         Raises:
             BlastEnvError: As `number`.
@@ -84,7 +84,7 @@ class NumberField(ui.input):
         return number
 
     def show(self, number: float | None) -> None:
-        """Show a number in the place of what stands there."""
+        """Show a number in place of the present text."""
         self._shown = number
         self.error = None
         self.value = _text(number)

@@ -39,9 +39,9 @@ class PlanPanel:
     """The plan with its tools.
 
     Args:
-        editor: The hand on the design.
+        editor: The editor of the design.
         after: Called after something was changed or selected.
-        commands: What further keys do.
+        commands: Commands of further keys.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class PlanPanel:
         self.refresh()
 
     def refresh(self) -> None:
-        """Show the design as it is."""
+        """Show the current design."""
         editor = self._editor
         if editor.session.scenario.site != self._site:
             self._site = editor.session.scenario.site
@@ -243,7 +243,7 @@ class SolidView:
     """The view in three dimensions, which can be turned.
 
     Args:
-        editor: The hand on the design.
+        editor: The editor of the design.
     """
 
     def __init__(self, editor: Editor) -> None:
@@ -273,7 +273,7 @@ class SolidView:
         )
 
     def refresh(self) -> None:
-        """Show the design as it is."""
+        """Show the current design."""
         solids = [*boxes(self._editor.session.scenario, self._editor.session.design.layout)]
         if solids == self._drawn:
             return

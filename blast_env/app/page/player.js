@@ -1,5 +1,5 @@
 // Plays the films of all layouts at the same moment. A film is an <img data-film="folder/"
-// data-count="frames that are there">; one slider and one button are for all of them.
+// data-count="frames written so far">; one slider and one button control all of them.
 (() => {
   const PERIOD_MS = 95;
   const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;

@@ -22,7 +22,7 @@ _COLUMNS: Final = (
     ("structure", "structure", "left"),
     ("impulse", "impulse (Pa\N{NO-BREAK SPACE}s)", "right"),
     ("peak", "peak (kPa)", "right"),
-    ("load", "", "right"),  # what the site's objective counts: its heading is that of the objective
+    ("load", "", "right"),  # load by the site's objective, which also gives the heading
     ("reduction", "reduction", "right"),
     ("cost", "cost", "right"),
     ("engine", "engine", "left"),
@@ -37,7 +37,7 @@ _VERDICT_COLUMNS: Final = (
     ("damage", "worst wall panel", "left"),
     ("flags", "flags of its loads", "left"),
 )
-# Okabe and Ito, with a dash each: no colour alone says which line is which.
+# Okabe and Ito, with dashes, so that colour is not the only difference between lines.
 _LINES: Final = (
     ("#000000", "solid"),
     ("#0072B2", "solid"),
@@ -49,12 +49,12 @@ _LINES: Final = (
 
 @dataclass(frozen=True)
 class _Found:
-    """A blast of which something is there.
+    """A blast with at least a part of its results.
 
     Attributes:
         shown: The layout.
-        record: What is kept of it; `None` while it runs.
-        frames: How many frames of its film are there.
+        record: Its record; `None` while it runs.
+        frames: Number of frames of its film written so far.
         film: Address of its film.
         pictures: Addresses of its pictures, by their labels.
     """
@@ -67,7 +67,7 @@ class _Found:
 
 
 class ResultsView:
-    """Shows the blasts of the layouts as they are now.
+    """Shows the blasts of the current layouts.
 
     Args:
         session: The design.
@@ -119,13 +119,13 @@ class ResultsView:
             self._notes = ui.column().classes("gap-0 mt-1")
 
     def _set(self, name: str, value: Any) -> None:
-        """Take another choice, unless a list is empty for a moment."""
+        """Apply another choice, unless it is empty, as while a list is refilled."""
         if value not in (None, "", getattr(self, name)):
             setattr(self, name, value)
             self.refresh()
 
     def refresh(self) -> None:
-        """Show what there is, if it is not shown already."""
+        """Show the current results, if they have changed."""
         session = self._session
         threats = {each.name: each for each in session.chosen_threats()}
         if self._threat not in threats:
@@ -162,7 +162,7 @@ class ResultsView:
         self._show_notes(records)
 
     def _found(self, there: Sequence[tuple[Shown, int]], threat: NamedThreat) -> Iterator[_Found]:
-        """Yield every blast of which anything is there, with the addresses of its pictures."""
+        """Yield every blast with a record or frames, with the addresses of its pictures."""
         session = self._session
         for each, frames in there:
             record = session.folder.record_of(each.key)
@@ -248,7 +248,7 @@ class ResultsView:
 
 
 def _columns(objective: ObjectiveSection) -> list[dict[str, str]]:
-    """Return the columns of the table; what counts has one unless it is the impulse."""
+    """Return the columns of the table; the counted load has one unless it is the impulse."""
     counts = f"counts: {objective.noun}" + (f" ({objective.unit})" if objective.unit else "")
     return [
         {"name": name, "field": name, "label": label or counts, "align": align}

@@ -1,4 +1,4 @@
-"""The panel on the left: what stands on the site, and what can be changed about it."""
+"""The panel on the left: the things on the site, and their values."""
 
 from collections.abc import Callable
 from functools import partial
@@ -24,10 +24,10 @@ _ADDED: Final = {
 
 
 class SitePanel:
-    """Shows and changes what is selected.
+    """Shows and changes the selected thing.
 
     Args:
-        editor: The hand on the design.
+        editor: The editor of the design.
         after: Called after the panel has changed something.
     """
 
@@ -57,7 +57,7 @@ class SitePanel:
             self._facts = ui.label().classes("be-quiet")
 
     def refresh(self) -> None:
-        """Show the design as it is."""
+        """Show the current design."""
         scenario, editor = self._editor.session.scenario, self._editor
         if editor.selected is not None and not edits.has(scenario, editor.selected):
             editor.selected = None

@@ -1,4 +1,4 @@
-"""The first page: designs to go on with, and sites to begin with."""
+"""The start page: saved designs, and sites for new ones."""
 
 from datetime import datetime
 
@@ -15,11 +15,11 @@ _MOST_SHOWN = 30
 
 
 class StartPage:
-    """The first page.
+    """The start page.
 
     Args:
         sessions: The designs.
-        message: What there is to say first.
+        message: A message to show first.
     """
 
     def __init__(self, sessions: Sessions, message: str = "") -> None:

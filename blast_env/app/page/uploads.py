@@ -1,4 +1,4 @@
-"""Files that are handed over: read apart, what a map leaves open asked, and what is wrong said."""
+"""Uploaded files: read in a separate process, with a dialog for maps and one for errors."""
 
 import re
 from collections.abc import Awaitable, Callable
@@ -25,7 +25,7 @@ _MOST_LETTERS: Final = 100
 
 
 def complain(error: BlastEnvError) -> None:
-    """Show what is wrong, with all its lines, until it has been read."""
+    """Show an error, with all its lines, until the user closes it."""
     with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full"):
         ui.label("That does not work").style("font-weight: 600; font-size: 16px")
         ui.label(str(error)).style("white-space: pre-wrap; overflow-wrap: anywhere")
@@ -36,20 +36,19 @@ def complain(error: BlastEnvError) -> None:
 async def read_upload(
     workers: Workers, file: FileUpload, read: Callable[..., Read], *arguments: Any
 ) -> Read | None:
-    """Return what a file holds, read in a process of its own, which ends with the page.
+    """Return the content of a file, read in a separate process, which ends with the page.
 
     Args:
-        workers: The processes; not all files are read at the same time.
+        workers: The processes; they limit the files read at the same time.
         file: The file.
-        read: Reads it, from a path; it, its arguments and what it returns pickle.
+        read: Reads it, from a path; it, its arguments and its result must pickle.
         arguments: Further arguments.
 
     Returns:
-        What was read; nothing if the page was closed meanwhile, or something is wrong, which was
-        said.
+        The content; `None` if the page was closed meanwhile, or after an error, which was shown.
     """
     client = ui.context.client
-    # The name stands in messages and names the site; nothing of it leads anywhere.
+    # The name appears in messages and names the site; cleaned, it cannot lead to another folder.
     name = re.sub(r"[^\w.() +-]", "_", file.name)[-_MOST_LETTERS:].lstrip(".") or "file"
     try:
         async with workers.readings:
@@ -77,10 +76,10 @@ async def _read_apart(
 
 
 def site_upload(label: str, workers: Workers, use: Callable[[Scenario, str], None]) -> None:
-    """Make a place to hand over the file of a site.
+    """Make an upload field for the file of a site.
 
     Args:
-        label: What stands on it.
+        label: Its label.
         workers: The processes, of which one reads it.
         use: Takes the site, and the name of the file.
     """
@@ -101,11 +100,11 @@ def file_upload(
     endings: tuple[str, ...],
     take: Callable[[events.UploadEventArguments], Awaitable[None]],
 ) -> None:
-    """Make a place to hand over a file.
+    """Make an upload field for a file.
 
     Args:
-        label: What stands on it.
-        endings: Endings of what is offered to choose from.
+        label: Its label.
+        endings: Suffixes of the files on offer.
         take: Takes the file.
     """
 
@@ -127,7 +126,7 @@ def file_upload(
 
 
 class ImportDialog:
-    """Asks what a file does not say, imports it, and says by how much the site deviates.
+    """Asks for the options of a map, imports it, and shows the deviations of the site.
 
     Args:
         file: The file.
@@ -163,10 +162,10 @@ class ImportDialog:
                 ui.button("cancel", on_click=self._dialog.close).props("flat no-caps")
 
     def _options(self) -> ImportOptions:
-        """Return what was filled in.
+        """Return the options entered.
 
         Raises:
-            BlastEnvError: If it is out of bounds, or no place.
+            BlastEnvError: If a value is out of bounds, or no place.
         """
         return ImportOptions(
             protect=tuple(
@@ -199,7 +198,7 @@ class ImportDialog:
             self._report(found)
 
     def _report(self, found: ImportedSite) -> None:
-        """Say by how much the site deviates from the map before it is taken."""
+        """Show the deviations of the site from the map before it is used."""
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full gap-1"):
             site = found.scenario.site
             ui.label(f"{self._file.name}: {site.width_m:g} x {site.height_m:g} m").classes(
@@ -241,10 +240,10 @@ def _filled(element: Any) -> str:
 
 
 def _places(text: str) -> list[tuple[float, float]]:
-    """Return the places of a text, `x, y; x, y`.
+    """Return the places in a text, `x, y; x, y`.
 
     Raises:
-        BlastEnvError: If it is none.
+        BlastEnvError: If a part is no place.
     """
     places = []
     for part in filter(None, (each.strip() for each in text.split(";"))):

@@ -1,4 +1,4 @@
-"""The panel on the right: layouts, blasts, proposals, and the work that is under way."""
+"""The panel on the right: layouts, blasts, proposals, and the current work."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -37,7 +37,7 @@ _ENGINES: Final = {
     ),
     "particles": (EngineRecord(name="event"), "particles: a first look"),
 }
-"""The engines that are offered, the one that judges first."""
+"""The engines on offer, gas dynamics first."""
 _SHOWN_JOBS: Final = 8
 _STATES: Final = {
     "waiting": ("hourglass_empty", "waiting"),
@@ -50,14 +50,14 @@ _STATES: Final = {
 
 @dataclass
 class _Card:
-    """What is shown of some work; its buttons stay in their places while it goes on.
+    """The elements that show some work; they stay in place while its numbers change.
 
     Attributes:
-        folder: The work.
-        status: How far it has come.
-        words: The state in a word, and how long it still takes.
-        bar: That as a bar, until it is over.
-        text: What is going on.
+        folder: The folder of the work.
+        status: The status shown.
+        words: The state in a word, and the time left.
+        bar: The completed share as a bar, until the work has ended.
+        text: The text of the status.
     """
 
     folder: Path
@@ -67,11 +67,11 @@ class _Card:
     text: ui.label | None = None
 
     def can_show(self, folder: Path, status: Status) -> bool:
-        """Whether it takes no other elements to show a state of some work."""
+        """Return whether the same elements can show a status of some work."""
         return self.folder == folder and _elements_of(self.status) == _elements_of(status)
 
     def show(self, status: Status) -> None:
-        """Show how far it has come now."""
+        """Show a status."""
         self.status = status
         if self.words is not None:
             left_s = status.left_s(time())
@@ -85,22 +85,22 @@ class _Card:
 
 
 def _elements_of(status: Status) -> tuple[object, ...]:
-    """Return what decides which elements show a status."""
+    """Return the values that decide which elements show a status."""
     return status.title, status.state, status.file, status.layout is None, _says(status)
 
 
 def _says(status: Status) -> bool:
-    """Return whether the text of a status says more than its state."""
+    """Return whether the text of a status adds to its state."""
     return status.text not in ("", _STATES[status.state][1])
 
 
 class WorkPanel:
-    """Asks for blasts and proposals, and follows them.
+    """Starts blasts and proposals, and follows them.
 
     Args:
-        editor: The hand on the design.
+        editor: The editor of the design.
         after: Called after the panel has changed something.
-        results: Called when somebody wants to see results.
+        results: Called to show the results.
         runs: Run folders of trained agents, by name.
     """
 
@@ -194,7 +194,7 @@ class WorkPanel:
         for element in (self._proposer, self._budget):
             element.on_value_change(lambda: self._say_cost_of_search())
 
-    # What it does.
+    # Actions.
 
     def _show(self, slot: int) -> None:
         if not self._filling:
@@ -226,7 +226,7 @@ class WorkPanel:
             self._after()
 
     def turn(self, turned: bool | None = None) -> None:
-        """Turn what is placed, or as said."""
+        """Toggle or set the rotation of the item to place."""
         if self._filling:
             return
         self._editor.turned = not self._editor.turned if turned is None else turned
@@ -234,7 +234,7 @@ class WorkPanel:
 
     def _harden(self, measure: str, taken: bool) -> None:
         if not self._try(lambda: self._session.harden(measure, taken=taken)):
-            self._measures_shown = None  # its switch does not say how it is
+            self._measures_shown = None  # its switch is wrong: draw it again
             self._after()
 
     def _use(self, name: str) -> None:
@@ -249,7 +249,7 @@ class WorkPanel:
             self._after()
 
     def blast(self) -> None:
-        """Blast the layout that is edited."""
+        """Blast the active layout."""
         self._blast([self._session.design.active])
 
     def blast_all(self) -> None:
@@ -263,7 +263,7 @@ class WorkPanel:
             self.follow()
 
     def propose(self) -> None:
-        """Ask for the layout that is chosen."""
+        """Start the chosen proposer or search."""
         kind, _, name = str(self._proposer.value).partition(" ")
         session = self._session
         if kind == "search":
@@ -284,7 +284,7 @@ class WorkPanel:
         self.follow()
 
     def _try(self, act: Callable[[], object]) -> bool:
-        """Do something, or say why not; return whether it was done."""
+        """Call `act`, or show its error; return whether it succeeded."""
         try:
             act()
         except BlastEnvError as error:
@@ -292,10 +292,10 @@ class WorkPanel:
             return False
         return True
 
-    # What it shows.
+    # Display.
 
     def refresh(self) -> None:
-        """Show the design as it is."""
+        """Show the current design."""
         session, design = self._session, self._session.design
         self._filling = True
         self._slots.value = design.active
@@ -329,14 +329,14 @@ class WorkPanel:
     def _say_cost_of_search(self) -> None:
         costs = []
         if str(self._proposer.value).startswith("search"):
-            with suppress(BlastEnvError):  # the field says what is wrong
+            with suppress(BlastEnvError):  # the field shows the error
                 costs = [*self._session.cost_of_search(int(self._budget.filled))]
         self._search_cost.visible = bool(costs)
         if costs:
             self._search_cost.text = cost_words(costs)
 
     def _offer_measures(self, scenario: Scenario, layout: Layout) -> None:
-        """Offer the measures; a switch each, since one is taken or not."""
+        """Offer the measures, one switch each."""
         offers = placing.measures(scenario, layout)
         if offers == self._measures_shown:
             return
@@ -352,14 +352,14 @@ class WorkPanel:
                 switch.props("dense").classes("text-sm").tooltip(each.words)
 
     def _offer_proposals(self, scenario: Scenario) -> None:
-        """Offer the rules for a site, agents and searches; what was chosen stays if it can."""
+        """Offer rules, agents and searches for a site; keep the choice if it is still offered."""
         offers = {**offered(scenario, self._runs)}
         chosen = self._proposer.value
         value = chosen if chosen in offers else next(iter(offers), None)
         self._proposer.set_options(offers, value=value)
 
     def follow(self) -> None:
-        """Show how far work has come."""
+        """Show the progress of work."""
         if self._session.folder.blasts_there() != self._there:
             self._say_cost()
         jobs = self._session.jobs(_SHOWN_JOBS)
