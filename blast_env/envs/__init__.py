@@ -9,7 +9,7 @@ from blast_env.bundled import ITEM_SITES, LARGE_SITES, REAL_SIZE, SITES, bundled
 BARRIER_ENTRY_POINT: Final = "blast_env.envs.barrier_env:BlastBarrierEnv"
 
 WITHOUT_BUILD_ZONE: Final = frozenset({"free_field"})
-"""Bundled scenarios in which nothing can be placed; named here, since loading all takes time."""
+"""Bundled scenarios without a build zone, listed here because loading all takes time."""
 
 FOR_GAS: Final = frozenset(
     {
@@ -18,8 +18,8 @@ FOR_GAS: Final = frozenset(
         *("school_and_clinic", "school_wing", "shopping_street", "visitor_entrance"),
     }
 )
-"""Bundled scenarios with heights and a catalogue, which have no calibration: their environments are
-of gas dynamics."""
+"""Bundled scenarios with heights and a catalogue but no calibration: their environments use gas
+dynamics."""
 
 
 def barrier_id(scenario_name: str) -> str:
@@ -29,7 +29,7 @@ def barrier_id(scenario_name: str) -> str:
 
 
 def register_environments() -> None:
-    """Register all environments; nothing of them is loaded yet."""
+    """Register all environments without importing their modules."""
     gym.register(
         id="BlastSimulator-v0",
         entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",

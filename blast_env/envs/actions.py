@@ -1,4 +1,4 @@
-"""What an action says: a place at once, or first the item, then where."""
+"""Action spaces: an action gives a complete placement, or the item first and then its place."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ from blast_env.values import whole_number
 
 
 class Actions(Protocol):
-    """A kind of action space: by which choices, one after the other, something is placed."""
+    """A kind of action space: the sequence of choices that makes up a placement."""
 
     def choices(self, catalogue: Catalogue) -> tuple[IntArray, ...]:
         """Return the choices that lead to a variant and its lower left cell.
 
         Returns:
-            For each choice, which of its options every variant and cell belongs to, counted from 0
-            (variants, rows, columns). The options of all choices together leave one place.
+            For each choice, the index from 0 of the option that contains each variant and cell
+            (variants, rows, columns). One option per choice determines a single placement.
         """
 
 
 @dataclass(frozen=True)
 class PlaceAtOnce:
-    """One action a place: a variant and its lower left cell, as `Catalogue` numbers them."""
+    """One action per placement: a variant and its lower left cell, as `Catalogue` numbers them."""
 
     def choices(self, catalogue: Catalogue) -> tuple[IntArray, ...]:
         """Return the only choice."""
@@ -39,11 +39,11 @@ class PlaceAtOnce:
 class ItemThenPlace:
     """First the variant (an item in one orientation), then the place of its lower left cell.
 
-    In a zone without a catalogue there is nothing to choose but the place.
+    In a zone without a catalogue only the place is chosen.
 
     Attributes:
-        block_cells: Side of square blocks of cells: the block is chosen before the cell in it.
-            Without it, the cell is chosen out of the whole zone.
+        block_cells: Side of square blocks, in cells: the block is chosen before the cell in it.
+            Without it, the cell is chosen from the whole zone.
 
     Raises:
         BlastEnvError: If it is less than 1.
@@ -56,7 +56,7 @@ class ItemThenPlace:
             whole_number("block_cells", self.block_cells, 1, 1000)
 
     def choices(self, catalogue: Catalogue) -> tuple[IntArray, ...]:
-        """Return two choices, or three with blocks, without those that have one option alone."""
+        """Return two choices, or three with blocks, without those that have a single option."""
         variant, row, column = np.indices((len(catalogue.variants), *catalogue.shape))
         rows, columns = catalogue.shape
         side = self.block_cells or max(rows, columns, 1)
@@ -72,17 +72,17 @@ ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
         "item_then_block": ItemThenPlace(block_cells=8),
     }
 )
-"""The kinds of actions that have names."""
+"""The action spaces, by their names."""
 
 
 @dataclass(frozen=True, eq=False)
 class ActionChoice:
-    """What has been chosen so far of the next thing to place.
+    """The choices so far for the next placement.
 
     Attributes:
-        possible: What may still come of it, by variant and lower left cell (variants, rows,
-            columns), read-only.
-        choices: How many choices were made.
+        possible: Mask of the placements that remain possible, by variant and lower left cell
+            (variants, rows, columns), read-only.
+        choices: Number of choices made.
     """
 
     possible: BoolArray
@@ -91,10 +91,10 @@ class ActionChoice:
 
 @dataclass(frozen=True, eq=False)
 class NumberedActions:
-    """The actions for a catalogue: the options of the first choice, of the next ones, to finish.
+    """The numbered actions for a catalogue: the options of each choice in turn, then to finish.
 
     Attributes:
-        catalogue: What can be placed.
+        catalogue: The catalogue of modules or pieces.
         choices: See `Actions.choices`.
         first: The first action of each choice (choices,).
         finish: The action that finishes; the others are below it.
@@ -114,7 +114,11 @@ class NumberedActions:
         return cls(catalogue, choices, tuple(first), finish)
 
     def mask(self, chosen: ActionChoice) -> NDArray[np.bool_]:
-        """Return which actions are legal (actions,); to finish is, where nothing is chosen yet."""
+        """Return the mask of legal actions (actions,); finishing is legal before the first choice.
+
+        Args:
+            chosen: The choices so far.
+        """
         mask = np.zeros(self.finish + 1, dtype=np.bool_)
         options = self.choices[chosen.choices]
         mask[self.first[chosen.choices] + options[chosen.possible]] = True
@@ -122,16 +126,17 @@ class NumberedActions:
         return mask
 
     def narrowed(self, chosen: ActionChoice, action: int) -> ActionChoice | Element | None:
-        """Return what is chosen after an action.
+        """Return the state of choice after an action.
 
-        Choices that leave no choice are passed over.
+        Choices with a single remaining option are skipped.
 
         Args:
-            chosen: What was chosen before.
-            action: One that does not finish.
+            chosen: The choices before the action.
+            action: An action other than the one that finishes.
 
         Returns:
-            What is chosen then, what is to be placed, or `None` if the action is illegal.
+            The choices after it; the element to place, if all choices are made; or `None` if the
+            action is illegal.
         """
         option = action - self.first[chosen.choices]
         possible = chosen.possible & (self.choices[chosen.choices] == option)

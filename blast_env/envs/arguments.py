@@ -1,4 +1,4 @@
-"""The arguments of environments and the options of `reset`: checked, and kept as plain data."""
+"""Checks of the arguments of environments and the options of `reset`, kept as plain data."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -23,10 +23,10 @@ _Strategy = TypeVar("_Strategy")
 def checked_keywords(
     function: Callable[_Parameters, _Returned],
 ) -> Callable[_Parameters, _Returned]:
-    """Return the function with an error that names the nearest keyword for a misspelt one.
+    """Return the function with an `UnknownArgumentError` for a misspelt keyword.
 
-    `gymnasium.make` hands keywords over that no type checker has seen, and Python's own error
-    does not say what was meant. What is called raises `UnknownArgumentError` for one.
+    Keywords to `gymnasium.make` escape type checkers, and the error of Python does not suggest the
+    nearest keyword; this one does.
     """
     known = [name for name in signature(function).parameters if name != "self"]
 
@@ -41,15 +41,15 @@ def checked_keywords(
 
 
 def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:
-    """Refuse a name that is not known.
+    """Refuse an unknown name.
 
     Args:
-        kind: What is named, for the error.
+        kind: Kind of the named thing, for the error.
         names: The names given.
         known: The names that exist.
 
     Raises:
-        UnknownNameError: If there is one; the message names the nearest known one.
+        UnknownNameError: If a name is unknown; the message has the nearest known one.
     """
     known = list(known)
     for name in names:
@@ -61,12 +61,12 @@ def strategy(kind: str, value: str | _Strategy, known: Mapping[str, _Strategy]) 
     """Return the strategy of a name, or the strategy itself.
 
     Args:
-        kind: What is named, for the error.
-        value: The name, or an object that is used as it is.
-        known: The strategies that have names.
+        kind: Kind of strategy, for the error.
+        value: The name, or an object that is used unchanged.
+        known: The named strategies.
 
     Raises:
-        UnknownNameError: If there is none of that name; the message names the nearest one.
+        UnknownNameError: If there is none of that name; the message has the nearest one.
         BlastEnvError: If an object lacks the methods that the known ones have in common.
     """
     if isinstance(value, str):
@@ -82,7 +82,7 @@ def strategy(kind: str, value: str | _Strategy, known: Mapping[str, _Strategy]) 
 
 
 def _common_methods(strategies: Iterable[object]) -> list[str]:
-    """Return the methods that all of the strategies have, `__call__` among them."""
+    """Return the public methods common to all the strategies, and `__call__` if they have it."""
     of_each = [{name for name in dir(each) if callable(getattr(each, name))} for each in strategies]
     common = set.intersection(*of_each)
     return sorted(name for name in common if name == "__call__" or not name.startswith("_"))
@@ -92,12 +92,12 @@ def checked_options(options: Mapping[str, Any] | None, known: Iterable[str]) -> 
     """Return the options of a call of `reset`.
 
     Args:
-        options: As given.
+        options: The options given; None for none.
         known: The names that exist.
 
     Raises:
-        UnknownNameError: If there is no such option; the message names the nearest one.
-        BlastEnvError: If they are no mapping.
+        UnknownNameError: If there is no such option; the message has the nearest one.
+        BlastEnvError: If they are not a mapping.
     """
     options = {} if options is None else options
     if not isinstance(options, Mapping):
@@ -106,19 +106,19 @@ def checked_options(options: Mapping[str, Any] | None, known: Iterable[str]) -> 
     return options
 
 
-_MOST_BLAST_SEED: Final = MOST_SEED - 10**6  # the other blasts of an episode have the next ones
+_MOST_BLAST_SEED: Final = MOST_SEED - 10**6  # further blasts of an episode use the next seeds
 
 
 @dataclass(frozen=True)
 class ResetOptions:
-    """What of an episode is fixed.
+    """The fixed parts of an episode; None for those that are drawn.
 
     Attributes:
         charge_position_m: (x, y) of every charge.
         tnt_kg: TNT-equivalent mass of every charge.
         charge_height_m: Height of every charge above the ground.
-        layout: Cells that hold a module, or pieces, from the start.
-        blast_seed: Seed of the first blast; the others have the following ones.
+        layout: The initial layout: cells of modules, or pieces.
+        blast_seed: Seed of the first blast; the others use the following ones.
     """
 
     charge_position_m: tuple[float, float] | None = None
@@ -132,8 +132,8 @@ class ResetOptions:
         """Return the options of a call of `reset`.
 
         Raises:
-            UnknownNameError: If there is no such option; the message names the nearest one.
-            BlastEnvError: If the value of an option is of no use.
+            UnknownNameError: If there is no such option; the message has the nearest one.
+            BlastEnvError: If the value of an option is invalid.
         """
         options = checked_options(options, [field.name for field in fields(cls)])
         checks: dict[str, Callable[[str, Any], Any]] = {
@@ -148,14 +148,14 @@ class ResetOptions:
 
     @property
     def fix_charge(self) -> bool:
-        """Whether anything of the charge is fixed."""
+        """Whether any property of the charge is fixed."""
         fixed = (self.charge_position_m, self.tnt_kg, self.charge_height_m)
         return any(each is not None for each in fixed)
 
     def charge(self, drawn: AnyCharge) -> AnyCharge:
-        """Return a charge that was drawn, with what is fixed in its place.
+        """Return a drawn charge with its fixed properties replaced.
 
-        One with a fixed position does not come in a vehicle.
+        A charge of a vehicle becomes a plain one if its position is fixed.
         """
         if isinstance(drawn, VehicleCharge):
             if self.charge_position_m is None:
@@ -169,17 +169,17 @@ class ResetOptions:
 
 
 class PlainSpec:
-    """A mixin for environments: keeps the arguments of `gymnasium.make` as plain data.
+    """A mixin for environments: stores the arguments of `gymnasium.make` as plain data.
 
-    A scenario becomes its document, a path becomes text. Whatever else is no plain data stays as
-    it is, and `EnvSpec.to_json` refuses it.
+    A scenario becomes its document, a path becomes text. Other objects stay unchanged, and
+    `EnvSpec.to_json` refuses those that are not plain data.
     """
 
     _spec: EnvSpec | None = None
 
     @property
     def spec(self) -> EnvSpec | None:
-        """What `gymnasium.make` made the environment from; `None` if it was made otherwise."""
+        """The specification used by `gymnasium.make`; `None` if the class was called directly."""
         return self._spec
 
     @spec.setter

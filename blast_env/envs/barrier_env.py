@@ -51,42 +51,43 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     ## Description
     Each action puts a barrier module, or a piece of a catalogue, on a cell of the build zone. When
-    the agent has finished, or the stock is used up, the charge goes off. The less impulse the
-    protected structures take, the better the layout is. The scenario says what is legal.
+    the agent has finished, or the stock is used up, the charge goes off. The smaller the impulse
+    on the protected structures, the better the layout. The scenario sets the rules of placement.
 
     ## Action space
     `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
     orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
-    action finishes. `action_masks()` says which are legal, `explain(element)` why one is not. With
-    `action="item_then_place"` or `"item_then_block"` the variant is chosen, then the cell.
+    action finishes. `action_masks()` returns the legal ones, `explain(element)` the reason why a
+    placement is not. With `action="item_then_place"` or `"item_then_block"` the variant is chosen,
+    then the cell.
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
     image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for
-    networks of your own. `"grid_with_load"`: one plane more, the load without a barrier.
+    custom networks. `"grid_with_load"`: one plane more, the load without a barrier.
     `"features"`: a flat vector. `blast_env.envs.observations` lists all planes and values.
 
     ## Rewards
-    An episode's rewards add up to minus the impulse on the protected structures (psi s, by weight)
-    and the cost of illegal actions. `info["reward_terms"]` has the terms: `impulse` (`peak` in psi
-    or `load` without a unit, where the scenario's objective counts these), `deposit` and
-    `illegal_actions`. `reward="terminal"` pays when the charge goes off. Its first step pays a
-    deposit of twice the impulse without a barrier, back at the end, so that to be cut off never
-    pays. `"incremental"` pays each module what it takes off, at once.
+    The rewards of an episode add up to minus the weighted impulse on the protected structures
+    (psi s) and the cost of illegal actions. `info["reward_terms"]` has the terms: `impulse` (`peak`
+    in psi or `load` without a unit, for scenarios with these objectives), `deposit` and
+    `illegal_actions`. `reward="terminal"` pays when the charge goes off. Its first step costs a
+    deposit of twice the impulse without a barrier, returned at the end, so that a truncated episode
+    never pays more. `"incremental"` pays the reduction by each module at once.
 
     ## Starting state
-    No module stands. `threat="visible"` draws one charge and shows it; `"hidden"` draws `threats`
-    charges and shows where charges may be. A vehicle brings its charge to the worst place that the
-    layout leaves it. Everything follows from the seed of `reset`. Options of `reset`:
+    The build zone is empty. `threat="visible"` draws one charge and shows it; `"hidden"` draws
+    `threats` charges and shows their possible places. A vehicle brings its charge to the worst
+    place that the layout allows. The seed of `reset` determines everything. Options of `reset`:
     `charge_position_m`, `tnt_kg`, `charge_height_m`, `layout`, `blast_seed`.
 
     ## Episode end
     Terminated when the agent finishes, nothing more can be placed, or after `illegal_action_limit`
     illegal actions. At the end `info` has the impulses with and without the barrier, `reduction`,
-    `layout`, and what repeats the blasts. Without an episode methods raise `ResetNeeded`.
+    `layout`, and the charges and seeds of the blasts. Methods raise `ResetNeeded` before `reset`.
 
     ## Arguments
-    Those of `__init__`, below.
+    See `__init__`, below.
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
     >>> observation, info = env.reset(seed=0, options={"charge_position_m": (5.0, 15.0)})
@@ -104,8 +105,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     - v0: first version.
 
     ## Notes
-    The engine decides what a result is good for. The particle model knows no heights, overrates
-    walls and is noisy; `"gas"` is three-dimensional, and statements about protection rest on it.
+    The validity of a result depends on the engine. The particle model has no heights, overrates
+    walls and is noisy; `"gas"` is three-dimensional and the basis for statements about protection.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (Gymnasium's declaration)
@@ -133,38 +134,39 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         render_mode: str | None = None,
         show_blast: bool = False,
     ) -> None:
-        """Make an environment; `gymnasium.make` hands its keywords over to this.
+        """Make an environment from the keywords of `gymnasium.make`.
 
         Args:
             scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data; or
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
-            observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts a charge),
+            observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts per charge),
                 `"features"`, or an `Observation`.
             action: `"place"`, `"item_then_place"`, `"item_then_block"`, or `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
-            threats: How many charges are drawn when they are hidden; 16 unless given.
-            realisations: Blasts for each charge; 2 unless given. It is 1 where charges are hidden,
-                since these differ anyway, and for engines without noise.
-            risk: `"mean"`, `"cvar"`, `"worst"`, or a `Risk`, which gets loads in SI units; as the
-                scenario's objective says unless given.
-            cvar_level: The worst share 1 - `cvar_level` of the charges makes the CVaR.
+            threats: Number of hidden charges per episode; default 16.
+            realisations: Number of blasts per charge; default 2 for a visible charge, 1 for
+                hidden ones, which differ anyway. It is always 1 for engines without noise.
+            risk: `"mean"`, `"cvar"`, `"worst"`, or a `Risk`, which gets loads in SI units; by
+                default that of the scenario's objective.
+            cvar_level: The CVaR is the mean over the worst share 1 - `cvar_level` of the charges.
             illegal_action_cost: In the unit of the reward; 0.001 psi s are 6.9 Pa s.
-            illegal_action_limit: Illegal actions that end the episode.
+            illegal_action_limit: Number of illegal actions that ends the episode.
             engine: Name of an engine, or an engine. `"event"` and `"pymunk"` run the particle
-                model: for studying it, for learning methods cheaply, for a first look. `"gas"` is
-                what a decision can rest on: no calibration, one realisation a charge, a second or
-                more a blast; `impulse_sim` is NaN there. `"surrogate"` guesses gas dynamics.
-            cell_m: Side of the cells of gas dynamics; 0.5 m unless given.
-            cache: Where blasts are remembered beside the memory of the environment: a folder,
-                which other processes and later runs may use too, or a `BlastCache`.
+                model: for studying it, for cheap tests of learning methods, for a first look.
+                `"gas"` is the basis for decisions: no calibration, one realisation per charge, a
+                second or more per blast; `impulse_sim` is NaN there. `"surrogate"` approximates
+                gas dynamics.
+            cell_m: Side of the cells of gas dynamics; default 0.5 m.
+            cache: Store of blasts beside the memory of the environment: a folder, which other
+                processes and later runs may use too, or a `BlastCache`.
             render_mode: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
-            show_blast: Whether an episode goes on after the charge has gone off, for as many steps
-                as the film of the blast has frames (some 250), whatever the actions: for a window,
-                and for `gymnasium.wrappers.RecordVideo`. The reward is paid before.
+            show_blast: Whether an episode continues after the detonation, for as many steps as the
+                film of the blast has frames (some 250), regardless of the actions: for a window,
+                and for `gymnasium.wrappers.RecordVideo`. The reward is paid at the detonation.
 
         Raises:
-            BlastEnvError: If an argument is of no use; the message names it and its bounds.
+            BlastEnvError: If an argument is invalid; the message names it and its bounds.
         """
         found = find_engine(engine, cell_m)
         if render_mode is not None:
@@ -185,7 +187,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             evaluators=Evaluators(found, cache),
         )
         representative = self.task.source.representative
-        self.task.evaluators.of(representative)  # so that a wrong engine fails here, not later
+        self.task.evaluators.of(representative)  # an unsuitable engine fails here, not later
         numbered = NumberedActions.of(self.task.actions, representative.zone.catalogue)
         self.action_space = spaces.Discrete(numbered.finish + 1)
         self.observation_space = self.task.observation.space(representative)
@@ -205,10 +207,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         """Draw scenario and charges and clear the build zone; see the class for the options.
 
         Raises:
-            UnknownNameError: If there is no such option; the message names the nearest one.
+            UnknownNameError: If there is no such option; the message has the nearest one.
             LayoutError: If the layout of the options does not fit the build zone.
-            BlastEnvError: If another option is of no use, or the scenario that was drawn is of
-                another size than the first.
+            BlastEnvError: If another option is invalid, or the size of the drawn scenario differs
+                from that of the representative one.
         """
         super().reset(seed=seed)
         self._display.stop_film()
@@ -220,7 +222,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return episode.observe(), episode.information()
 
     def step(self, action: np.int64 | int) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Place a module, choose a part of that, or finish; see the class.
+        """Make a choice, place a module or a piece, or finish; see the class.
 
         Raises:
             gymnasium.error.InvalidAction: If the action is not in the action space.
@@ -246,7 +248,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return episode.observe(), total(terms), ended, False, info
 
     def _show_blast(self) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Go on to the next frame of the film, which pays nothing more."""
+        """Go on to the next frame of the film, with a reward of 0."""
         if self._film_info is None:
             raise gym.error.ResetNeeded("the episode has ended: call reset")
         terms = dict.fromkeys(self._film_info["reward_terms"], 0.0)
@@ -259,14 +261,14 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self._episode.observe(), 0.0, ended, False, info
 
     def blasts_due(self, action: np.int64 | int) -> tuple[BlastAsked, ...]:
-        """Return the blasts that `step` asks for if this action ends the episode; else none.
+        """Return the blasts that `step` requests if this action ends the episode; else none.
 
-        So whoever steps many environments can run the blasts of all of them together, and leave
-        the loads in the `cache` that they share (`Evaluators.run_ahead`). What an observation asks
-        for, or a reward before the end, is not among them.
+        The caller of several environments can thus run their blasts together in advance and leave
+        the loads in a shared `cache` (`Evaluators.run_ahead`). Blasts requested by an observation,
+        or by a reward before the end, are not included.
 
         Args:
-            action: As for `step`, which is still to be called.
+            action: The action of the next call of `step`.
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
@@ -274,7 +276,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self._episode.blasts_due(int(action), self.illegal)
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal now, (actions,).
+        """Return the mask of actions that are legal now, (actions,).
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
@@ -282,7 +284,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self._episode.action_mask()
 
     def explain(self, element: Element) -> str | None:
-        """Return a sentence that says why something cannot be placed, or `None` if it can.
+        """Return a sentence with the reason why an element cannot be placed, `None` if it can.
 
         Args:
             element: (row, column) of the build zone; with a catalogue, a piece.
@@ -293,7 +295,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return self.placement.explain(element)
 
     def explain_vehicles(self) -> tuple[str, ...]:
-        """Return a sentence for each vehicle: how near it comes now, by which way, how fast.
+        """Return a sentence per vehicle with its present stand-off, way and speed.
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
@@ -307,7 +309,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     @property
     def observable(self) -> Observable:
-        """What may be observed of the episode before the charge goes off."""
+        """The observable part of the episode before the charge goes off."""
         return self._episode.observable
 
     def render(self) -> Any:
@@ -315,19 +317,19 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         return None if self._begun is None else self._display.render(self._begun)
 
     def blast_frames(self) -> Iterator[NDArray[np.uint8]]:
-        """Return the film of the blast that ended the episode, uint8 (height, width, 3) each.
+        """Return the film of the blast that ended the episode, frames of uint8 (height, width, 3).
 
-        The frames are as large as those of `render`. Of several charges, it is the worst one.
+        The frames have the size of those of `render`. Of several charges, it shows the worst one.
 
         Raises:
-            gymnasium.error.ResetNeeded: If there is no episode that has ended.
+            gymnasium.error.ResetNeeded: If no episode has ended.
         """
         if not self._episode.ended:
             raise gym.error.ResetNeeded("the charge has not gone off: finish the episode first")
         return self._display.blast_frames(self._episode)
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Tell those who call `gymnasium.utils.play` what has keys: an action a cell has none.
+        """Refuse `gymnasium.utils.play`, since one action per cell is too many for keys.
 
         Raises:
             BlastEnvError: Always; the message names the wrapper.
@@ -339,16 +341,16 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     @property
     def charge_has_gone_off(self) -> bool:
-        """Whether nothing more can be placed, and the layout has been assessed."""
+        """Whether the charge has gone off, so that no more can be placed."""
         return self._episode.ended
 
     def mark(self, action: int | None) -> None:
-        """Outline in the frames of `render` what an action would place, or nothing.
+        """Outline the placement of an action in the frames of `render`, or none.
 
-        A sentence beside it says why it may not be placed, if that is so.
+        The text of the frame has the reason if the placement is illegal.
 
         Args:
-            action: The action; one that finishes is not shown.
+            action: The action; `None`, or one that finishes, removes the outline.
 
         Raises:
             gymnasium.error.InvalidAction: If the action is not in the action space.

@@ -1,4 +1,4 @@
-"""How an episode is shown: as text, as a picture, in a window."""
+"""Display of an episode: as text, as a picture, in a window."""
 
 from collections.abc import Iterator, Sequence
 from math import ceil
@@ -37,11 +37,11 @@ _LEGEND: Final = {
 def placing_text(
     placement: Placement, sources: Sequence[AnySource], lines: Sequence[str] = ()
 ) -> str:
-    """Return the site as text: a character a module of 0.5 m, a frame, a legend.
+    """Return the site as text: one character per square of 0.5 m, a frame and a legend.
 
     Args:
         placement: The modules placed so far.
-        sources: Where the charge is, when it is a single point, or may be.
+        sources: The place of the charge, if a single point, or its possible places.
         lines: Text above the map, after the scenario's name.
     """
     characters = _map(placement.scenario, placement, sources)
@@ -83,7 +83,7 @@ def _map(
 
 
 def _inside(rectangle_m: Rectangle, x: FloatArray, y: FloatArray) -> BoolArray:
-    """Return which squares have their centre in a rectangle."""
+    """Return the mask of squares whose centre is in a rectangle."""
     left, bottom, right, top = rectangle_m
     inside: BoolArray = (x >= left) & (x < right) & (y >= bottom) & (y < top)
     return inside
@@ -96,11 +96,11 @@ _FRAMES_PER_PLACEMENT: Final = 5  # in the window: 0.2 s, so that a person can f
 class Display:
     """Shows an episode of placing, and the blast at its end.
 
-    Drawing objects are made when they are needed and left out when this is pickled.
+    Drawing objects are made on demand and not pickled.
 
     Args:
-        render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for nothing.
-        frames_per_s: Frames a second of the window and of films.
+        render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for no display.
+        frames_per_s: Frames per second of the window and of films.
 
     Attributes:
         marked: The action that is marked in the frames, before the charge goes off.
@@ -118,13 +118,13 @@ class Display:
         self._window: Window | None = None
 
     def show(self, episode: Episode) -> None:
-        """Show the present state in the window, so long that a person can follow."""
+        """Show the present state in the window, long enough for a person to follow."""
         in_film = self._film_frame is not None
         for _ in range(1 if in_film or episode.ended else _FRAMES_PER_PLACEMENT):
             self._show(self._frame(episode))
 
     def render(self, episode: Episode) -> Frame | str | None:
-        """Return what `render` of an environment returns in the render mode."""
+        """Return the frame or text of the render mode; `"human"` shows a frame instead."""
         if self._render_mode == "rgb_array":
             return self._frame(episode).copy()
         if self._render_mode == "ansi":
@@ -140,7 +140,7 @@ class Display:
         return _screening(episode, painter.size_px).frames(self._frames_per_s)
 
     def begin_film(self, episode: Episode) -> None:
-        """Begin the film of the blast: from now on its frames are shown, one after the other."""
+        """Begin the film of the blast, whose frames are shown from now on."""
         self._film = self.blast_frames(episode)
         self.go_on_with_film()
 
@@ -152,7 +152,7 @@ class Display:
         return self._film_frame is not None
 
     def stop_film(self) -> None:
-        """Leave the film, if one is on: a new episode begins."""
+        """End the film, if there is one, for a new episode."""
         self._film = self._film_frame = None
 
     def cell_at(self, episode: Episode, place_px: tuple[int, int]) -> Cell | None:
@@ -170,7 +170,7 @@ class Display:
         return {**self.__dict__, "_painter": None, "_window": None, "_film": None}
 
     def _frame(self, episode: Episode) -> Frame:
-        """Return what is to be seen now."""
+        """Return the present frame."""
         if self._film_frame is not None:
             return self._film_frame
         return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
@@ -188,7 +188,7 @@ class Display:
         painter = self._placing_painter(episode)
         if self._last_frame is None and episode.objective.evaluator.engine.screening:
             self._last_frame = _screening(episode, painter.size_px).last_frame()
-        if self._last_frame is None:  # there is no state of the blast that could be drawn
+        if self._last_frame is None:  # the engine gives no state of the blast to draw
             return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
         return self._last_frame
 
@@ -213,7 +213,7 @@ class Display:
 
 
 def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | PressureScreening":
-    """Return the film of the blast that is shown."""
+    """Return the film of the blast by the worst threat."""
     shown, evaluator = _shown_threat(episode), episode.objective.evaluator
     # Sorted as for the assessment: the order may change the last bits.
     layout = tuple(sorted(episode.placement.layout))
@@ -236,7 +236,7 @@ def _shown_threat(episode: Episode) -> Threat:
 
 
 def _outcome(episode: Episode) -> str:
-    """Return what came of the blast, in words."""
+    """Return the loads and the reduction, in words."""
     protected, unprotected = episode.assess()
     reduction_percent = 100.0 * protected.reduction_from(unprotected)
     of_all = "all charges: " if len(episode.objective.case.charges) > 1 else ""
@@ -248,7 +248,7 @@ def _outcome(episode: Episode) -> str:
 
 
 def _state_lines(episode: Episode) -> list[str]:
-    """Return what is left to build with, and how many illegal actions there were."""
+    """Return the remaining stock and budget, the stand-off, and the count of illegal actions."""
     placement, zone = episode.placement, episode.placement.scenario.zone
     what = "pieces" if zone.items else "modules"
     lines = [f"{placement.stock_left} of {zone.stock} {what} left"]

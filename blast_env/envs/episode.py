@@ -1,4 +1,4 @@
-"""One episode of placing, and what all episodes of an environment have in common."""
+"""One episode of placing, and the task common to all episodes of an environment."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -43,11 +43,11 @@ ILLEGAL_TERM: Final = "illegal_actions"
 
 @dataclass(frozen=True)
 class IllegalActions:
-    """What illegal actions lead to.
+    """The consequences of illegal actions.
 
     Attributes:
-        cost: What each one costs, in the unit of the reward.
-        limit: After so many of them the episode ends as if finished.
+        cost: Cost of each one, in the unit of the reward.
+        limit: Number of them after which the episode ends as if finished.
     """
 
     cost: float
@@ -59,14 +59,14 @@ class Episode:
     """The state of an episode.
 
     Attributes:
-        observable: What may be observed before the end.
+        observable: The observable part of the episode before the end.
         objective: Assesses layouts.
         observation: Observes the episode.
         initial: The layout at the start.
         placement: The modules placed so far.
-        actions: What the actions are.
-        chosen: What has been chosen of the next module or piece.
-        illegal_actions: How many illegal actions there were.
+        actions: The numbered actions.
+        chosen: The choices so far for the next module or piece.
+        illegal_actions: Number of illegal actions so far.
         begun: Whether there has been an action.
         ended: Whether the charge has gone off.
     """
@@ -86,9 +86,9 @@ class Episode:
         self.chosen = ActionChoice(self.placement.legal)
 
     def action_mask(self) -> NDArray[np.bool_]:
-        """Return which actions are legal (actions,); see `NumberedActions.mask`.
+        """Return the mask of legal actions (actions,); see `NumberedActions.mask`.
 
-        When the charge has gone off, to finish is the only one.
+        When the charge has gone off, only finishing is legal.
         """
         if not self.ended:
             return self.actions.mask(self.chosen)
@@ -97,22 +97,22 @@ class Episode:
         return mask
 
     def observe(self) -> Array:
-        """Return the observation: what is not possible after what was chosen is shown as taken."""
+        """Return the observation; the choices so far limit the cells that it shows as free."""
         placement = self.placement
         if self.chosen.choices:
             placement = placement.limited_to(self.chosen.possible)
         return self.observation.observe(placement)
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
-        """Place a module or a piece, choose a part of it, or finish; return the reward's terms.
+        """Make a choice, place a module or a piece, or finish; return the terms of the reward.
 
         Args:
             action: One of `actions`.
-            reward: Pays for the action.
-            illegal: What an illegal action leads to.
+            reward: The reward of the action.
+            illegal: The consequences of an illegal action.
 
         Raises:
-            BlastEnvError: If the reward names a term that is taken.
+            BlastEnvError: If the reward has a term with the reserved name `ILLEGAL_TERM`.
         """
         before = self.placement
         self.placement, self.chosen, is_illegal, self.ended = self._after(action, illegal)
@@ -134,11 +134,11 @@ class Episode:
         return {**terms, ILLEGAL_TERM: -illegal.cost if is_illegal else 0.0}
 
     def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:
-        """Return the blasts that `final_information` asks for if the action ends the episode.
+        """Return the blasts that `final_information` requests if the action ends the episode.
 
         Args:
-            action: As for `act`, which is still to be called.
-            illegal: What an illegal action leads to.
+            action: The action of the next call of `act`.
+            illegal: The consequences of an illegal action.
         """
         placement, _, _, ended = self._after(action, illegal)
         case = self.objective.case
@@ -153,7 +153,7 @@ class Episode:
     def _after(
         self, action: int, illegal: IllegalActions
     ) -> tuple[Placement, ActionChoice, bool, bool]:
-        """Return placement and choice after an action, whether it is illegal, whether it ends."""
+        """Return placement and choices after an action, and whether it is illegal and the last."""
         placement, chosen = self.placement, self.chosen
         finishes = action == self.actions.finish and chosen.choices == 0
         found = None if finishes else self.actions.narrowed(chosen, action)
@@ -167,7 +167,7 @@ class Episode:
         return placement, chosen, is_illegal, finishes or exhausted or placement.is_full
 
     def assess(self) -> tuple[Assessment, Assessment]:
-        """Return what the layout is worth, and what no barrier is.
+        """Return the assessments of the layout and of the site without a barrier.
 
         Raises:
             BlastEnvError: As `BlastEvaluator.loads_of_many`.
@@ -175,15 +175,15 @@ class Episode:
         return self.objective.assess(self.placement.checked), self.objective.assess(())
 
     def information(self) -> dict[str, Any]:
-        """Return what is told after every action and after `reset`."""
-        mask = self.action_mask().astype(np.int8)  # what `sample(mask=...)` of a space takes
+        """Return the information after every action and after `reset`."""
+        mask = self.action_mask().astype(np.int8)  # the type for `sample(mask=...)` of a space
         return {"action_mask": mask, "illegal_actions": self.illegal_actions}
 
     def final_information(self, evaluators: Evaluators) -> dict[str, Any]:
-        """Return what is told when the charge has gone off.
+        """Return the information after the charge has gone off.
 
         Args:
-            evaluators: They know how many blasts there were.
+            evaluators: The evaluators, which count the blasts.
         """
         protected, unprotected = self.assess()
         case = self.objective.case
@@ -210,7 +210,7 @@ class Episode:
 
 
 def _where_known(protected: Assessment, unprotected: Assessment) -> dict[str, Any]:
-    """Return peaks, if the engine knows them, and the response of facades, where that counts."""
+    """Return peaks, if the engine has them, and the facade response, if the objective has it."""
     if isnan(unprotected.peak_pa):
         return {}
     peaks = {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}
@@ -231,23 +231,23 @@ def total(terms: Mapping[str, float]) -> float:
 
 
 VISIBLE_REALISATIONS: Final = 2
-"""Blasts for a visible charge unless an argument says otherwise (`studies.noise reward`)."""
+"""Default number of blasts for a visible charge (`studies.noise reward`)."""
 
 HIDDEN_THREATS: Final = 16
-"""Charges for a hidden threat, one blast each, unless an argument says otherwise."""
+"""Default number of charges for a hidden threat, one blast each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What is placed where, against what, and what is seen of it.
+    """The task of an environment: scenarios, threats, observations and actions.
 
     Attributes:
-        source: Gives each episode its scenario.
+        source: Source of the scenario of each episode.
         threat_model: Draws the charges of an episode.
-        realisations: Blasts for each charge, with different fan and air.
-        risk: How the loads of several charges become one; as the scenario says if `None`.
-        observation: What is seen.
-        actions: What an action says.
+        realisations: Number of blasts per charge, with different seeds.
+        risk: Reduces the loads of several charges to one; that of the scenario if `None`.
+        observation: The kind of observation.
+        actions: The kind of action space.
         evaluators: Run the blasts.
     """
 
@@ -260,7 +260,7 @@ class Task:
     evaluators: Evaluators
 
     def start(self, rng: np.random.Generator, options: ResetOptions) -> Episode:
-        """Draw an episode; always as much of the stream, whatever the options fix.
+        """Draw an episode; options do not change the amount drawn from the random stream.
 
         Raises:
             LayoutError: If the layout of the options does not fit the build zone.
@@ -295,7 +295,7 @@ class Task:
     def _case(
         self, scenario: Scenario, charges: Sequence[AnyCharge], seeds: NDArray[np.int64]
     ) -> Case:
-        """Return what the layout meets; `seeds` has the shape (charges, realisations)."""
+        """Return the load case of a layout; `seeds` has the shape (charges, realisations)."""
         threats = tuple(
             Threat(charge, int(seed))
             for of_realisation in seeds.T
@@ -309,8 +309,8 @@ def find_threat_model(threat: str | ThreatModel, threats: int | None) -> ThreatM
 
     Raises:
         UnknownNameError: If there is no threat model of that name.
-        BlastEnvError: If the number of threats is out of bounds, or is given for a threat model
-            that does not ask for it.
+        BlastEnvError: If the number of threats is out of bounds, or is not 1 for a threat model
+            other than `"hidden"`.
     """
     count = HIDDEN_THREATS if threats is None else whole_number("threats", threats, 1, 1000)
     models: dict[str, ThreatModel] = {"visible": VisibleThreat(), "hidden": HiddenThreat(count)}
@@ -321,10 +321,10 @@ def find_threat_model(threat: str | ThreatModel, threats: int | None) -> ThreatM
 
 
 def find_realisations(realisations: int | None, threat: str | ThreatModel, engine: Engine) -> int:
-    """Return the number of blasts for each charge for the arguments `realisations` and `threat`.
+    """Return the number of blasts per charge for the arguments `realisations` and `threat`.
 
     Raises:
-        BlastEnvError: If the number is out of bounds: without noise a charge has one realisation.
+        BlastEnvError: If the number is out of bounds; it must be 1 for an engine without noise.
     """
     if not engine.has_noise:
         if realisations not in (None, 1):
@@ -342,7 +342,7 @@ def find_risk(risk: str | Risk | None, cvar_level: float) -> Risk | None:
 
     Raises:
         UnknownNameError: If there is no risk measure of that name.
-        BlastEnvError: If the level is no number or out of bounds.
+        BlastEnvError: If the level is not a number or is out of bounds.
     """
     level = real_number("cvar_level", cvar_level, 0.0, 1.0)
     if risk is None:

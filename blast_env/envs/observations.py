@@ -1,4 +1,4 @@
-"""What an agent sees: the observations, and what they are made of."""
+"""Observations of an agent, and their parts."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -39,21 +39,21 @@ Plane = NDArray[np.float32]
 """Values of the squares of a site (rows, columns), or several planes of them."""
 
 FULL_CHARGE_KG: Final = 1000.0
-"""TNT-equivalent mass that is shown as 1; larger ones as well."""
+"""TNT-equivalent mass shown as 1; larger ones too."""
 
 FULL_STOCK: Final = 100
-"""Number of modules in stock that is shown as 1; larger ones as well."""
+"""Number of modules in stock shown as 1; larger ones too."""
 
 FULL_HEIGHT_M: Final = 12.0
-"""Height that is shown as 1; what is higher, or as high as the air, as well."""
+"""Height shown as 1; larger ones, and the full height of the air, too."""
 
-# ---- What may be seen.
+# ---- The observable part of an episode.
 
 ModuleLoads = Callable[[Scenario, tuple[AnySource, ...], int], FloatArray]
-"""Gives the load on each module of the structures without a barrier, simulation units (modules,).
+"""Returns the load on each module of the structures without a barrier, simulation units (modules,).
 
-In the order of the scenario's structures, row by row; called with the scenario, with where the
-charge is or may be, and with how many blasts the loads are to be the mean of.
+Modules are in the order of the scenario's structures, row by row. Arguments are the scenario, the
+place of the charge or its possible places, and the number of blasts to average.
 """
 
 
@@ -61,10 +61,10 @@ charge is or may be, and with how many blasts the loads are to be the mean of.
 class SimulatedModuleLoads:
     """Mean loads of blasts of charges from the sources, with seeds from 0 on: a `ModuleLoads`.
 
-    Those are not the blasts that the layout is assessed with.
+    Other blasts assess the layout.
 
     Attributes:
-        evaluators: Run the blasts; nothing is asked of them before the loads are.
+        evaluators: Run the blasts; used only when loads are requested.
     """
 
     evaluators: Evaluators
@@ -80,18 +80,18 @@ class SimulatedModuleLoads:
 
 @dataclass(frozen=True, eq=False)
 class Observable:
-    """What may be observed of an episode before the charge goes off.
+    """The observable part of an episode before the charge goes off.
 
-    Observations are made from this and from what has been placed so far, so that nothing else can
-    slip into them: with a hidden threat, `sources` are those of the scenario.
+    Observations use only this and the present layout, so no other information can leak into them:
+    with a hidden threat, `sources` are those of the scenario.
 
     Attributes:
         scenario: The scenario.
-        sources: Where the charge is, or may be.
-        module_loads: For observations that show loads; they alone need an engine and a
-            calibration, and only they call it.
-        among_vehicles: Whether other scenarios of the environment have vehicles, so that this one
-            shows that it has none.
+        sources: The place of the charge, or its possible places.
+        module_loads: For observations with loads; only they call it, and only it needs an engine
+            and a calibration.
+        among_vehicles: Whether other scenarios of the environment have vehicles, so that values
+            for vehicles are present.
     """
 
     scenario: Scenario
@@ -105,13 +105,13 @@ class Observable:
         return self.among_vehicles or bool(self.scenario.vehicles)
 
     def unprotected_loads(self, blasts: int) -> FloatArray:
-        """Return the load on each module of the structures without a barrier.
+        """Return the load on each module of the structures without a barrier (modules,).
 
         Args:
-            blasts: How many blasts the loads are the mean of.
+            blasts: Number of blasts to average.
 
         Raises:
-            BlastEnvError: If there is nothing that gives them.
+            BlastEnvError: If `module_loads` is None.
         """
         if self.module_loads is None:
             raise BlastEnvError("module_loads is None, must be given for what shows the loads")
@@ -120,11 +120,11 @@ class Observable:
 
 @dataclass(frozen=True)
 class VehicleView:
-    """The vehicles that may be seen.
+    """The observable vehicles.
 
     Attributes:
         scenario: The scenario.
-        vehicles: Those of them that may bring the charge.
+        vehicles: The vehicles that may bring the charge.
     """
 
     scenario: Scenario
@@ -136,7 +136,7 @@ class VehicleView:
         return cls(scenario, tuple(each for each in sources if isinstance(each, VehicleSource)))
 
     def reached(self, layout: Layout) -> BoolArray:
-        """Return which squares of the site a vehicle gets to with a layout, (rows, columns)."""
+        """Return the mask of squares of the site within reach of a vehicle, (rows, columns)."""
         rows, columns = squares_of(self.scenario.site)
         ground = np.zeros((rows, columns), dtype=bool)
         for source in self.vehicles:
@@ -144,7 +144,7 @@ class VehicleView:
         return ground
 
     def stand_off_m(self, layout: Layout) -> float:
-        """Return how near a vehicle comes to a protected structure; infinite without any."""
+        """Return the least stand-off of a vehicle, m; infinite without vehicles."""
         places = (worst_places(self.scenario, source, layout) for source in self.vehicles)
         return min((each.stand_off_m for each in places), default=inf)
 
@@ -153,41 +153,42 @@ class EpisodeObservation(Protocol):
     """Observes one episode."""
 
     def observe(self, placement: Placement) -> Array:
-        """Return a fresh array in the space, for the modules placed so far."""
+        """Return a new array in the space, for the modules placed so far."""
 
 
 class Observation(Protocol):
     """A kind of observation."""
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
-        """Return the space, a `Box` that depends on site, build zone and catalogue alone.
+        """Return the space, a `Box`.
 
-        On their sizes, and on names and sizes of the items.
+        It depends only on the sizes of site and build zone, the names and sizes of the items, and
+        whether there are vehicles.
         """
 
     def episode(self, observable: Observable) -> EpisodeObservation:
-        """Prepare the observations of an episode; what does not change is worked out here."""
+        """Prepare the observations of an episode, with all values that do not change."""
 
 
-# ---- Values from 0 to 1, which planes and vectors show alike.
+# ---- Values from 0 to 1, common to planes and vectors.
 
 
 def charge_share(tnt_kg: float) -> float:
-    """Return a charge's mass as it is shown: (mass / 1000 kg)^(1/3), at most 1.
+    """Return a charge's mass as an observed value: (mass / 1000 kg)^(1/3), at most 1.
 
     The cube root, because distances scale with it (Hopkinson and Cranz): a charge of eight times
-    the mass acts as one of the same mass at half the distance.
+    the mass has the same peak at twice the distance.
     """
     return float(min((tnt_kg / FULL_CHARGE_KG) ** (1.0 / 3.0), 1.0))
 
 
 def height_share(height_m: float | None) -> float:
-    """Return a height as it is shown: as a share of 12 m, at most 1."""
+    """Return a height as an observed value: a share of 12 m, at most 1; 1 for None."""
     return 1.0 if height_m is None else min(height_m / FULL_HEIGHT_M, 1.0)
 
 
 def stock_shares(placement: Placement) -> tuple[float, float, float]:
-    """Return what there is left to build with, each from 0 to 1.
+    """Return the remaining stock and budget as values from 0 to 1.
 
     Returns:
         The share of the stock, the number of modules or pieces as a share of 100 (at most 1), and
@@ -206,7 +207,7 @@ def cost_shares(scenario: Scenario) -> FloatArray:
 
 
 def occupied_cells(placement: Placement) -> BoolArray:
-    """Return which cells of the build zone hold a module, shape (rows, columns)."""
+    """Return the mask of cells of the build zone that hold a module, (rows, columns)."""
     occupied = np.zeros(placement.usable.shape, dtype=bool)
     if placement.cells:
         occupied[tuple(np.array(placement.cells).T)] = True
@@ -214,11 +215,11 @@ def occupied_cells(placement: Placement) -> BoolArray:
 
 
 def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
-    """Return what does not change of the items of a catalogue, measures among them.
+    """Return the constant values of the items of a catalogue, including measures.
 
     Returns:
-        Their heights (items,), and what a piece of each costs (items,): as a share of the budget,
-        or of the dearest item's cost where there is no budget, at most 1.
+        Their heights (items,), and their costs per piece (items,): as a share of the budget, or of
+        the dearest item's cost if there is no budget, at most 1.
     """
     everything = {each.item: each for each in zone.catalogue.variants}.values()
     costs = np.array([each.cost for each in everything])
@@ -227,12 +228,12 @@ def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
 
 
 def items_placed(placement: Placement) -> tuple[FloatArray, FloatArray]:
-    """Return what changes of a catalogue.
+    """Return the values of a catalogue that change with the layout.
 
     Returns:
-        Which share of the pieces of each item may still be placed (items,); and of each cell the
-        height of the module that stands there, whether it stops vehicles, and whether a piece of
-        each variant may have its lower left cell there (2 + variants, rows, columns).
+        The remaining share of the pieces of each item (items,); and for each cell the height of
+        its module, whether that stops vehicles, and whether a piece of each variant may have its
+        lower left cell there (2 + variants, rows, columns).
     """
     stocks = np.array(placement.catalogue.stocks)
     left = np.array(placement.stocks_left, dtype=np.float64) / np.maximum(stocks, 1)
@@ -243,9 +244,9 @@ def items_placed(placement: Placement) -> tuple[FloatArray, FloatArray]:
     return left, np.concatenate((standing, placement.legal))
 
 
-# ---- The squares of 0.5 m that a site is drawn on.
+# ---- The grid of squares of 0.5 m over a site.
 
-_POINTS_PER_MODULE: Final = 8  # along a segment where a charge may be
+_POINTS_PER_MODULE: Final = 8  # along a line of possible places of a charge
 
 
 @dataclass(frozen=True)
@@ -253,8 +254,8 @@ class SiteGrid:
     """Planes of (rows, columns) squares of 0.5 m; row 0 is the lower edge of the site.
 
     Attributes:
-        rows: Squares upwards.
-        columns: Squares to the right.
+        rows: Number of squares upwards.
+        columns: Number of squares to the right.
     """
 
     rows: int
@@ -262,16 +263,16 @@ class SiteGrid:
 
     @classmethod
     def of(cls, site: Site) -> "SiteGrid":
-        """Return the grid of a site; the last squares jut out of one that is no whole number."""
+        """Return the grid of a site; its last squares may extend beyond the site."""
         return cls(*squares_of(site))
 
     def lattice(self, corner_m: tuple[float, float], rows: int, columns: int) -> "Lattice":
-        """Return where a lattice of modules lies on the grid.
+        """Return the position of a lattice of modules on the grid.
 
         Args:
             corner_m: Its lower left corner.
-            rows: Modules upwards.
-            columns: Modules to the right.
+            rows: Number of modules upwards.
+            columns: Number of modules to the right.
         """
         return Lattice(
             _shares(self.rows, corner_m[1], rows), _shares(self.columns, corner_m[0], columns)
@@ -285,20 +286,20 @@ class SiteGrid:
         return (along_y @ along_x.T).astype(np.float32)
 
     def source(self, source: AnySource) -> Plane:
-        """Return how likely the charge of a source is in each square, (rows, columns).
+        """Return the probability of the charge of a source in each square, (rows, columns).
 
-        The plane adds up to 1. A point is shared between the four squares around it such that
-        their mean place is the point's. That of a vehicle is where it enters.
+        The plane adds up to 1. A point is distributed over the four squares around it such that
+        their mean position is the point. A vehicle is shown at its entries.
         """
         if isinstance(source, RectangleSource):
             plane = self.rectangle(source.rectangle_m)
         else:
             plane = np.sum([self._line(*ends_m) for ends_m in source.lines_m], axis=0)
-        # A narrow rectangle covers next to nothing of its squares, which rounding must not lose.
+        # Divided by the sum, since a narrow rectangle covers only a tiny part of its squares.
         return plane / np.float32(plane.sum(dtype=np.float64))
 
     def _line(self, start_m: PointM, end_m: PointM) -> Plane:
-        """Return points close to each other along a line."""
+        """Return a plane of closely spaced points along a line."""
         start, end = np.array(start_m), np.array(end_m)
         length_m = float(np.hypot(*(end - start)))
         count = 1 + _POINTS_PER_MODULE * ceil(length_m / MODULE_SIDE_M)
@@ -306,7 +307,7 @@ class SiteGrid:
         return self._points(start + share[:, np.newaxis] * (end - start))
 
     def _points(self, points_m: NDArray[np.float64]) -> Plane:
-        """Return points (n, 2), each shared between the four squares around it."""
+        """Return a plane of points (n, 2), each distributed over the four squares around it."""
         plane = np.zeros((self.rows, self.columns), dtype=np.float32)
         places = points_m[:, ::-1] / MODULE_SIDE_M - 0.5
         low = np.floor(places).astype(int)
@@ -323,10 +324,10 @@ class SiteGrid:
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Where a lattice of modules lies on the grid; modules on the 0.5 m grid fill one square each.
+    """Position of a lattice of modules on the grid; modules on the 0.5 m grid fill one square each.
 
     Attributes:
-        along_y: Share of each row of squares that each row of modules covers (grid rows, rows).
+        along_y: Share of each row of squares covered by each row of modules (grid rows, rows).
         along_x: The same for columns (grid columns, columns).
     """
 
@@ -334,7 +335,7 @@ class Lattice:
     along_x: Plane
 
     def plane(self, values: NDArray[np.generic]) -> Plane:
-        """Return values of the modules (..., rows, columns) on the grid, by the area covered."""
+        """Return values of the modules (..., rows, columns) on the grid, weighted by area."""
         plane: Plane = self.along_y @ values.astype(np.float32) @ self.along_x.T
         return plane
 
@@ -347,11 +348,11 @@ def _shares(squares: int, start_m: float, modules: int) -> Plane:
 def _covered(
     squares: int, low_m: NDArray[np.float64], high_m: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the share of each square that each interval covers (squares, intervals)."""
+    """Return the share of each square covered by each interval (squares, intervals)."""
     first = np.arange(squares)[:, np.newaxis]
     low, high = low_m / MODULE_SIDE_M, high_m / MODULE_SIDE_M
     common = np.minimum(first + 1, high) - np.maximum(first, low)
-    # Rounded, so that what lies on the grid but for the last bit fills whole squares.
+    # Rounded, so that edges on the grid, up to the last bit, fill whole squares.
     covered: NDArray[np.float64] = np.round(np.clip(common, 0.0, 1.0), 9)
     return covered
 
@@ -365,9 +366,9 @@ REACH: Final = "reach"
 
 
 def item_channels(catalogue: Catalogue) -> tuple[str, ...]:
-    """Return the names of the planes that a zone with a catalogue has more than others.
+    """Return the names of the additional planes for a zone with a catalogue.
 
-    Those of an item begin with its name and a colon, which no name has.
+    Those of an item begin with its name and a colon, which no name contains.
     """
     if not catalogue.has_items:
         return ()
@@ -380,7 +381,7 @@ def item_channels(catalogue: Catalogue) -> tuple[str, ...]:
 
 
 def vehicle_channels(shown: bool) -> tuple[str, ...]:
-    """Return the names of the planes that show vehicles; none where they are not shown."""
+    """Return the names of the planes for vehicles; none if they are not shown."""
     return (EMPTY_REACH, REACH) if shown else ()
 
 
@@ -388,9 +389,8 @@ def vehicle_channels(shown: bool) -> tuple[str, ...]:
 class GridObservation:
     """Planes of (rows, columns) squares of 0.5 m over the site, float32 from 0 to 1.
 
-    Row 0 is the lower edge of the site and column 0 the left one, as in the build zone. Whatever
-    lies on the 0.5 m grid fills whole squares; what does not is shown by the share of a square
-    that it covers.
+    Row 0 is the lower edge of the site and column 0 the left one, as in the build zone. Objects
+    on the 0.5 m grid fill whole squares; others are shown by the covered share of each square.
 
     | channel | plane | value, from 0 to 1 |
     |---|---|---|
@@ -404,38 +404,38 @@ class GridObservation:
     | 7 | `stock` | modules left / 100, at most 1, the same everywhere |
     | 8 | `budget_share` | budget left / budget, 1 without a budget, the same everywhere |
 
-    `charge`: the square root of (how likely the charge is in a square / the largest such value),
+    `charge`: the square root of (probability of the charge in a square / the largest such value),
     times (mass / 1000 kg)^(1/3), at most 1. A visible charge fills the squares around its centre,
-    up to four, and the largest value tells its mass. A hidden one fills all squares where it may
-    be, and where it may have different masses, their mean counts; the root lets wide areas be
-    seen beside single points.
+    up to four, and the largest value gives its mass. A hidden one fills all its possible squares;
+    of several possible masses in a square, the mean value counts. The root keeps wide areas
+    visible beside single points.
 
-    Where the build zone has a catalogue, planes follow the ones above (`channels_of`); heights
-    are shares of 12 m, and what has the same value everywhere is marked =:
+    If the build zone has a catalogue, further planes follow (`channels_of`); heights are shares
+    of 12 m, and planes with the same value everywhere are marked =:
 
     | plane | value, from 0 to 1 |
     |---|---|
     | `structure_height` | height of the structure here, 1 where it is as high as the air |
     | `<item>:height`, for each item | its height = |
     | `<item>:cost`, for each item | its cost / the budget (or the dearest item's), at most 1 = |
-    | `barrier_height` | height of the module that stands here |
-    | `stops_vehicles` | 1 where a module stands that stops vehicles |
+    | `barrier_height` | height of the module here |
+    | `stops_vehicles` | 1 where a module stops vehicles |
     | `<item>:left`, for each item | pieces that may still be placed / pieces at first = |
     | `<item>:legal`, `<item>:turned:legal` | 1 where a piece may have its lower left cell now |
 
-    Where the scenario has a vehicle, or is drawn among others that have, two planes come last
-    (empty without a vehicle). The plane `charge` shows where it
-    enters, whether the threat is visible or hidden: where it goes off is up to the layout.
+    If the scenario has a vehicle, or is drawn among others that have one, two planes come last
+    (empty without a vehicle). The plane `charge` then shows its entries, for visible and hidden
+    threats alike: the place of the detonation depends on the layout.
 
     | plane | value |
     |---|---|
-    | `reach_without_barrier` | 1 where the vehicle gets to on the empty site |
-    | `reach` | 1 where it gets to with what stands so far |
+    | `reach_without_barrier` | 1 within reach of the vehicle on the empty site |
+    | `reach` | 1 within its reach with the modules placed so far |
 
-    Values are in steps of 1/255, as in `ImageObservation`. They are no whole numbers, because
-    stable-baselines3 takes those for an image whose order of axes it guesses from their sizes, and
-    may then learn on planes that it has turned. So convolutions of your own see the same planes in
-    every library; image policies take `"image"`.
+    Values are in steps of 1/255, as in `ImageObservation`, but not integers: stable-baselines3
+    takes integers for an image, guesses the order of its axes from their sizes, and may transpose
+    the planes. Custom convolutions thus see the same planes in every library; image policies take
+    `"image"`.
     """
 
     channels: ClassVar[tuple[str, ...]] = (
@@ -457,7 +457,7 @@ class GridObservation:
 
         Args:
             scenario: The scenario.
-            shows_vehicles: Whether those of vehicles are there; if it has some, unless given.
+            shows_vehicles: Whether to include those of vehicles; by default if it has vehicles.
         """
         shown = bool(scenario.vehicles) if shows_vehicles is None else shows_vehicles
         items = item_channels(scenario.zone.catalogue)
@@ -496,12 +496,12 @@ class GridWithLoadObservation(GridObservation):
     """`GridObservation` with one more plane: the loads on the structures without a barrier.
 
     Channel 9, `unprotected_load`, has the impulse on each module divided by the largest one: the
-    mean of blasts with seeds of their own, of the charge that is visible or of charges drawn from
-    where a hidden one may be. The blasts are run at `reset`, once a charge, or once a scenario
-    where the charge is hidden.
+    mean of blasts with separate seeds, of the visible charge or of charges drawn from the sources
+    of a hidden one. The blasts run at `reset`, once per charge, or once per scenario if the charge
+    is hidden.
 
     Attributes:
-        blasts: How many blasts the loads are the mean of.
+        blasts: Number of blasts to average.
     """
 
     blasts: int = 4
@@ -529,10 +529,10 @@ class GridEpisode:
     """The planes of one episode.
 
     Attributes:
-        static: What does not change (channels, rows, columns), 255 for 1; the rest is 0.
-        zone: Where the build zone lies on the grid.
+        static: The constant planes (channels, rows, columns), 255 for 1; the others are 0.
+        zone: Position of the build zone on the grid.
         channels: Names of the planes.
-        vehicles: The vehicles that may be seen.
+        vehicles: The observable vehicles.
     """
 
     static: NDArray[np.uint8]
@@ -545,7 +545,7 @@ class GridEpisode:
         return self.levels(placement).astype(np.float32) / _LEVELS
 
     def levels(self, placement: Placement) -> NDArray[np.uint8]:
-        """Return the same as whole numbers, 255 for 1."""
+        """Return the same planes as integers, 255 for 1."""
         planes = self.static.copy()
         cells = np.stack((occupied_cells(placement), placement.free))
         self.show(planes, ("barrier", "free"), self.zone.plane(cells))
@@ -561,16 +561,16 @@ class GridEpisode:
         return planes
 
     def ending(self, ending: str) -> tuple[str, ...]:
-        """Return the names of the planes of items or variants that end so, in their order."""
+        """Return the names of the planes with an ending, in their order."""
         return tuple(name for name in self.channels if name.endswith(ending))
 
     def show(self, planes: NDArray[np.uint8], names: Sequence[str], values: NDArray[Any]) -> None:
-        """Set some of the planes to values from 0 to 1, in steps of 1/255; more counts as 1.
+        """Set some of the planes to values from 0 to 1, in steps of 1/255; larger ones become 1.
 
         Args:
-            planes: All planes (channels, rows, columns).
-            names: Which of them.
-            values: (names, rows, columns), or (names,) for planes that are the same everywhere.
+            planes: All planes (channels, rows, columns), changed in place.
+            names: Names of the planes to set.
+            values: (names, rows, columns), or (names,) for planes with one value everywhere.
         """
         steps = np.rint(_LEVELS * np.minimum(values.astype(np.float32), np.float32(1.0)))
         shape = values.shape if values.ndim == 3 else (*values.shape, 1, 1)
@@ -581,7 +581,7 @@ _LEVELS: Final = np.float32(255.0)
 
 
 def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane, Plane]:
-    """Return the protected structures by weight, the others, and the heights of all."""
+    """Return planes of the protected structures by weight, the others, and the heights of all."""
     protected, others, heights = np.zeros((3, grid.rows, grid.columns), dtype=np.float32)
     weights = [structure.weight for structure in scenario.structures if structure.protected]
     for structure in scenario.structures:
@@ -610,21 +610,21 @@ def _charge_plane(grid: SiteGrid, sources: tuple[AnySource, ...]) -> Plane:
 
 
 LEAST_IMAGE_SIDE: Final = 36
-"""Pixels of an image's shorter side, at least: fewer are too few for the convolutions of the
-network that most image policies have (Mnih et al. 2015), with kernels of 8, 4 and 3."""
+"""Least length of an image's shorter side, pixels: the convolutions of the usual network of image
+policies (Mnih et al. 2015), with kernels of 8, 4 and 3, need as many."""
 
 
 @dataclass(frozen=True)
 class ImageObservation:
     """The planes of `GridObservation` as an image: uint8 (height, width, channels), 255 for 1.
 
-    What image policies take as it is: stable-baselines3's `CnnPolicy`, with no network of your
-    own. A pixel is a square of 0.5 m. Row 0 and column 0 of the image are those of the planes.
-    Rows and columns of zeros follow after the site, until both sides are at least 36 pixels and
-    longer than there are channels: by that libraries that guess the order of axes find it.
+    Image policies such as `CnnPolicy` of stable-baselines3 take it without a custom network.
+    A pixel is a square of 0.5 m. Row 0 and column 0 of the image are those of the planes. Rows and
+    columns of zeros follow after the site, until both sides have at least 36 pixels and more than
+    there are channels, so that libraries guess the order of axes correctly.
 
     Attributes:
-        planes: The planes.
+        planes: The observation that gives the planes.
     """
 
     planes: GridObservation = field(default_factory=GridObservation)
@@ -648,7 +648,7 @@ class ImageEpisode:
     """The images of one episode.
 
     Attributes:
-        planes: Gives the planes.
+        planes: The planes of the episode.
         size: Height and width of the image, pixels.
     """
 
@@ -667,7 +667,7 @@ class ImageEpisode:
 # ---- A vector.
 
 MOST_STRUCTURES: Final = 8
-"""Structures that the vector has room for."""
+"""Most structures that fit the vector."""
 
 _FIXED: Final = 3 + 6 + 2 + MOST_STRUCTURES * 6
 
@@ -676,37 +676,36 @@ _FIXED: Final = 3 + 6 + 2 + MOST_STRUCTURES * 6
 class FeaturesObservation:
     """A vector of float32 from 0 to 1; x is divided by the site's width, y by its height.
 
-    | from | length | what |
+    | from | length | values |
     |---|---|---|
     | 0 | 3 | modules left / modules at first; modules left / 100, at most 1; budget left / budget |
-    | 3 | 4 | left, bottom, right, top of the smallest box around where the charge is or may be |
-    | 7 | 2 | least and largest mass that the charge may have, (mass / 1000 kg)^(1/3), at most 1 |
+    | 3 | 4 | left, bottom, right, top of the smallest box around places of the charge |
+    | 7 | 2 | least and largest possible mass of the charge, (mass / 1000 kg)^(1/3), at most 1 |
     | 9 | 2 | x and y of the lower left corner of the build zone |
     | 11 | 8 x 6 | of each structure: left, bottom, right, top; 1; its weight / the largest weight |
     | 59 | cells | 1 where a module stands, row by row |
     | 59 + cells | cells | 1 where a module may be placed now, row by row |
     | 59 + 2 cells | cells | cost of a module / the highest, row by row |
 
-    Protected structures come first, in the order of the scenario. The weight of another structure
-    is 0, and all six values are 0 where there is no structure.
+    Protected structures come first, in the order of the scenario. The weight of other structures
+    is 0, and unused places for structures have six zeros.
 
-    Where the build zone has a catalogue, more values follow; heights are shares of 12 m, and the
+    If the build zone has a catalogue, more values follow; heights are shares of 12 m, and the
     values of cells are row by row:
 
-    | length | what |
+    | length | values |
     |---|---|
     | 8 | height of each structure, in the order above; 1 where it is as high as the air |
     | items | height of each item |
     | items | cost of each item / the budget (or the dearest item's cost), at most 1 |
     | items | pieces of each item that may still be placed / pieces at first |
-    | cells | height of the module that stands on a cell |
-    | cells | 1 where a module stands that stops vehicles |
+    | cells | height of the module on a cell |
+    | cells | 1 where a module stops vehicles |
     | variants x cells | 1 where a piece may have its lower left cell now, variant by variant |
 
-    Where the scenario has a vehicle, the box from 3 on is around where it enters. There, and in
-    scenarios that are drawn among others with a vehicle, one more value comes last: how near it
-    comes to a protected structure with what stands so far, as a share of the site's diagonal; 1
-    without a vehicle.
+    If the scenario has a vehicle, the box from 3 on encloses its entries. For such scenarios, and
+    for those drawn among others with a vehicle, one more value comes last: the stand-off of the
+    vehicle with the modules placed so far, as a share of the site's diagonal; 1 without a vehicle.
     """
 
     def space(self, scenario: Scenario) -> spaces.Space[Array]:
@@ -721,10 +720,10 @@ class FeaturesObservation:
         return spaces.Box(0.0, 1.0, (length,), np.float32)
 
     def episode(self, observable: Observable) -> "FeaturesEpisode":
-        """Work out the values that do not change.
+        """Compute the constant values.
 
         Raises:
-            BlastEnvError: If the scenario has more structures than there is room for.
+            BlastEnvError: If the scenario has more than `MOST_STRUCTURES` structures.
         """
         scenario, zone = observable.scenario, observable.scenario.zone
         size = np.array([scenario.site.width_m, scenario.site.height_m])
@@ -751,10 +750,10 @@ class FeaturesEpisode:
     """The vector of one episode.
 
     Attributes:
-        site: Charge, corner of the build zone and structures (56,).
-        costs: Of the cells (rows, columns).
-        items: Heights of structures and items and costs of items; none without a catalogue.
-        vehicles: The vehicles that may be seen.
+        site: Values of charge, corner of the build zone and structures (56,).
+        costs: Costs of the cells (rows, columns).
+        items: Heights of structures and items and costs of items; empty without a catalogue.
+        vehicles: The observable vehicles.
         shows_vehicles: Whether the stand-off is the last value; 1 without a vehicle.
     """
 
@@ -781,7 +780,7 @@ class FeaturesEpisode:
 def _structures(scenario: Scenario) -> FloatArray:
     """Return left, bottom, right, top, 1, weight and height of each structure, as shares.
 
-    Shape (MOST_STRUCTURES, 7); the protected ones come first.
+    The shape is (MOST_STRUCTURES, 7), with the protected ones first.
     """
     structures = sorted(scenario.structures, key=lambda structure: not structure.protected)
     if len(structures) > MOST_STRUCTURES:
@@ -807,4 +806,4 @@ OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
         "features": FeaturesObservation(),
     }
 )
-"""The observations that have names."""
+"""The observations, by their names."""

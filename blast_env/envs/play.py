@@ -1,4 +1,4 @@
-"""Placing by hand: with keyboard and mouse, or with the keys of `gymnasium.utils.play`."""
+"""Placement by hand, with keyboard and mouse, or with the keys of `gymnasium.utils.play`."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ KEYS: Final = (
     " or turn it; Backspace: take the last one back; Return: set the charge off, and after the"
     " blast a new episode; Escape: end"
 )
-"""What the keys of `play` do."""
+"""Explanation of the keys of `play`."""
 
 
 class Key(IntEnum):
@@ -50,11 +50,11 @@ _MOVES: Final = {
 
 @dataclass(frozen=True)
 class Cursor:
-    """What would be placed next, and where.
+    """The outline of the next placement.
 
     Attributes:
-        catalogue: What can be placed.
-        variant: Index of what is placed.
+        catalogue: The catalogue of modules or pieces.
+        variant: Index of the variant to place.
         cell: Its lower left cell.
     """
 
@@ -75,7 +75,7 @@ class Cursor:
         return self.catalogue.action(self.catalogue.element_at(self.variant, *self.cell))
 
     def moved(self, up: int, right: int) -> "Cursor":
-        """Return the cursor so many cells further, or at the edge of the zone."""
+        """Return the cursor moved by a number of cells, at most to the edge of the zone."""
         rows, columns = self.catalogue.shape
         row, column = self.cell[0] + up, self.cell[1] + right
         return replace(self, cell=(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
@@ -89,7 +89,8 @@ def barrier_env(env: gym.Env[Any, Any]) -> BlastBarrierEnv:
     """Return the barrier environment within wrappers.
 
     Raises:
-        BlastEnvError: If it is another one, or does not give frames.
+        BlastEnvError: If it is another environment, or its render mode or action space does not
+            suit playing.
     """
     inner = env.unwrapped
     if not isinstance(inner, BlastBarrierEnv):
@@ -101,25 +102,25 @@ def barrier_env(env: gym.Env[Any, Any]) -> BlastBarrierEnv:
     return inner
 
 
-_FIRST_REPEAT: Final = 8  # steps that a key is held before it counts again
+_FIRST_REPEAT: Final = 8  # steps of a held key before it repeats
 _REPEAT_EVERY: Final = 2
 
 
 class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
-    """Few actions in the place of one a cell: they move a cursor, and place what it outlines.
+    """Few actions instead of one per cell: they move a cursor and place its outline.
 
-    The actions are those of `Key`. Those that move, and those that would place something where it
-    may not be, are no step of the environment: they pay nothing. An action that comes again and
-    again is a key that is held down: it counts at once, and after a while in every second step.
-    `get_keys_to_action` has the keys for `gymnasium.utils.play`:
+    The actions are those of `Key`. Moves, and illegal placements, are no steps of the environment
+    and have a reward of 0. A repeated action is a held key: it counts at once, and a move again
+    after eight steps, then in every second step. `get_keys_to_action` has the keys for
+    `gymnasium.utils.play`:
 
         play(CursorControl(gym.make("BlastBarrier-v0", render_mode="rgb_array", show_blast=True)))
 
     Args:
-        env: A barrier environment with `render_mode="rgb_array"`.
+        env: A barrier environment with `render_mode="rgb_array"` and `action="place"`.
 
     Raises:
-        BlastEnvError: If it is another one.
+        BlastEnvError: If it is another environment.
     """
 
     def __init__(self, env: gym.Env[Array, np.int64]) -> None:
@@ -132,13 +133,13 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         self._held = (Key.NOTHING, 0)
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Return the keys, by their numbers in pygame, with their actions."""
+        """Return the actions of the keys, by their numbers in pygame."""
         from blast_env.rendering.window import KEY_NUMBERS
 
         return {(KEY_NUMBERS[name],): int(key) for name, key in _PLAY_KEYS.items()}
 
     def action_masks(self) -> Array:
-        """Return which actions do anything now, (actions,)."""
+        """Return the mask of actions with an effect now, (actions,)."""
         masks = np.ones(len(Key), dtype=np.bool_)
         legal = self._inner.action_masks()
         masks[Key.PLACE] = self._cursor is not None and legal[self._cursor.action]
@@ -154,7 +155,7 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         return self._last[0], self._information(self._last[1])
 
     def step(self, action: np.int64) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Move the cursor, or place what it outlines, or finish.
+        """Move the cursor, place its outline, or finish.
 
         Raises:
             gymnasium.error.InvalidAction: If the action is not in the action space.
@@ -167,7 +168,7 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
 
     @property
     def cursor(self) -> Cursor:
-        """What would be placed next, and where.
+        """The outline of the next placement.
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
@@ -177,9 +178,9 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         return self._cursor
 
     def press(self, key: Key) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Do what a key asks for, at once; as `step` otherwise."""
+        """Apply a key at once, without the delay of held keys; otherwise as `step`."""
         cursor = self.cursor
-        assert self._last is not None  # as there is a cursor
+        assert self._last is not None  # since there is a cursor
         if key == Key.FINISH:
             return self.take(cursor.catalogue.finish)
         if key == Key.PLACE and self._inner.action_masks()[cursor.action]:
@@ -191,7 +192,7 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         return self._last[0], 0.0, False, False, self._information(self._last[1])
 
     def _counted(self, key: Key) -> Key:
-        """Return the key, or nothing while it is held down and not to count again yet."""
+        """Return the key, or `Key.NOTHING` while it is held and does not repeat."""
         held, steps = self._held
         steps = steps + 1 if key == held else 0
         self._held = (key, steps)
@@ -199,19 +200,19 @@ class CursorControl(gym.Wrapper[Array, np.int64, Array, np.int64]):
         return key if steps == 0 or again else Key.NOTHING
 
     def take(self, action: int) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
-        """Take an action of the environment within; `taken` remembers those of the episode."""
+        """Take an action of the wrapped environment, and add it to `taken`."""
         self.taken.append(action)
         observation, reward, ended, truncated, info = self.env.step(np.int64(action))
         self._last = observation, info
         return observation, reward, ended, truncated, self._information(info)
 
     def point(self, cursor: Cursor) -> None:
-        """Let the cursor be elsewhere."""
+        """Set the cursor, and mark it in the frames."""
         self._cursor = cursor
         self._inner.mark(cursor.action)
 
     def _information(self, info: dict[str, Any]) -> dict[str, Any]:
-        """Return information whose mask is that of the actions here."""
+        """Return the information with the action mask of this wrapper."""
         return info | {"action_mask": self.action_masks().astype(np.int8)}
 
 
@@ -233,12 +234,12 @@ _GAME_KEYS: Final = _PLAY_KEYS | {"left click": Key.PLACE, "right click": Key.NE
 
 @dataclass(frozen=True)
 class Played:
-    """An episode that has been played to its end.
+    """An episode played to its end.
 
     Attributes:
         seed: Its seed.
-        layout: What was placed.
-        reduction: The share that it takes off the impulse.
+        layout: The final layout.
+        reduction: Its reduction of the load, as a share.
         impulse_pa_s: The impulse with it.
     """
 
@@ -249,14 +250,14 @@ class Played:
 
 
 def play(env: gym.Env[Any, Any], seed: int = 0) -> Iterator[Played]:
-    """Let a person place barriers with mouse and keyboard; yield what comes of each episode.
+    """Let a person place barriers with mouse and keyboard; yield the result of each episode.
 
-    A window shows the site until it is closed; `KEYS` says what to do. The blast is shown if the
+    A window shows the site until it is closed; `KEYS` explains the keys. The blast is shown if the
     environment has `show_blast=True`.
 
     Args:
         env: A barrier environment with `render_mode="rgb_array"`.
-        seed: Of the first episode; the others have the following ones.
+        seed: Seed of the first episode; the others use the following ones.
 
     Raises:
         BlastEnvError: If it is another environment, or there is no screen.
@@ -280,9 +281,9 @@ class _Game:
 
     Args:
         control: The environment, with wrappers.
-        inner: The same without.
-        window: Where it is shown, and what the person does.
-        seed: Of the episode.
+        inner: The same without wrappers.
+        window: Shows the frames and collects the input.
+        seed: Seed of the episode.
     """
 
     def __init__(
@@ -294,7 +295,7 @@ class _Game:
         control.reset(seed=seed)
 
     def play(self) -> Iterator[dict[str, Any]]:
-        """Play until the person wants another episode; yield the final information once."""
+        """Play until the person starts another episode; yield the final information once."""
         told = False
         while not self._wants_next and self._window.show(self._control.render()):  # type: ignore[arg-type]
             if self._inner.charge_has_gone_off and not told:
@@ -306,7 +307,7 @@ class _Game:
                 self._press(Key.FINISH)
 
     def _react(self, done: "Input") -> None:
-        """Do what a key or the mouse asks for; the cursor follows the mouse."""
+        """Apply an input by key or mouse; the cursor follows the mouse."""
         key = _GAME_KEYS.get(done.name)
         if done.name == "escape":
             self._window.close()
@@ -324,7 +325,7 @@ class _Game:
             self._press(key)
 
     def _take_back(self) -> None:
-        """Begin again, with all but the last one."""
+        """Start the episode again, and repeat all actions but the last."""
         cursor, actions = self._control.cursor, self._control.taken[:-1]
         self._control.reset(seed=self._seed)
         for action in actions:

@@ -41,9 +41,9 @@ Observation = dict[str, Any]
 _BALL_KINDS: Final = (CollisionType.ExplosionBall, CollisionType.AirBall)
 
 PLAN_HEIGHT_M: Final = 1.5
-"""Height of the plan of overpressure that is observed; the layer of cells that holds it."""
+"""Height of the observed plan of overpressure, taken from the layer of cells around it."""
 
-# Far beyond what is possible; without bounds, spaces draw warnings.
+# Far beyond possible values; spaces without bounds cause warnings.
 _MOST_IMPULSE: Final = 1e9
 _MOST_OVERPRESSURE_PA: Final = 1e10
 _LEAST_OVERPRESSURE_PA: Final = -101_325.0
@@ -51,11 +51,11 @@ _LATEST_S: Final = 60.0
 
 
 class Unfolding(ABC):
-    """A blast on its way: of particles, or of a gas.
+    """A blast in progress, of particles or of gas.
 
     Attributes:
         blast: The blast.
-        run: How far it is.
+        run: Its state.
     """
 
     blast: "Blast | GasBlast"
@@ -63,7 +63,7 @@ class Unfolding(ABC):
     _painter: "FramePainter | PressureNow | None" = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what draws: it does not pickle, and is made anew."""
+        """Leave out the painter, which does not pickle and is made anew."""
         return {**self.__dict__, "_painter": None}
 
     @property
@@ -73,7 +73,7 @@ class Unfolding(ABC):
 
     @property
     def end_reason(self) -> EndReason | None:
-        """Why it has ended; None while it has not."""
+        """The reason for its end; None while it runs."""
         return self.run.end_reason
 
     @property
@@ -84,11 +84,11 @@ class Unfolding(ABC):
     @property
     @abstractmethod
     def site(self) -> BlastSite:
-        """What stands where."""
+        """The site of the blast."""
 
     @property
     def module_ids(self) -> tuple[str, ...]:
-        """Names of the modules of the structures, as they are observed."""
+        """Names of the modules of the structures, in the order of the observation."""
         return tuple(
             outline.module_name(row, column)
             for outline in self.site.structures
@@ -100,19 +100,19 @@ class Unfolding(ABC):
     @property
     @abstractmethod
     def impulse(self) -> float:
-        """Impulse on the protected structures so far, by weight: simulation units, or Pa s."""
+        """Weighted impulse on the protected structures so far, simulation units or Pa s."""
 
     @abstractmethod
     def advance(self, until_s: float) -> dict[str, Any]:
-        """Go on to a time, or the end; return what is to be said of that part."""
+        """Advance to a time, or the end; return the information on that part."""
 
     @abstractmethod
     def observe(self) -> Observation:
-        """Return what is seen now."""
+        """Return the present observation."""
 
     @abstractmethod
     def result(self) -> "BlastResult | GasResult":
-        """Return what happened, at the end.
+        """Return the result, at the end.
 
         Raises:
             ValueError: If the run has not ended.
@@ -120,11 +120,11 @@ class Unfolding(ABC):
 
     @abstractmethod
     def frame(self) -> NDArray[np.uint8]:
-        """Return a picture of now."""
+        """Return a picture of the present state."""
 
 
 class UnfoldingParticles(Unfolding):
-    """A blast of particles on its way.
+    """A blast of particles in progress.
 
     Args:
         blast: The blast.
@@ -140,16 +140,16 @@ class UnfoldingParticles(Unfolding):
 
     @property
     def site(self) -> BlastSite:
-        """What stands where."""
+        """The site of the blast."""
         return self.blast.scene
 
     @property
     def impulse(self) -> float:
-        """Impulse on the protected structures so far, by weight, simulation units."""
+        """Weighted impulse on the protected structures so far, simulation units."""
         return sum(o.weight * o.impulse for o in self.run.obstacles if o.protected)
 
     def advance(self, until_s: float) -> dict[str, Any]:
-        """Go on to a time, or the end; return the collisions on the way, a row each."""
+        """Advance to a time, or the end; return the collisions of that part and the impulse."""
         recorded = len(self.run.log)
         self.run.advance(until_s)
         collisions: tuple[dict[Any, Any], ...] = ()
@@ -172,7 +172,7 @@ class UnfoldingParticles(Unfolding):
         }
 
     def result(self) -> BlastResult:
-        """Return what happened, at the end.
+        """Return the result, at the end.
 
         Raises:
             ValueError: If the run has not ended.
@@ -190,7 +190,7 @@ class UnfoldingParticles(Unfolding):
     @staticmethod
     def space(scenario: Scenario, engine: Engine) -> spaces.Dict:  # noqa: ARG004
         """Return the space of the observations."""
-        # With the heaviest charge every bound is the highest.
+        # The heaviest charge has the highest bounds.
         source = max(scenario.charge, key=lambda source: source.tnt_kg)
         heaviest = scenario.model_copy(update={"charge": (source,)})
         scene = Blast(heaviest).scene
@@ -212,7 +212,7 @@ class UnfoldingParticles(Unfolding):
 
 
 class UnfoldingGas(Unfolding):
-    """A blast of gas dynamics on its way.
+    """A blast of gas dynamics in progress.
 
     Args:
         blast: The blast.
@@ -236,18 +236,18 @@ class UnfoldingGas(Unfolding):
 
     @property
     def site(self) -> BlastSite:
-        """What stands where."""
+        """The site of the blast."""
         return self.run.site
 
     @property
     def impulse(self) -> float:
-        """Impulse on the protected structures so far, by weight, Pa s."""
+        """Weighted impulse on the protected structures so far, Pa s."""
         table = self._so_far().structures
         counts = table["protected"] * table["weight"]
         return float((counts * table["positive_impulse_pa_s"]).sum())
 
     def advance(self, until_s: float) -> dict[str, Any]:
-        """Go on to a time, or the end; return the impulse so far."""
+        """Advance to a time, or the end; return the impulse so far."""
         self.run.advance(until_s)
         return {"impulse_pa_s": self.impulse}
 
@@ -268,7 +268,7 @@ class UnfoldingGas(Unfolding):
         }
 
     def result(self) -> "GasResult":
-        """Return what happened, at the end.
+        """Return the result, at the end.
 
         Raises:
             ValueError: If the run has not ended.
@@ -286,7 +286,7 @@ class UnfoldingGas(Unfolding):
         return self._painter.frame()
 
     def _so_far(self) -> "GasResult":
-        """Return what has happened so far, in the form of a result."""
+        """Return the loads so far, as a result."""
         from blast_env.engines.gas import GasResult
 
         return GasResult(self.blast, self.run, oblique=self._oblique)
@@ -310,10 +310,10 @@ class UnfoldingGas(Unfolding):
 
 
 def _unfolding_class(engine: Engine) -> Any:
-    """Return what shows the blasts of an engine step by step.
+    """Return the class that runs the blasts of an engine step by step.
 
     Raises:
-        BlastEnvError: If it tells loads without a blast.
+        BlastEnvError: If the engine runs no blasts.
     """
     if not engine.unfolding:
         raise BlastEnvError(f"engine {engine.name!r} runs no blasts: there is none to show")
@@ -321,7 +321,7 @@ def _unfolding_class(engine: Engine) -> Any:
 
 
 def _plan_shape(scenario: Scenario, cell_m: float) -> tuple[int, int]:
-    """Return how many cells the site has upwards and to the right."""
+    """Return the numbers of cells of the site upwards and to the right."""
     site = scenario.site
     rows, columns = (
         int(np.ceil(np.round(length_m / cell_m, 9))) for length_m in (site.height_m, site.width_m)
@@ -337,14 +337,14 @@ _OPTIONS: Final = ("layout", "charge_position_m")
 
 
 class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
-    """A blast that unfolds step by step: nothing is decided, everything can be watched.
+    """A blast that unfolds step by step, to be watched without decisions.
 
     ## Description
-    `reset` lays out a scenario at the moment of the detonation, `step` lets a fixed time pass. It
-    serves to study the blast model, to watch it, and to build other tasks on.
+    `reset` sets up a scenario at the moment of the detonation, `step` advances it by a fixed time.
+    It serves to study the blast model, to watch it, and as a basis of other tasks.
 
     ## Action space
-    `Discrete(1)`: the only action, 0, is to go on.
+    `Discrete(1)`: the only action, 0, continues.
 
     ## Observation space
     A dictionary. Particles give the first three, gas dynamics all but `particle_counts`:
@@ -362,23 +362,23 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     The rows of `overpressure` go upwards, and solids have 0.
 
     ## Rewards
-    Minus the impulse that the protected structures took in this step, by weight, in simulation
-    units, or in Pa s with gas. Over an episode it adds up to minus what `blast_env.simulate` gives:
-    exactly for particles with weights that are powers of two, with gas up to rounding.
+    Minus the weighted impulse on the protected structures in this step, in simulation units, or in
+    Pa s with gas. Over an episode it adds up to minus the impulse of `blast_env.simulate`: exactly
+    for particles with weights that are powers of two, with gas up to rounding.
 
     ## Starting state
-    `reset(seed=s)` lays out the blast of `simulate(..., seed=s)`; without a seed one is drawn.
+    `reset(seed=s)` sets up the blast of `simulate(..., seed=s)`; without a seed one is drawn.
     With gas the seed draws the charge alone, and the blast begins when its front is near the first
-    solid: what was before is in the loads and at the gauges. Options: `"layout"`, and
-    `"charge_position_m"`, (x, y) of the charge, whose mass is then drawn as before.
+    solid: loads and gauges include the time before. Options: `"layout"`, and
+    `"charge_position_m"`, (x, y) of the charge, whose mass is still drawn.
 
     ## Episode end
-    Terminated when the run has ended (`info["end_reason"]` says why); never truncated. `step` tells
-    `collisions` (the keys of `blast_env.recording.tables.COLLISION_COLUMNS`) and `impulse_sim`, or
-    with gas `impulse_pa_s`; at the end also `digest`.
+    Terminated when the run has ended (`info["end_reason"]` has the reason); never truncated. `step`
+    returns `collisions` (keys of `blast_env.recording.tables.COLLISION_COLUMNS`) and `impulse_sim`,
+    or with gas `impulse_pa_s`; at the end also `digest`.
 
     ## Arguments
-    Those of `__init__`, below.
+    See `__init__`, below.
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastSimulator-v0", scenario="free_field", step_s=0.01)
     >>> observation, info = env.reset(seed=0)
@@ -413,7 +413,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         render_mode: str | None = None,
         cell_m: float | None = None,
     ) -> None:
-        """Make an environment; `gymnasium.make` hands its keywords over to this.
+        """Make an environment from the keywords of `gymnasium.make`.
 
         Args:
             scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data.
@@ -421,12 +421,12 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
             engine: Name of an engine, or an engine.
             step_s: Simulated time per step.
             render_mode: `None`, `"rgb_array"` or `"human"`; with gas the overpressure in plan and
-                in a vertical section, on a scale that ends at the peak that Kingery and Bulmash
-                have in the open as near to the charge as the nearest structure that counts.
-            cell_m: Side of the cells of gas dynamics; 0.5 m unless given.
+                in a vertical section, on a scale up to the free-field peak by Kingery and Bulmash
+                at the distance of the nearest structure that counts.
+            cell_m: Side of the cells of gas dynamics; default 0.5 m.
 
         Raises:
-            BlastEnvError: If an argument is of no use; the message names it and its bounds.
+            BlastEnvError: If an argument is invalid; the message names it and its bounds.
         """
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
@@ -447,7 +447,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Lay out a blast; see the class for the options and the information.
+        """Set up a blast; see the class for the options.
 
         Raises:
             BlastEnvError: If an option is unknown, or the layout or the charge does not fit.
@@ -469,7 +469,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         return blast.observe(), info
 
     def step(self, action: np.int64 | int) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Let `step_s` pass; the action is always 0.
+        """Advance the blast by `step_s`; the action is always 0.
 
         Raises:
             gymnasium.error.InvalidAction: If the action is another one.
@@ -492,7 +492,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         return blast.observe(), before - blast.impulse, ended, False, info
 
     def result(self) -> "BlastResult | GasResult":
-        """Return the result of the blast that has ended, as `blast_env.simulate` would.
+        """Return the result of the ended blast, as `blast_env.simulate` does.
 
         Raises:
             gymnasium.error.ResetNeeded: If `reset` has not been called.
@@ -517,7 +517,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         return None
 
     def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Return the one key for `gymnasium.utils.play`: the space bar goes on, as nothing does."""
+        """Return the key of the only action for `gymnasium.utils.play`: the space bar."""
         return {(ord(" "),): 0}
 
     def close(self) -> None:
@@ -527,7 +527,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
             self._window = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the window: a copy opens one of its own."""
+        """Leave out the window: a copy opens a new one."""
         return {**self.__dict__, "_window": None}
 
     def _lay_out(self, seed: int, options: Mapping[str, Any]) -> Unfolding:

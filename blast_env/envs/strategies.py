@@ -1,4 +1,4 @@
-"""What is chosen by name: threat models, sources of scenarios, rewards."""
+"""Strategies with names: threat models, sources of scenarios, rewards."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ from blast_env.sites import FAMILIES, training_sites
 
 
 class ThreatModel(Protocol):
-    """Draws the charges of an episode and decides what may be seen of them."""
+    """Draws the charges of an episode and determines their observable part."""
 
     def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:
-        """Draw the charges that the layout is assessed against, with nothing but `rng`."""
+        """Draw the charges for the assessment of the layout, with `rng` as the only randomness."""
 
     def shown(self, scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[AnySource, ...]:
-        """Return where the charge is, or may be, as far as the agent may know."""
+        """Return the place of the charge, or its possible places, as shown to the agent."""
 
 
 @dataclass(frozen=True)
 class VisibleThreat:
-    """One charge, and the agent sees where it is: a layout for each charge."""
+    """One charge at a place known to the agent: a layout for each charge."""
 
     def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:
         """Draw one charge."""
@@ -45,16 +45,16 @@ class VisibleThreat:
 
 @dataclass(frozen=True)
 class HiddenThreat:
-    """Several charges, of which the agent sees only where they may be: one layout for all.
+    """Several charges, of which the agent sees only the possible places: one layout for all.
 
     Attributes:
-        threats: How many charges are drawn for an episode.
+        threats: Number of charges per episode.
     """
 
     threats: int
 
     def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:
-        """Draw the charges, independently of each other but for the ranks of vehicles' places."""
+        """Draw the charges, independently except for the ranks of vehicles' places."""
         return scenario.sample_charges(rng, self.threats)
 
     def shown(
@@ -62,33 +62,32 @@ class HiddenThreat:
         scenario: Scenario,
         charges: tuple[AnyCharge, ...],  # noqa: ARG002
     ) -> tuple[AnySource, ...]:
-        """Return the places of the scenario; nothing of the charges."""
+        """Return the sources of the scenario, without the charges drawn."""
         return scenario.charge
 
 
 class ScenarioSource(Protocol):
-    """Gives each episode its scenario.
+    """Provides the scenario of each episode.
 
-    All scenarios of a source have sites of one size, build zones of as many rows and columns, and
-    catalogues with items of the same names and sizes, so that they share the observation and the
-    action space. Some of the items may be out of stock. If any has a vehicle, the representative
-    one has.
+    All scenarios of a source have sites and build zones of one size, and catalogues with items of
+    the same names and sizes, so that they share the observation and the action space. Some of the
+    items may be out of stock. If any scenario has a vehicle, the representative one has.
     """
 
     @property
     def representative(self) -> Scenario:
-        """A scenario of the size that all have; always the same one."""
+        """A scenario of the common size; always the same one."""
 
     def sample(self, rng: np.random.Generator) -> Scenario:
-        """Draw the scenario of an episode, with nothing but `rng`."""
+        """Draw the scenario of an episode, with `rng` as the only randomness."""
 
 
 @dataclass(frozen=True)
 class SingleScenario:
-    """Gives every episode the same scenario.
+    """Provides the same scenario for every episode.
 
     Attributes:
-        scenario: The scenario; its bundled name or path will do.
+        scenario: The scenario, also given by its bundled name or path.
     """
 
     scenario: ScenarioField = ScenarioField()
@@ -104,15 +103,15 @@ class SingleScenario:
 
 
 def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
-    """Return the source for what a user calls a scenario.
+    """Return the source for the argument `scenario` of an environment.
 
     Args:
-        scenario: Bundled name, `"sites"`, `"item_sites"` or `"large_sites"` for generated sites to
-            train on, path of a scenario file, a scenario or its plain data, or a source.
+        scenario: Bundled name, `"sites"`, `"item_sites"` or `"large_sites"` for generated sites for
+            training, path of a scenario file, a scenario or its plain data, or a source.
 
     Raises:
-        ScenarioError: If there is no such scenario, or anything is wrong with it.
-        BlastEnvError: If it has no build zone, or is anything else.
+        ScenarioError: If there is no such scenario, or it is invalid.
+        BlastEnvError: If it has no build zone, or has another type.
     """
     source: ScenarioSource
     if isinstance(scenario, str) and scenario in FAMILIES:
@@ -125,20 +124,20 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
         raise BlastEnvError(
             f"scenario is {source!r}, must be a name, a path, a Scenario or a ScenarioSource"
         )
-    source.representative.zone  # noqa: B018  # refuses a scenario without one
+    source.representative.zone  # noqa: B018  # refuses a scenario without a build zone
     return source
 
 
 def check_size(scenario: Scenario, representative: Scenario) -> None:
-    """Refuse a scenario of another size than the one that the spaces were made for.
+    """Refuse a scenario whose size does not fit the spaces of the environment.
 
     Args:
-        scenario: The scenario that was drawn.
-        representative: The scenario that the spaces were made for.
+        scenario: The scenario drawn.
+        representative: The scenario that determines the spaces.
 
     Raises:
         BlastEnvError: If site, build zone or items have another size, there is no build zone, or
-            it has a vehicle and the representative has none. The other way round, observations
+            it has a vehicle and the representative has none. In the opposite case, observations
             show that there is no vehicle.
     """
     has_room = bool(representative.vehicles)
@@ -171,12 +170,12 @@ def _sizes(scenario: Scenario, has_room: bool) -> tuple[tuple[object, ...], ...]
 
 @dataclass(frozen=True)
 class Transition:
-    """What one action changed.
+    """The change of the layout by one action.
 
     Attributes:
         initial: The layout at `reset`.
         before: The layout before the action.
-        after: The layout after it; the same, unless the action placed a module.
+        after: The layout after it; the same, unless the action placed a module or a piece.
         begins: Whether it is the first action of the episode.
         ended: Whether the charge goes off now.
         objective: Assesses layouts under the threats of the episode.
@@ -196,40 +195,41 @@ class Transition:
 
 
 class Reward(Protocol):
-    """Pays for an action, in named terms.
+    """The reward of an action, in named terms.
 
-    An episode may be cut off after any action, by a time limit that a user puts round the
-    environment, and the environment does not learn of it. So what is paid until then should be no
-    more than what finishing would have paid.
+    A time limit around the environment may truncate an episode after any action, without the
+    environment's knowledge. So the sum until then should not exceed the sum after finishing.
     """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the terms; the reward is their sum.
 
-        Always the same names, and none that the environment uses itself (`illegal_actions`).
+        The names are always the same, without that reserved for the environment
+        (`illegal_actions`).
         """
 
 
 DEPOSIT: Final = 2.0
-"""Times the load without a barrier: more than any layout lets through; measured by
-`python -m studies.noise deposit`."""
+"""Deposit as a multiple of the load without a barrier: more than the load with any layout, as
+measured by `python -m studies.noise deposit`."""
 
 
 @dataclass(frozen=True)
 class TerminalReward:
     """Minus the load with the whole layout, paid when the charge goes off.
 
-    The load is what the scenario's objective counts: the impulse unless it says otherwise.
+    The load is that of the scenario's objective, by default the impulse.
 
-    The first action also pays a deposit, which comes back when the charge goes off: an episode that
-    is cut off before loses it. It is more than any layout lets through, so that to finish always
-    pays better than to be cut off.
+    The first action also costs a deposit, which is returned when the charge goes off: a truncated
+    episode loses it. It exceeds the load with any layout, so that finishing always pays more than
+    truncation.
     """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the term of the load, 0 before the end, and `deposit`, 0 in between.
 
-        The load's is named `impulse` (psi s), `peak` (psi) or `load` (both, without a unit).
+        The term of the load is named `impulse` (psi s), `peak` (psi) or `load` (both, without a
+        unit).
         """
         paid = transition.objective.paid
         load = deposit = 0.0
@@ -242,13 +242,12 @@ class TerminalReward:
 
 @dataclass(frozen=True)
 class IncrementalReward:
-    """What each module takes off the load, paid at once; a set of blasts per module.
+    """The reduction of the load by each module, paid at once; needs a set of blasts per module.
 
-    A placement earns I(before) - I(after), where I is what the scenario's objective counts. The
-    first action also pays -I(initial), the load with the layout at `reset`, which is the one
-    without a barrier unless an option says otherwise. So what has been paid is at any time minus
-    the load with what stands: what finishing would come to, and over an episode the sum of
-    `TerminalReward`.
+    A placement earns I(before) - I(after), where I is the load of the scenario's objective. The
+    first action also pays -I(initial), the load with the layout at `reset`: no barrier, unless an
+    option sets one. So the sum at any time is minus the load with the present layout, as if the
+    agent finished then, and over an episode that of `TerminalReward`.
     """
 
     def __call__(self, transition: Transition) -> Mapping[str, float]:
@@ -265,4 +264,4 @@ class IncrementalReward:
 REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
     {"terminal": TerminalReward(), "incremental": IncrementalReward()}
 )
-"""The rewards that have names."""
+"""The rewards, by their names."""

@@ -1,4 +1,4 @@
-"""Several environments at a time, in threads: the mode `"vector_entry_point"` of `make_vec`."""
+"""Several environments at once, in threads: the mode `"vector_entry_point"` of `make_vec`."""
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -20,7 +20,7 @@ _Action = TypeVar("_Action")
 
 
 class _Begun(gym.Wrapper[_Observation, _Action, _Observation, _Action]):
-    """Can begin a step in a thread, whose result `step` then returns."""
+    """Begins a step in a thread; `step` then returns its result."""
 
     def __init__(self, env: gym.Env[_Observation, _Action]) -> None:
         super().__init__(env)
@@ -34,7 +34,7 @@ class _Begun(gym.Wrapper[_Observation, _Action, _Observation, _Action]):
             self._pending = pool.submit(self.env.step, action)
 
     def step(self, action: _Action) -> tuple[_Observation, Any, bool, bool, dict[str, Any]]:
-        """Return what the step that has begun comes to."""
+        """Return the result of the step that has begun, or step if none has."""
         pending, self._pending = self._pending, None
         result = self.env.step(action) if pending is None else pending.result()
         self._resets_next = result[2] or result[3]
@@ -49,23 +49,23 @@ class _Begun(gym.Wrapper[_Observation, _Action, _Observation, _Action]):
         return self.env.reset(seed=seed, options=options)
 
     def _wait(self) -> None:
-        """Wait for a step that nobody asked for: another environment's error came before."""
+        """Wait for a step whose result was not fetched because another environment failed."""
         pending, self._pending = self._pending, None
         if pending is not None:
             pending.exception()
 
 
 class ThreadedVectorEnv(PlainSpec, SyncVectorEnv):
-    """Environments of this process, the steps of which run at the same time in threads.
+    """Environments of one process, whose steps run in parallel threads.
 
-    What comes out is that of `SyncVectorEnv`, to the last bit: the environments have nothing in
-    common. Threads pay with the compiled engines, whose loops hold no interpreter lock.
+    Results equal those of `SyncVectorEnv`, to the last bit: the environments share no state.
+    Threads pay with the compiled engines, whose loops release the interpreter lock.
 
     Args:
         make_env: Makes one environment.
-        num_envs: How many.
-        threads: How many steps run at the same time; as many as there are cores unless given, and
-            a single one where a window is to be drawn in.
+        num_envs: Number of environments.
+        threads: Number of steps that run at the same time; by default the number of cores, or 1
+            with `render_mode="human"`.
     """
 
     def __init__(
@@ -101,12 +101,12 @@ class ThreadedVectorEnv(PlainSpec, SyncVectorEnv):
 
 
 def barrier_vector(num_envs: int, **arguments: Any) -> ThreadedVectorEnv:
-    """Return several `BlastBarrierEnv`; the arguments are its own, and `max_episode_steps`."""
+    """Return several `BlastBarrierEnv`, from its arguments and `max_episode_steps`."""
     return _vector(BlastBarrierEnv, num_envs, **arguments)
 
 
 def simulator_vector(num_envs: int, **arguments: Any) -> ThreadedVectorEnv:
-    """Return several `BlastSimulatorEnv`; the arguments are its own, and `max_episode_steps`."""
+    """Return several `BlastSimulatorEnv`, from its arguments and `max_episode_steps`."""
     return _vector(BlastSimulatorEnv, num_envs, **arguments)
 
 
