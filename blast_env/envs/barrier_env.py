@@ -57,9 +57,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     ## Action space
     `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
     orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
-    action finishes. `action_masks()` returns the legal ones, `explain(element)` the reason why a
-    placement is not. With `action="item_then_place"` or `"item_then_block"` the variant is chosen,
-    then the cell.
+    action finishes. `action_masks()` has the legal ones, `explain(element)` why a placement is not
+    legal. With `action="item_then_place"` or `"item_then_block"` the variant comes before the cell.
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
@@ -70,10 +69,10 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     ## Rewards
     The rewards of an episode add up to minus the weighted impulse on the protected structures
     (psi s) and the cost of illegal actions. `info["reward_terms"]` has the terms: `impulse` (`peak`
-    in psi or `load` without a unit, for scenarios with these objectives), `deposit` and
-    `illegal_actions`. `reward="terminal"` pays when the charge goes off. Its first step costs a
-    deposit of twice the impulse without a barrier, returned at the end, so that a truncated episode
-    never pays more. `"incremental"` pays the reduction by each module at once.
+    in psi or `load` without a unit, if that is the objective), `deposit` and `illegal_actions`.
+    `reward="terminal"` pays when the charge goes off. Its first step costs a deposit of twice the
+    impulse without a barrier, returned at the end, so that truncation never pays. `"incremental"`
+    pays the reduction by each module at once.
 
     ## Starting state
     The build zone is empty. `threat="visible"` draws one charge and shows it; `"hidden"` draws
