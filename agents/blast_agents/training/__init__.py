@@ -1,4 +1,4 @@
-"""Training of agents with stable-baselines3, in run folders that survive any interruption."""
+"""Training of agents with stable-baselines3, in run folders that survive interruptions."""
 
 from blast_agents.training.agent import (
     TrainedAgent,

@@ -1,4 +1,4 @@
-"""Agents: the model, its files, and what it proposes."""
+"""Agents: models, their files, and the layouts that they propose."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -58,10 +58,10 @@ AnyOf = TypeVar("AnyOf", bound=CommonHyperparameters)
 
 
 def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenario) -> AnyOf:
-    """Return hyperparameters with what follows from the scenario's build zone and the threat.
+    """Return hyperparameters with the arguments given by the scenario's build zone and the threat.
 
     Raises:
-        BlastEnvError: If the policy is not one for the algorithm and the observation.
+        BlastEnvError: If the policy does not suit the algorithm and the observation.
     """
     zone = scenario.zone
     places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
@@ -85,10 +85,10 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
 
 
 def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFolder) -> None:
-    """Refuse hyperparameters that are none for the scenario's build zone.
+    """Refuse hyperparameters that do not fit the scenario's build zone.
 
     Raises:
-        BlastEnvError: If there are such.
+        BlastEnvError: If an argument of the policy differs.
     """
     found = configuration.hyperparameters
     wanted = fitted(found, configuration.settings, scenario)
@@ -104,14 +104,14 @@ def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFo
 def channels_of(observation: str) -> tuple[str, ...]:
     """Return the names of an observation's planes, without those of catalogue and vehicles.
 
-    None for one that is no planes.
+    The result is empty for an observation without planes.
     """
     channels: tuple[str, ...] = getattr(OBSERVATIONS[observation], "channels", ())
     return channels
 
 
 def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
-    """Return a model with fresh weights, which the seed decides."""
+    """Return a model with random weights, drawn by the seed of the run."""
     arguments = configuration.ppo.model_arguments()
     for name in ("learning_rate", "clip_range"):
         arguments[name] = schedule(arguments[name])
@@ -124,7 +124,7 @@ def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
 
 
 def policy_for(configuration: RunConfiguration, scenario: Scenario) -> Policy:
-    """Return the policy of a run on a scenario of its size, with fresh weights."""
+    """Return the policy of a run for a scenario of its size, with random weights."""
     policy_class, arguments = _policy_class(configuration)
     seen, actions = policy_spaces(configuration.settings.observation, scenario)
     policy: Policy = policy_class(seen, actions, lambda _: 0.0, **arguments)
@@ -134,9 +134,9 @@ def policy_for(configuration: RunConfiguration, scenario: Scenario) -> Policy:
 def policy_spaces(
     observation: str, scenario: Scenario
 ) -> tuple[spaces.Space[Any], spaces.Discrete]:
-    """Return the spaces of observations and actions that a policy for a scenario is made with.
+    """Return the spaces of observations and actions of a policy for a scenario.
 
-    Those of the environment, but for an image: stable-baselines3 puts its channels first.
+    They are those of the environment, except that stable-baselines3 puts an image's channels first.
     """
     space = OBSERVATIONS[observation].space(scenario)
     if isinstance(space, spaces.Box) and is_image_space(space):
@@ -145,7 +145,7 @@ def policy_spaces(
 
 
 def as_tensor(policy: Policy, observations: Array) -> torch.Tensor:
-    """Return several observations as a policy takes them, of an image the channels first."""
+    """Return observations as the input tensor of a policy, with an image's channels first."""
     tensor, _ = policy.obs_to_tensor(observations)
     if not isinstance(tensor, torch.Tensor):
         raise TypeError(f"observations are arrays, not {type(tensor).__name__}")
@@ -163,7 +163,7 @@ def logits_of(policy: Policy, observations: torch.Tensor) -> torch.Tensor:
 
 @contextmanager
 def torch_threads(count: int) -> Iterator[None]:
-    """Let torch work with so many threads in this block."""
+    """Set the number of torch's threads in this block."""
     before = torch.get_num_threads()
     torch.set_num_threads(count)
     try:
@@ -173,7 +173,7 @@ def torch_threads(count: int) -> Iterator[None]:
 
 
 def _policies(settings: TrainingSettings) -> dict[str, type[Policy]]:
-    """Return the policies for algorithm and observation, by the names that RL Zoo imports."""
+    """Return the policies for algorithm and observation, by their names for import in RL Zoo."""
     of_ppo = settings.algorithm == "ppo"
     plain: dict[str, type[Policy]] = {
         "MlpPolicy": ActorCriticPolicy if of_ppo else MaskableActorCriticPolicy
@@ -189,7 +189,7 @@ def _policies(settings: TrainingSettings) -> dict[str, type[Policy]]:
 
 
 def _policy_class(configuration: RunConfiguration) -> tuple[type[Any], dict[str, Any]]:
-    """Return the class of the policy, and the arguments beside spaces and schedule."""
+    """Return the class of the policy, and its arguments without spaces and schedule."""
     settings, hyperparameters = configuration.settings, configuration.hyperparameters
     policy_class = _policies(settings)[hyperparameters.policy]
     if not issubclass(policy_class, ZonePolicy):
@@ -203,22 +203,22 @@ _ARCHIVE: Final = ".zip"
 _ARCHIVES_HOLD_CODE: Final = "such archives may hold pickled code, which runs when they are read"
 
 _SCHEDULES: Final = ("learning_rate", "lr_schedule", "clip_range", "clip_range_vf")
-"""What only training needs; in RL Zoo's archives objects of classes that may not be installed."""
+"""Entries of an archive that only training needs; RL Zoo's may not be importable here."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrainedAgent:
-    """Places modules one after the other as a policy says; a `LayoutAgent`.
+    """Places modules one after the other by a policy; a `LayoutAgent`.
 
     Attributes:
         policy: The policy, of PPO or MaskablePPO.
         representative: A scenario of the size that the policy is for.
         observation: Name of the observation that the policy is for.
-        engine: Engine for the blasts of an observation that shows loads; others need none, and no
-            calibration.
+        engine: Engine for the blasts of an observation that shows loads; other observations need
+            neither engine nor calibration.
 
     Raises:
-        UnknownNameError: If there is no such observation.
+        UnknownNameError: If the observation is unknown.
     """
 
     policy: Policy
@@ -245,10 +245,9 @@ class TrainedAgent:
         """Return the layout of the most likely legal actions.
 
         Args:
-            scenario: A scenario of the size of the one that the agent was trained on, or its
-                bundled name or path.
-            charge: Where the charge is, one that the scenario may draw; `None` where it is
-                hidden.
+            scenario: A scenario of the same size as that of the training, or its bundled name or
+                path.
+            charge: One of the scenario's charges; `None` if it is hidden.
 
         Raises:
             BlastEnvError: If the scenario has another size, or no build zone.
@@ -262,16 +261,16 @@ class TrainedAgent:
         count: int = 8,
         seed: int = 0,
     ) -> tuple[Layout, ...]:
-        """Return layouts of actions drawn as the policy would draw them in training.
+        """Return layouts of actions sampled from the policy, as in training.
 
         Args:
             scenario: As for `propose`.
             charge: As for `propose`.
-            count: How many; some may be equal.
-            seed: Decides them.
+            count: Number of layouts; some may be equal.
+            seed: Seed of the samples.
 
         Raises:
-            BlastEnvError: As for `propose`, or if there are to be none.
+            BlastEnvError: As for `propose`, or if `count` is below 1.
         """
         if count < 1:
             raise BlastEnvError(f"count is {count}, must be at least 1")
@@ -287,13 +286,13 @@ class TrainedAgent:
         placements = [Placement.empty(scenario)] * count
         open_ones = [index for index in range(count) if not placements[index].is_full]
         while open_ones:
-            # Most layouts begin alike: what is the same is looked at once.
+            # Many layouts have the same beginning: the policy evaluates it once.
             different = {placements[index].layout: placements[index] for index in open_ones}
             number_of = {layout: number for number, layout in enumerate(different)}
             observations = np.stack([episode.observe(each) for each in different.values()])
             legal = np.stack([each.legal.ravel() for each in different.values()])
             numbers = [number_of[placements[index].layout] for index in open_ones]
-            with torch_threads(1):  # for a few small sums more of them only wait
+            with torch_threads(1):  # further threads only wait for these small products
                 actions = self._actions(observations, legal, numbers, draw)
             going_on = []
             for index, action in zip(open_ones, actions, strict=True):
@@ -308,7 +307,7 @@ class TrainedAgent:
     def _episode(self, scenario: Scenario, charge: AnyCharge | None) -> EpisodeObservation:
         sources = scenario.charge if charge is None else (source_of(charge),)
         among_vehicles = bool(self.representative.vehicles)
-        # Whoever shows no loads needs no engine: it is looked for when they are asked for.
+        # The engine is resolved on the first use, since most observations show no loads.
         module_loads: ModuleLoads = lambda *asked: self._module_loads(*asked)  # noqa: E731
         observable = Observable(scenario, sources, module_loads, among_vehicles)
         return OBSERVATIONS[self.observation].episode(observable)
@@ -320,7 +319,7 @@ class TrainedAgent:
         numbers: Sequence[int],
         draw: torch.Generator | None,
     ) -> list[int]:
-        """Return an action for each of the numbered observations; to finish is always legal."""
+        """Return an action for each of the numbered observations; finishing is always legal."""
         legal = torch.as_tensor(np.pad(placeable, ((0, 0), (0, 1)), constant_values=True))
         with torch.no_grad():
             logits = logits_of(self.policy, as_tensor(self.policy, observations))
@@ -334,10 +333,10 @@ class TrainedAgent:
 
 
 def newest_weights(run: str | Path) -> Literal["best", "last"]:
-    """Return which weights of a run folder to use: the best, or the last before any evaluation.
+    """Return the weights to use of a run folder: the best, or the last before any evaluation.
 
     Raises:
-        BlastEnvError: If it is no run folder, or damaged.
+        BlastEnvError: If it is not a run folder or is damaged.
     """
     checkpoint = Checkpoint.load(RunFolder(Path(run)).checkpoint)
     return "best" if checkpoint.best_policy else "last"
@@ -346,16 +345,16 @@ def newest_weights(run: str | Path) -> Literal["best", "last"]:
 def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> TrainedAgent:
     """Return the agent of a run folder.
 
-    The policy is rebuilt from the run's configuration, and nothing but weights is read: no file
-    of a run folder can hold code.
+    The policy is rebuilt from the run's configuration, and only weights are read: no file of a run
+    folder can contain code.
 
     Args:
         run: A run folder.
-        weights: Those of the best evaluation, or the last ones.
+        weights: Weights of the best evaluation, or the last ones.
 
     Raises:
-        BlastEnvError: If it is no run folder, or damaged; also for an archive of
-            stable-baselines3, which is for `load_archive`, and if there are no such weights yet.
+        BlastEnvError: If it is not a run folder, is damaged, or has no such weights yet; also for
+            an archive of stable-baselines3, which `load_archive` reads.
     """
     if Path(run).suffix == _ARCHIVE:
         raise BlastEnvError(
@@ -384,22 +383,22 @@ def load_archive(
     observation: str = "grid",
     engine: str | Engine = "event",
 ) -> TrainedAgent:
-    """Return the agent of an archive that stable-baselines3 or RL Zoo wrote.
+    """Return the agent of an archive written by stable-baselines3 or RL Zoo.
 
-    Such archives may hold pickled objects, and reading these runs whatever code their maker put
-    in. So it takes a flag. RL Zoo need not be installed.
+    Such archives may contain pickled objects, which can execute arbitrary code when read, so
+    reading them requires a flag. RL Zoo need not be installed.
 
     Args:
         path: The archive, a `.zip` file.
-        algorithm: Of the archive.
+        algorithm: Algorithm of the archive.
         scenario: A scenario of the size that the policy is for, or its bundled name or path.
-        trust_archive: Whether the archive may run code: only for one whose maker you trust.
+        trust_archive: Whether the archive may run code; only for a trusted source.
         observation: Name of the observation that the policy is for.
-        engine: For an observation that shows loads; see `TrainedAgent`.
+        engine: Engine for an observation that shows loads; see `TrainedAgent`.
 
     Raises:
-        BlastEnvError: If the archive is not trusted, or cannot be read, or is for other
-            observations or actions than those of the scenario.
+        BlastEnvError: If the archive is not trusted, cannot be read, or is for observations or
+            actions other than those of the scenario.
     """
     if not trust_archive:
         raise BlastEnvError(f"{path}: {_ARCHIVES_HOLD_CODE}; trust_archive is False, must be True")

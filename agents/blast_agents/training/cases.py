@@ -1,4 +1,4 @@
-"""Cases for agents: those that the best weights are chosen by, and those that judge in the end."""
+"""Cases for agents: for training, for the selection of the best weights, and for the judgement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from blast_env.statistics import Estimate
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Cases by which the best weights of a run are chosen.
+    """Cases that select the best weights of a run.
 
     Attributes:
         cases: The cases.
-        evaluators: Run their blasts, and remember those without a barrier.
-        processes: Worker processes for them.
+        evaluators: Run their blasts, and cache those without a barrier.
+        processes: Worker processes for the blasts.
     """
 
     cases: tuple[Case, ...]
@@ -34,19 +34,19 @@ class Selection:
     def of(
         cls, settings: TrainingSettings, source: ScenarioSource, processes: int = 1
     ) -> "Selection":
-        """Draw the cases of a run; they follow from the settings alone.
+        """Draw the cases of a run, which depend only on the settings.
 
-        Of generated sites they are the last of those that training never sees.
+        Generated sites are the last ones of the held-out sites.
 
         Args:
-            settings: Of the run.
-            source: Of the run.
-            processes: Worker processes for the blasts; they change nothing but the time.
+            settings: Settings of the run.
+            source: Source of the run's scenarios.
+            processes: Worker processes for the blasts; results do not depend on their number.
 
         Raises:
             CalibrationError: If the scenario has no calibration for the judge.
-            UnknownNameError: If there is no such engine.
-            BlastEnvError: If there are to be more cases than seeds or sites for them.
+            UnknownNameError: If the engine is unknown.
+            BlastEnvError: If there are fewer seeds or sites than cases.
         """
         count = settings.evaluation_cases
         seeds = SeedRange.SELECTION.seeds(settings.evaluation_first_seed, count)
@@ -72,13 +72,13 @@ class Selection:
 def training_cases(
     settings: TrainingSettings, source: ScenarioSource, count: int
 ) -> tuple[Case, ...]:
-    """Return cases to learn from; they follow from the settings alone, and none comes twice.
+    """Return distinct training cases, which depend only on the settings.
 
     Args:
-        settings: Of the run; with a hidden charge, each case has `hidden_threats` charges.
-        source: Of the run: its scenario, or generated sites.
-        count: How many are drawn. There are fewer where the scenario has no more charges, as one
-            with points or vehicles alone, and only one of a known site with a hidden charge.
+        settings: Settings of the run; with a hidden charge, each case has `hidden_threats` threats.
+        source: Source of the run: its scenario, or generated sites.
+        count: Number of draws. Fewer cases result if the scenario has fewer charges, such as
+            points or vehicles, and only one for a single site with a hidden charge.
     """
     hidden = settings.threat == "hidden"
     known_site = isinstance(source, SingleScenario)
@@ -103,18 +103,18 @@ def training_cases(
 def unseen_cases(
     settings: TrainingSettings, source: ScenarioSource, seeds: Sequence[int]
 ) -> tuple[Case, ...]:
-    """Return a case a seed: a threat of the run's scenario, or of a held-out site each.
+    """Return one case per seed: threats of the run's scenario, or each of a held-out site.
 
     Args:
-        settings: Of the run.
-        source: Of the run: its scenario, or generated sites. The sites are the first of those that
-            training never sees; the weights were chosen on the last ones.
-        seeds: At least one, none twice, of `SeedRange.JUDGEMENT` unless something special is
-            asked; each draws the charge, the fan and the air.
+        settings: Settings of the run.
+        source: Source of the run: its scenario, or generated sites. The sites are the first ones
+            of the held-out sites; the last ones selected the weights.
+        seeds: At least one, all distinct, usually of `SeedRange.JUDGEMENT`; each draws the charge,
+            the fan and the air.
 
     Raises:
-        BlastEnvError: If there are no seeds, one is repeated or negative, or there are not that
-            many sites.
+        BlastEnvError: If there are no seeds, a seed is repeated or negative, or there are fewer
+            sites than seeds.
     """
     if isinstance(source, SingleScenario):
         return _cases(settings, (source.scenario,) * len(seeds), seeds)
@@ -126,14 +126,14 @@ def unseen_cases(
 
 
 def _ranges_of(source: ScenarioSource) -> AnyRanges:
-    """Return the family that the sites of a source are of."""
+    """Return the family of a source's sites."""
     return source.ranges if isinstance(source, SiteSource) else FAMILIES[SITES]
 
 
 def _cases(
     settings: TrainingSettings, scenarios: Sequence[Scenario], seeds: Sequence[int]
 ) -> tuple[Case, ...]:
-    """Return a case of one threat for each scenario with its seed."""
+    """Return one case with one threat per scenario and seed."""
     if len(set(seeds)) < len(seeds):
         raise BlastEnvError("seeds: one is there twice, must be none twice")
     cases = []

@@ -1,4 +1,4 @@
-"""What training goes on from: all of a run that changes, in one file."""
+"""Checkpoints: the complete state of a training run in one file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -32,17 +32,17 @@ Weights = Mapping[str, torch.Tensor]
 
 @dataclass(frozen=True)
 class Counters:
-    """How far a training run is.
+    """Counters of a training run.
 
     Attributes:
         steps: Steps of all environments.
         rollouts: Rollouts with their updates.
         updates: Passes over rollouts.
-        episodes: Episodes that ended.
+        episodes: Finished episodes.
         blasts: Blasts simulated.
         cache_hits: Loads that needed no blast.
-        seconds: Time that the training has taken.
-        best_reduction: Of the best evaluation; minus infinity before the first.
+        seconds: Duration of the training so far, in s.
+        best_reduction: Reduction of the best evaluation; minus infinity before the first.
         best_steps: Steps at that evaluation.
     """
 
@@ -59,12 +59,12 @@ class Counters:
 
 @dataclass(frozen=True)
 class CaseLabel:
-    """The best layout of a case that self-labelling knows so far.
+    """The best layout of a case found by self-labelling so far.
 
     Attributes:
-        layout: The layout, sorted; empty where nothing is better than nothing.
-        load: With it, in the unit of the scenario's objective, one a threat of the case.
-        unprotected: Without a barrier, one a threat of the case.
+        layout: The layout, sorted; empty if no layout is better than no barrier.
+        load: Load with it, one per threat of the case, in the unit of the scenario's objective.
+        unprotected: Load without a barrier, one per threat of the case, in the same unit.
     """
 
     layout: Layout
@@ -76,21 +76,22 @@ _LABELS: Final = TypeAdapter(list[CaseLabel])
 
 
 class Checkpoint(BaseModel):
-    """What training goes on from, and what it has come to.
+    """The state of a training run between two rollouts.
 
-    It is one file, so that every moment of a run is before one rollout or after it. There is no
-    state of random numbers: each rollout has seeds of its own.
+    It is a single file, so that a run is always in the state before or after a rollout. It holds no
+    state of random generators, because each rollout has separate seeds.
 
     Attributes:
-        format: Version of this form.
-        configuration: Of the run, which the weights belong to.
-        counters: How far the run is.
-        policy: Weights of the policy, by name; none before the first rollout.
+        format: Version of the file format.
+        configuration: Configuration of the run of the weights.
+        counters: Counters of the run.
+        policy: Weights of the policy, by name; empty before the first rollout unless the run
+            started from other weights.
         optimizer: State of the optimiser.
-        best_policy: Weights of the best evaluation; none before the first one.
-        rollouts: What each rollout brought.
+        best_policy: Weights of the best evaluation; empty before the first one.
+        rollouts: Results of the rollouts.
         evaluations: The evaluations on held-out threats.
-        labels: What self-labelling has found, a label a case.
+        labels: Labels of self-labelling, one per case.
     """
 
     model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
@@ -109,11 +110,11 @@ class Checkpoint(BaseModel):
     def of_start(
         cls, configuration: RunConfiguration, weights: Weights = MappingProxyType({})
     ) -> "Checkpoint":
-        """Return the checkpoint of a run that has not done anything.
+        """Return the checkpoint of a run before its first rollout.
 
         Args:
-            configuration: Of the run.
-            weights: Those that it begins with; fresh ones unless given.
+            configuration: Configuration of the run.
+            weights: Initial weights; random ones by default.
         """
         return cls(
             configuration=configuration,
@@ -125,14 +126,14 @@ class Checkpoint(BaseModel):
 
     @property
     def is_start(self) -> bool:
-        """Whether there has not been a rollout."""
+        """Whether the run has no rollout yet."""
         return self.counters.rollouts == 0
 
     def save(self, path: Path, policy: BasePolicy | None = None) -> None:
-        """Write the checkpoint, as a policy is now; the file is complete or as it was.
+        """Write the checkpoint atomically, with the present state of a policy if given.
 
         Raises:
-            BlastEnvError: If it cannot be written.
+            BlastEnvError: If the file cannot be written.
         """
         if policy is not None:
             self.policy, self.optimizer = policy.state_dict(), policy.optimizer.state_dict()
@@ -147,7 +148,7 @@ class Checkpoint(BaseModel):
             "evaluations": [asdict(row) for row in self.evaluations],
             "labels": _LABELS.dump_python(self.labels, mode="json"),
         }
-        # torch would say in an error of its own that the device is full.
+        # torch raises errors of another type if the device is full.
         buffer = BytesIO()
         torch.save(content, buffer)
         with write_atomically(path) as temporary:
@@ -155,10 +156,10 @@ class Checkpoint(BaseModel):
 
     @classmethod
     def load(cls, path: Path) -> "Checkpoint":
-        """Read a checkpoint; nothing but tensors and plain data is accepted.
+        """Read a checkpoint; only tensors and plain data are accepted.
 
         Raises:
-            BlastEnvError: If there is none, or it is damaged.
+            BlastEnvError: If the file does not exist or is damaged.
         """
         if not path.is_file():
             raise BlastEnvError(f"{path}: there is no such checkpoint")
@@ -172,7 +173,7 @@ class Checkpoint(BaseModel):
             ) from error
 
     def write_tables(self, folder: RunFolder) -> None:
-        """Write the tables for people.
+        """Write the tables for readers.
 
         Raises:
             BlastEnvError: If they cannot be written.
@@ -181,16 +182,16 @@ class Checkpoint(BaseModel):
         write_rows(folder.evaluations, EvaluationRow, self.evaluations)
 
     def check_configuration(self, configuration: RunConfiguration, place: Path) -> None:
-        """Refuse the configuration of another run: with it the weights would say other things.
+        """Refuse the configuration of another run, which would change the meaning of the weights.
 
-        Only `steps` may differ, the steps to train for: a run may be made longer or shorter.
+        Only `steps`, the length of the training, may differ.
 
         Args:
-            configuration: As the run folder has it.
+            configuration: The configuration in the run folder.
             place: The folder, for the error.
 
         Raises:
-            BlastEnvError: If anything else differs.
+            BlastEnvError: If any other value differs.
         """
         own, given = dict(_flat(self.configuration.document())), _flat(configuration.document())
         for name, value in given:
@@ -203,15 +204,15 @@ class Checkpoint(BaseModel):
     def load_policy(
         self, policy: nn.Module, place: Path, weights: Literal["best", "last"] = "last"
     ) -> None:
-        """Give a policy the weights.
+        """Load the weights into a policy.
 
         Args:
             policy: The policy.
-            place: Where they come from, for the error.
-            weights: Those of the best evaluation, or the last ones.
+            place: Source of the weights, for the error.
+            weights: Weights of the best evaluation, or the last ones.
 
         Raises:
-            BlastEnvError: If there are none yet, or they are those of another policy.
+            BlastEnvError: If there are none yet, or they do not fit the policy.
         """
         values = self.best_policy if weights == "best" else self.policy
         if not values:
@@ -223,14 +224,14 @@ class Checkpoint(BaseModel):
         load_weights(policy, values, place)
 
     def load_into(self, policy: BasePolicy, place: Path) -> None:
-        """Give a policy the last weights, and its optimiser its state, as far as there are some.
+        """Load the last weights and the optimiser's state, if any, into a policy.
 
         Args:
             policy: The policy.
-            place: Where they come from, for the error.
+            place: Source of the weights, for the error.
 
         Raises:
-            BlastEnvError: If they are those of another policy.
+            BlastEnvError: If they do not fit the policy.
         """
         if self.policy:
             self.load_policy(policy, place)
@@ -238,25 +239,25 @@ class Checkpoint(BaseModel):
             return
         try:
             policy.optimizer.load_state_dict(self.optimizer)
-        # torch says in errors of many kinds what does not fit.
+        # torch reports a mismatch by exceptions of many types.
         except Exception as error:
             raise BlastEnvError(f"{place}: the optimiser's state does not fit: {error}") from error
 
 
 def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
-    """Give a policy weights.
+    """Load weights into a policy.
 
     Args:
         policy: The policy.
         values: The weights, by name.
-        place: Where they come from, for the error.
+        place: Source of the weights, for the error.
 
     Raises:
-        BlastEnvError: If they are those of another policy, or not finite.
+        BlastEnvError: If they do not fit the policy or are not finite.
     """
     try:
         policy.load_state_dict(values)
-    # torch says in errors of many kinds what does not fit.
+    # torch reports a mismatch by exceptions of many types.
     except Exception as error:
         problem = " ".join(str(error).split())
         raise BlastEnvError(f"{place}: weights and configuration differ: {problem}") from error
@@ -266,20 +267,20 @@ def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:
 
 
 def load_archive(path: Path, otherwise: str) -> Any:
-    """Return what torch has saved; nothing but tensors and plain data is accepted.
+    """Return the content of a file saved by torch; only tensors and plain data are accepted.
 
     Args:
         path: The file.
-        otherwise: What it is if it is not damaged, for the error.
+        otherwise: Alternative to a damaged file, for the error, such as `"no checkpoint"`.
 
     Raises:
-        BlastEnvError: If it is anything else.
+        BlastEnvError: If the file is damaged or contains anything else.
     """
     try:
         _check_archive(path)
         content = torch.load(path, map_location="cpu", weights_only=True)
         _check_tensors(content)
-    # torch says what is wrong with a file in errors of many kinds.
+    # torch reports a faulty file by exceptions of many types.
     except Exception as error:
         first_line = str(error).partition("\n")[0]
         raise BlastEnvError(f"{path}: is damaged, or {otherwise}: {first_line}") from error
@@ -287,10 +288,10 @@ def load_archive(path: Path, otherwise: str) -> Any:
 
 
 def _check_archive(path: Path) -> None:
-    """Refuse a file with wrong checksums, which torch itself does not look at, or compressed."""
+    """Refuse a compressed file, or one with wrong checksums, which torch does not verify."""
     with ZipFile(path) as archive:
         for member in archive.infolist():
-            if member.compress_type != ZIP_STORED:  # may take up any memory
+            if member.compress_type != ZIP_STORED:  # may expand to any size
                 raise BadZipFile(f"{member.filename} is compressed")
         wrong = archive.testzip()
     if wrong is not None:
@@ -298,7 +299,7 @@ def _check_archive(path: Path) -> None:
 
 
 def _check_tensors(content: Any) -> None:
-    """Refuse tensors that are larger than what the file holds of them."""
+    """Refuse tensors larger than their data in the file."""
     if isinstance(content, torch.Tensor):
         if content.numel() * content.element_size() > content.untyped_storage().nbytes():
             raise ValueError(f"a tensor of {tuple(content.shape)} is not in the file")
@@ -311,7 +312,7 @@ def _check_tensors(content: Any) -> None:
 
 
 def _flat(document: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield name and value of what is in nested tables."""
+    """Yield the dotted names and values of nested tables."""
     for key, value in document.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{above}{key}.")

@@ -30,24 +30,24 @@ _Env = gym.Env[Array, np.int64]
 
 
 class _Masked(gym.Wrapper[Array, np.int64, Array, np.int64]):
-    """A wrapper that hands on which actions are legal."""
+    """A wrapper that forwards the mask of legal actions."""
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Return which actions are legal now, (actions,)."""
+        """Return the mask of the actions that are legal now (actions,)."""
         masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
         return masks
 
 
 class RelativeReward(_Masked):
-    """Pays the reduction when the charge goes off: the share of the impulse that is gone.
+    """Rewards the relative reduction of the load at the end of an episode.
 
-    Minus the impulse, the environment's own reward, depends most of all on where the charge is.
-    The reduction compares with the same blast without a barrier, so that what remains is due to
-    the layout; it is of the order of 1 in every scenario.
+    The reward of the environment, minus the load, depends mainly on the place of the charge. The
+    reduction is relative to the same blast without a barrier, so that it isolates the effect of the
+    layout; it is of the order of 1 in every scenario.
 
     Args:
         env: A `BlastBarrier` environment with `reward="terminal"`.
-        illegal_action_cost: What an illegal action costs.
+        illegal_action_cost: Cost of an illegal action, from 0 to 1.
 
     Raises:
         BlastEnvError: If the cost is out of bounds.
@@ -60,7 +60,7 @@ class RelativeReward(_Masked):
     def step(self, action: np.int64) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
         """Place a module or finish."""
         observation, _, ended, truncated, info = self.env.step(action)
-        # Where nothing arrives without a barrier there is no reduction, and nothing to be paid.
+        # If nothing arrives without a barrier, the reduction is undefined and the reward 0.
         reward = float(np.nan_to_num(info["reduction"])) if ended else 0.0
         if info["reward_terms"][ILLEGAL_TERM] < 0.0:
             reward -= self.illegal_action_cost
@@ -68,16 +68,16 @@ class RelativeReward(_Masked):
 
 
 class ThreatPool(_Masked):
-    """Draws the episodes, with their sites and charges, from a set that is fixed once for all.
+    """Draws the episodes, with their sites and charges, from a fixed set.
 
-    The blast without a barrier is then the same again and again, and the environment remembers
-    it: an episode costs half the blasts. By itself an environment remembers a thousand loads of
-    each of four sites; for more of either give it a `cache`.
+    The blasts without a barrier then recur and are cached, so that an episode costs half the
+    blasts. By default an environment caches a thousand loads for each of four sites; a `cache`
+    raises both limits.
 
     Args:
         env: A `BlastBarrier` environment.
         size: Number of episodes in the set.
-        seed: Decides which; another one for each of parallel environments.
+        seed: Seed of the set; different for each of several parallel environments.
 
     Raises:
         BlastEnvError: If the size or the seed is out of bounds.
@@ -92,7 +92,7 @@ class ThreatPool(_Masked):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode of the set; the seed decides which ones follow each other."""
+        """Begin an episode of the set; the seed determines their order."""
         if seed is not None:
             self._rng = np.random.default_rng(seed)
         return self.env.reset(seed=self.seeds[self._rng.integers(len(self.seeds))], options=options)
@@ -101,10 +101,10 @@ class ThreatPool(_Masked):
 SITES_ID: Final = "BlastBarrierSites-v0"
 
 _LOADS: Final = 8192
-"""Loads that an environment remembers, so that a site that comes again costs no blast twice."""
+"""Number of loads that an environment caches, so that recurring sites repeat no blast."""
 
 _FORK_SERVER: Final = "forkserver"
-"""How stable-baselines3 starts processes where the system can."""
+"""Start method of stable-baselines3's processes on systems that support it."""
 
 
 def environment_id(scenario: str) -> str:
@@ -117,19 +117,19 @@ def environment_id(scenario: str) -> str:
 
 
 class SharedBlastsVecEnv(DummyVecEnv):
-    """Environments in this process whose blasts run elsewhere, those of a step all together.
+    """Environments in this process whose blasts run on other workers, all those of a step at once.
 
-    For blasts that take far longer than all else in a step, and more workers than one machine has:
-    the runner gives them to the workers that joblib was told of (`on_cluster`). As many blasts run
-    at a time as episodes end in a step, so there should be several environments a worker; they
-    begin together, and those that use up the stock end together.
+    It suits blasts that dominate the time of a step, and more workers than one machine has: the
+    runner sends the blasts to the workers of `on_cluster`. The number of parallel blasts is that of
+    the episodes that end in a step, so there should be several environments per worker; they begin
+    together, and those that use up the stock end together.
 
     Observations, rewards and masks are those of any other vector of the same environments.
 
     Args:
-        makers: Make the environments, `BlastBarrier` ones that share `cache`.
-        engine: The engine of all of them.
-        cache: Where they find the loads.
+        makers: Create the `BlastBarrier` environments, which share `cache`.
+        engine: The engine of all environments.
+        cache: Cache of the loads.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class SharedBlastsVecEnv(DummyVecEnv):
         self._blasts = np.zeros(len(makers), dtype=np.int64)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Run the blasts that the actions lead to, then act."""
+        """Run the blasts that the actions require, then step the environments."""
         due = [env.get_wrapper_attr("blasts_due") for env in self.envs]
         blasts_due = [of(action) for of, action in zip(due, self.actions, strict=True)]
         owners = [index for index, blasts in enumerate(blasts_due) for _ in blasts]
@@ -151,7 +151,7 @@ class SharedBlastsVecEnv(DummyVecEnv):
         np.add.at(self._blasts, owners, was_run)
         observations, rewards, ended, infos = super().step_wait()
         for blasts, info in zip(self._blasts.tolist(), infos, strict=True):
-            if "blasts" in info:  # who asked for a blast counts it, wherever it ran
+            if "blasts" in info:  # the environment that requested a blast counts it
                 info["blasts"] += blasts
                 info["cache_hits"] -= blasts
                 asked = info["blasts"] + info["cache_hits"]
@@ -161,13 +161,13 @@ class SharedBlastsVecEnv(DummyVecEnv):
 
 @dataclass(frozen=True)
 class EnvironmentMaker:
-    """Makes one of the parallel environments; can be sent to another process.
+    """Creates one of the parallel environments; can be pickled.
 
     Attributes:
-        configuration: Of the run.
-        source: Gives the episodes their scenario.
-        index: Which one it is.
-        cache: Where it looks for loads; a memory of its own unless given.
+        configuration: Configuration of the run.
+        source: Source of the episodes' scenarios.
+        index: Index of the environment.
+        cache: Cache of the loads; by default a separate one in memory.
     """
 
     configuration: RunConfiguration
@@ -201,9 +201,9 @@ class EnvironmentMaker:
 
 
 def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
-    """Return the parallel environments, each in a process of its own unless there is but one.
+    """Return the parallel environments, each in a separate process if there are several.
 
-    Within `on_cluster`, in this process, and their blasts on the cluster.
+    Within `on_cluster` they are in this process, and their blasts run on the cluster.
     """
     count = configuration.ppo.n_envs
     if workers_told() > 1:
@@ -214,6 +214,6 @@ def make_environments(configuration: RunConfiguration, source: ScenarioSource) -
     if count == 1:
         return DummyVecEnv([*makers])
     if _FORK_SERVER in get_all_start_methods():
-        # The processes are forks of one that has imported all this: once, not once each.
+        # The processes are forks of a server that has imported this module, once for all.
         get_context(_FORK_SERVER).set_forkserver_preload([__name__])
     return SubprocVecEnv([*makers])

@@ -1,4 +1,4 @@
-"""Hyperparameters: read from YAML, changed by options `key=value`, and checked."""
+"""Hyperparameters, read from YAML, changed by options `key=value` and validated."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -25,14 +25,14 @@ from blast_env.errors import BlastEnvError, UnknownNameError, shortened
 
 
 def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
-    """Return the values of options, `"key=value"` each; a value that is no JSON is a text.
+    """Return the values of options, `"key=value"` each; a value that is not JSON is a text.
 
     Args:
         options: The options.
-        known: The keys that there are.
+        known: The valid keys.
 
     Raises:
-        UnknownNameError: If there is no such key; the message names the nearest one.
+        UnknownNameError: If a key is unknown; the message names the nearest one.
         BlastEnvError: If an option has no `=`.
     """
     values = {}
@@ -50,7 +50,7 @@ def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any
 
 
 def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values with changes in their places; `"group.key"` is for a mapping within."""
+    """Return values with changes; `"group.key"` changes a nested mapping."""
     result = dict(values)
     for key, value in changes.items():
         group, _, name = key.rpartition(".")
@@ -62,7 +62,7 @@ def with_changes(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[
 
 
 def option_names(model: type[BaseModel]) -> list[str]:
-    """Return the keys for the fields of a model, `"group.key"` for those of a model within."""
+    """Return the keys of a model's fields, `"group.key"` for those of nested models."""
     names = []
     for name, field in model.model_fields.items():
         inner = field.annotation
@@ -91,31 +91,31 @@ def _checked(value: float | str) -> float | str:
 
 
 Amount = Annotated[float | str, AfterValidator(_checked)]
-"""A number from 0 to 1, or `"lin_"` and a number: from that to 0 at the end of training."""
+"""A number above 0 up to 1, or `"lin_"` and such a number for a linear decay to 0."""
 
 
 def schedule(amount: float | str) -> float | Callable[[float], float]:
-    """Return an amount as stable-baselines3 takes it: a number, or one times what share is left."""
+    """Return an amount for stable-baselines3: a number, or a function of the remaining share."""
     if isinstance(amount, str):
         return partial(mul, float(amount.removeprefix(LINEAR)))
     return amount
 
 
 PPO_ALGORITHMS: Final = ("ppo", "maskable_ppo")
-"""Those of stable-baselines3 and sb3-contrib."""
+"""Algorithms of stable-baselines3 and sb3-contrib."""
 
 SELF_LABELLING: Final = "self_labelling"
-"""Begins where the rules end and learns from its own best; see `training.self_labelling`."""
+"""Starts from the rules and imitates its best layouts; see `training.self_labelling`."""
 
 ALGORITHMS: Final = (*PPO_ALGORITHMS, SELF_LABELLING)
 
 ALGORITHM_NAMES: Final[Mapping[str, str]] = MappingProxyType(
     {"ppo": "PPO", "maskable_ppo": "MaskablePPO", SELF_LABELLING: "Self-labelling"}
 )
-"""What people call them."""
+"""Names of the algorithms for readers."""
 
 DEFAULT_SECTION: Final = "BlastBarrier-v0"
-"""The section for scenarios that have none of their own."""
+"""The section for scenarios without a separate one."""
 
 _FOLDER: Final = Path(__file__).parents[1] / "hyperparameters"
 
@@ -125,29 +125,29 @@ PolicyName = Literal[
     "CnnPolicy",
     "MlpPolicy",
 ]
-"""Policies by the names that RL Zoo imports them by."""
+"""Policies, by their names for import in RL Zoo."""
 
 WrapperName = Literal[
     "blast_agents.training.environments.RelativeReward",
     "blast_agents.training.environments.ThreatPool",
 ]
-"""Wrappers of the environment by the names that RL Zoo imports them by."""
+"""Wrappers of the environment, by their names for import in RL Zoo."""
 
 Share = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
 
 
 class PolicyArguments(BaseModel):
-    """Arguments of the spatial policies; stable-baselines3's own policies take none.
+    """Arguments of the spatial policies; the policies of stable-baselines3 take none.
 
     Attributes:
-        rows: Rows of the build zone; the scenario decides.
-        columns: Its columns; the scenario decides.
-        item_channels: Names of the planes that its catalogue adds to the observation.
-        places: Places that stand for where the charge may be; unless given, 1 for a visible charge
-            and 9 for a hidden one.
-        width: Number of features of a cell.
+        rows: Rows of the build zone, from the scenario.
+        columns: Columns of the build zone, from the scenario.
+        item_channels: Names of the planes that the catalogue adds to the observation.
+        places: Number of places that represent the charge; by default 1 for a visible and 9 for a
+            hidden one.
+        width: Number of features per cell.
         critic_width: Neurons of the critic's hidden layer.
-        finish_bias: What the logit of finishing begins with.
+        finish_bias: Initial bias of the logit of finishing.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -162,17 +162,17 @@ class PolicyArguments(BaseModel):
 
 
 class CommonHyperparameters(BaseModel):
-    """What all algorithms have; see each for what a step is.
+    """Hyperparameters of all algorithms; each algorithm defines its step.
 
     Attributes:
-        n_timesteps: Steps of training unless others are asked for.
-        n_envs: Parallel environments, or worker processes, unless others are asked for.
+        n_timesteps: Default number of steps of training.
+        n_envs: Default number of parallel environments or worker processes.
         policy: The policy.
         policy_kwargs: Its arguments.
-        learning_rate: A number, or `"lin_"` and a number for one that falls to 0 at the end.
+        learning_rate: A number, or `"lin_"` and a number for a linear decay to 0.
         batch_size: Steps in a minibatch.
         vf_coef: Weight of the critic's error.
-        max_grad_norm: Largest gradient.
+        max_grad_norm: Bound on the norm of the gradient.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -193,16 +193,16 @@ class Hyperparameters(CommonHyperparameters):
     A step is a step of an environment: a module or piece.
 
     Attributes:
-        env_wrapper: Wrappers of the environment, the innermost first: a name, or a name with
+        env_wrapper: Wrappers of the environment, the innermost first: names, or names with
             arguments.
         n_steps: Steps of each environment between two updates.
         n_epochs: Passes over the steps in an update.
         gamma: Discount; 1 for none.
         gae_lambda: Trade-off between bias and variance of the advantages.
-        clip_range: How far an update may move a probability; as `learning_rate`.
-        ent_coef: Weight of the entropy, which keeps the agent exploring.
-        normalize_advantage: Whether advantages are normalised by minibatch.
-        target_kl: An update ends where the policy has moved further; `None` for no limit.
+        clip_range: Bound on the change of a probability ratio in an update; as `learning_rate`.
+        ent_coef: Weight of the entropy bonus, which sustains exploration.
+        normalize_advantage: Whether advantages are normalised per minibatch.
+        target_kl: Divergence of the policy that ends an update; `None` for no limit.
     """
 
     env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
@@ -217,7 +217,7 @@ class Hyperparameters(CommonHyperparameters):
 
     @model_validator(mode="after")
     def _check_batches(self) -> "Hyperparameters":
-        """Refuse batches that do not divide a rollout: stable-baselines3 would only warn."""
+        """Refuse a batch size that does not divide a rollout: stable-baselines3 only warns."""
         steps = self.n_steps * self.n_envs
         if steps % self.batch_size:
             raise ValueError(
@@ -226,7 +226,7 @@ class Hyperparameters(CommonHyperparameters):
         return self
 
     def model_arguments(self) -> dict[str, Any]:
-        """Return the arguments of PPO and MaskablePPO but for the policy and its own."""
+        """Return the arguments of PPO and MaskablePPO except the policy and its arguments."""
         others = {"n_timesteps", "n_envs", "policy", "policy_kwargs", "env_wrapper"}
         return self.model_dump(exclude=others)
 
@@ -247,17 +247,16 @@ Count = Annotated[StrictInt, Field(ge=0, le=10_000)]
 class SelfLabellingHyperparameters(CommonHyperparameters):
     """Hyperparameters of self-labelling; see `training.self_labelling`.
 
-    A step is a layout that meets a threat: a blast, unless it is known already.
+    A step is the load of one layout under one threat: a blast, unless it is cached.
 
     Attributes:
-        cases: How many cases there are: charges, or sites, to learn from.
-        cases_per_round: How many of them, in turn, get new layouts in a round after the first.
-        samples: Layouts that the policy draws for each of these.
-        neighbours: Layouts for each of them that are the best one so far, a little changed.
-        borrowed: Layouts for each of them that are the best ones of the nearest charges.
-        first_updates: Minibatches that the policy learns from after the first round, which has the
-            layouts of the rules.
-        updates: The same after each further round.
+        cases: Number of training cases: charges or sites.
+        cases_per_round: Number of cases, in turn, with new layouts in each round after the first.
+        samples: Layouts per case that the policy samples.
+        neighbours: Layouts per case that are small changes of its best one so far.
+        borrowed: Layouts per case that are the best ones of the nearest charges.
+        first_updates: Minibatches after the first round, which has the layouts of the rules.
+        updates: Minibatches after each further round.
     """
 
     cases: Annotated[StrictInt, Field(ge=1, le=100_000)]
@@ -277,20 +276,20 @@ _MODELS: Final[Mapping[str, type[AnyHyperparameters]]] = MappingProxyType(
 
 
 def hyperparameter_keys(algorithm: str) -> tuple[str, ...]:
-    """Return names that changes can have: `"policy_kwargs.width"` for an argument of the policy.
+    """Return the valid keys of changes, such as `"policy_kwargs.width"`.
 
     Raises:
-        UnknownNameError: If there is no such algorithm; the message names the nearest one.
+        UnknownNameError: If the algorithm is unknown; the message names the nearest one.
     """
     check_names("algorithm", [algorithm], ALGORITHMS)
     return tuple(option_names(_MODELS[algorithm]))
 
 
 def hyperparameter_file(algorithm: str) -> Path:
-    """Return the YAML file of an algorithm, which comes with the package.
+    """Return the bundled YAML file of an algorithm.
 
     Raises:
-        UnknownNameError: If there is no such algorithm; the message names the nearest one.
+        UnknownNameError: If the algorithm is unknown; the message names the nearest one.
     """
     check_names("algorithm", [algorithm], ALGORITHMS)
     return _FOLDER / f"{algorithm}.yml"
@@ -306,13 +305,13 @@ def load_hyperparameters(
 
     Args:
         algorithm: One of `ALGORITHMS`.
-        env_id: Section of the file; one that it does not have gets that of `BlastBarrier-v0`.
-        changes: Values in the place of those of the file, by name; see `hyperparameter_keys`.
-        envs: Parallel environments, in the place of `n_envs`.
+        env_id: Section of the file; that of `BlastBarrier-v0` if the file has no such section.
+        changes: Values that override those of the file, by name; see `hyperparameter_keys`.
+        envs: Number of parallel environments, which overrides `n_envs`.
 
     Raises:
-        UnknownNameError: If there is no such algorithm or key; the message names the nearest one.
-        BlastEnvError: If a value is of no use; the message names its bound.
+        UnknownNameError: If the algorithm or a key is unknown; the message names the nearest one.
+        BlastEnvError: If a value is invalid; the message names its bound.
     """
     path = hyperparameter_file(algorithm)
     sections = yaml.safe_load(path.read_text(encoding="utf-8"))  # our own file, with aliases

@@ -1,4 +1,4 @@
-"""Trained weights that come with the package: weights only, and beside them what they are."""
+"""Bundled trained weights: files of weights only, with records of their provenance."""
 
 import json
 from collections.abc import Iterator
@@ -20,22 +20,22 @@ from blast_env.scenario import Scenario
 from blast_env.sites import FAMILIES, training_sites
 
 WEIGHTS: Final = Path(__file__).parents[1] / "weights"
-"""The folder of the weights that come with the package."""
+"""The folder of the bundled weights."""
 
 
 class LeagueResult(BaseModel):
-    """What the weights did where nothing was chosen by: a row of a league.
+    """Result of the weights in a league, on cases used neither for training nor for selection.
 
     Attributes:
-        command: What played the league.
-        engine: The judge.
+        command: Command that played the league.
+        engine: The judging engine.
         track: Name of the track.
-        cases: Cases of it.
+        cases: Number of cases.
         reduction: Mean reduction of the load.
         low: Lower end of its 95 % interval.
-        high: Upper end.
-        best_rule: Name of the rule that was best on the mean.
-        best_rule_reduction: Its mean reduction.
+        high: Upper end of its 95 % interval.
+        best_rule: Name of the rule with the largest mean reduction.
+        best_rule_reduction: Mean reduction by that rule.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -52,18 +52,18 @@ class LeagueResult(BaseModel):
 
 
 class Record(BaseModel):
-    """What belongs to weights, a JSON file beside them.
+    """Provenance of weights, in a JSON file beside them.
 
     Attributes:
-        format: Version of this form.
-        configuration: Of the run that they come from, with the scenario's hash.
+        format: Version of the file format.
+        configuration: Configuration of their run, with the scenario's hash.
         scenario: Name of the scenario, or of the family of generated sites.
-        command: What trained them.
-        versions: With what, without the machine.
-        steps: Steps of training at the evaluation that they were chosen by.
-        blasts: Blasts of the training; guesses, where a surrogate made them.
-        seconds: Time that it took.
-        league: What they did in a league.
+        command: Command that trained them.
+        versions: Versions of the software, without the platform.
+        steps: Steps of training at the evaluation that selected them.
+        blasts: Blasts of the training, or predictions of a surrogate.
+        seconds: Duration of the training, in s.
+        league: Their result in a league.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -82,19 +82,20 @@ class Record(BaseModel):
 def pack(
     run: str | Path, name: str, league: LeagueResult | None = None, folder: Path = WEIGHTS
 ) -> list[Path]:
-    """Write the best weights of a run, and what belongs to them.
+    """Write the best weights of a run and their record.
 
     Args:
         run: The run folder.
-        name: Of the files.
-        league: What they did in a league.
-        folder: It exists.
+        name: Stem of the files.
+        league: Their result in a league.
+        folder: Target folder, which exists.
 
     Returns:
         The files.
 
     Raises:
-        BlastEnvError: If it is no run folder, or damaged, or a file cannot be written.
+        BlastEnvError: If `run` is not a run folder, is damaged or has no evaluation yet, or if a
+            file cannot be written.
     """
     source = RunFolder(Path(run))
     configuration, checkpoint = source.configuration(), Checkpoint.load(source.checkpoint)
@@ -125,10 +126,10 @@ def pack(
 
 
 def records(folder: Path | None = None) -> Iterator[tuple[Path, Record]]:
-    """Yield each file of weights with what belongs to it, by name.
+    """Yield each file of weights with its record, by name.
 
     Args:
-        folder: Where they are; `WEIGHTS` unless given.
+        folder: Folder of the files; `WEIGHTS` by default.
 
     Raises:
         BlastEnvError: If a record is damaged.
@@ -142,15 +143,15 @@ def records(folder: Path | None = None) -> Iterator[tuple[Path, Record]]:
 def packaged_agent(
     scenario: Scenario, threat: Literal["visible", "hidden"], folder: Path | None = None
 ) -> tuple[TrainedAgent, Record] | None:
-    """Return the agent that comes with the package for a scenario, or `None` if there is none.
+    """Return the bundled agent for a scenario, or `None` if there is none.
 
-    One that was trained for this scenario comes before one for the family of generated sites that
-    it is of. Nothing but weights is read: no file can hold code.
+    An agent trained for this scenario precedes one for its family of generated sites. Only weights
+    are read: no file can contain code.
 
     Args:
-        scenario: The scenario; its content decides, not its name.
-        threat: Whether the agent is to be told the charge.
-        folder: Where the weights are; `WEIGHTS` unless given.
+        scenario: The scenario, identified by its content and not by its name.
+        threat: Whether the agent sees the charge.
+        folder: Folder of the weights; `WEIGHTS` by default.
 
     Raises:
         BlastEnvError: If a file is damaged.
@@ -167,7 +168,7 @@ def packaged_agent(
 
 
 def _of_family(configuration: RunConfiguration, scenario: Scenario) -> Scenario | None:
-    """Return the site that stands for the family that weights are for, if a scenario is like it."""
+    """Return the representative site of the family of weights if a scenario is compatible."""
     family, size = configuration.settings.scenario, configuration.hyperparameters.policy_kwargs
     if family not in FAMILIES or (size.rows, size.columns) != scenario.zone.shape:
         return None

@@ -1,4 +1,4 @@
-"""What happens between two rollouts: seeds, evaluation, tables, checkpoint, learning curve."""
+"""Actions between two rollouts: seeds, evaluation, tables, checkpoint and learning curve."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -45,18 +45,18 @@ def evaluate(so_far: Checkpoint, agent: TrainedAgent, selection: Selection) -> E
 
 
 class TrainingRecorder(BaseCallback):
-    """Makes each rollout a unit of its own, and writes down what it brought.
+    """Makes rollouts independent units, and records their results.
 
-    A rollout begins with fresh episodes and with seeds that follow from the seed of the run and
-    the number of the rollout. So a run that goes on from a checkpoint is the same, to the last
-    bit, as one that was never interrupted.
+    A rollout begins with new episodes and with seeds derived from the seed of the run and the
+    number of the rollout. A run resumed from a checkpoint is therefore identical, to the last bit,
+    to an uninterrupted one.
 
     Args:
-        folder: Where everything is written.
-        configuration: Of the run.
+        folder: The run folder.
+        configuration: Configuration of the run.
         scenario: A scenario of the size that the policy is for.
-        selection: What the best weights are chosen by.
-        progress: What the run has come to so far; goes on from here.
+        selection: Cases that select the best weights.
+        progress: State of the run, which training continues.
         show: Called with the share of the steps that is done.
     """
 
@@ -125,7 +125,7 @@ class TrainingRecorder(BaseCallback):
             self._finish_rollout()
 
     def _finish_rollout(self) -> None:
-        """Write down a rollout and its update: the checkpoint decides, the tables follow."""
+        """Record a rollout and its update: first in the checkpoint, then in the tables."""
         counters = self.progress.counters
         counters = replace(
             counters,
@@ -165,7 +165,7 @@ class TrainingRecorder(BaseCallback):
         )
 
     def _log_rollout(self, row: RolloutRow) -> None:
-        """Hand the scalars to TensorBoard, which are written with those of stable-baselines3."""
+        """Log scalars to TensorBoard, which are written with those of stable-baselines3."""
         before = self.progress.rollouts[-1] if self.progress.rollouts else None
         blasts = row.blasts - (before.blasts if before else 0)
         seconds = row.seconds - (before.seconds if before else 0.0)
@@ -181,25 +181,25 @@ class TrainingRecorder(BaseCallback):
 
 
 def _means(episodes: Sequence[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Return the means of reward, reduction and modules; NaN where no episode ended."""
+    """Return the means of reward, reduction and modules; NaN without a finished episode."""
     if not episodes:
         return nan, nan, nan
     reward, reduction, modules = (fmean(column) for column in zip(*episodes, strict=True))
     return reward, reduction, modules
 
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
+# Okabe and Ito's colours, which are distinguishable with any colour vision.
 _TRAINING: Final = "#56B4E9"
 _HELD_OUT: Final = "#D55E00"
 _BEST: Final = "#000000"
 
 
 def learning_curve(progress: Checkpoint, configuration: RunConfiguration) -> Figure:
-    """Return the reduction in training and on held-out threats over the blasts or guesses.
+    """Return the figure of the reduction in training and on held-out threats over the blasts.
 
     Args:
         progress: The tables of the run.
-        configuration: Of the run.
+        configuration: Configuration of the run.
     """
     settings, counters = configuration.settings, progress.counters
     spent = "guesses" if is_surrogate(settings.engine) else "blasts"

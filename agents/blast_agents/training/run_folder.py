@@ -1,4 +1,4 @@
-"""What a training run is about, as its run folder keeps it."""
+"""The settings and the run folder of a training."""
 
 import csv
 import json
@@ -48,33 +48,33 @@ SETTING_KEYS: Final = (
     "evaluation_first_seed",
     "torch_threads",
 )
-"""Settings that `--set` changes, beside the hyperparameters."""
+"""Settings that `--set` changes, in addition to the hyperparameters."""
 
 
 class TrainingSettings(BaseModel):
-    """What is trained on what; how is for the hyperparameters.
+    """Algorithm, scenario, engine and evaluation of a training, without the hyperparameters.
 
     Attributes:
         algorithm: `"ppo"`, `"maskable_ppo"` or `"self_labelling"`.
         scenario: Bundled name, path of a scenario file, or `"sites"` for generated ones.
-        steps: Steps to train for; a rollout, or a round, is always finished.
-        seed: Decides everything: weights, episodes, actions, minibatches.
-        threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees where it may be.
-        engine: Engine that runs the blasts; or `"surrogate"`, guesses instead of blasts (that
-            of the package; or a surrogate's file).
-        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
-        cells: How they grow: `"uniform"`, `"coarse"` or `"fine"`; as the engine's unless given.
-        observation: Name of what the agent sees of the site; see `BlastBarrier-v0`.
-        hidden_threats: Charges in an episode where they are hidden. The mean over episodes is the
-            same for any number; with few, more layouts are tried for the same number of blasts.
-        evaluation_interval: Rollouts from one evaluation to the next.
-        evaluation_cases: Held-out threats that the layouts are evaluated on.
-        evaluation_engine: Engine by which the best weights are chosen; that of the training unless
-            given, and gas dynamics where the surrogate trains.
-        evaluation_first_seed: The seeds of these threats count from here, within those that
-            belong to the choice of weights (`SeedRange.SELECTION`).
+        steps: Steps to train for; the last rollout, or round, is always completed.
+        seed: Seed of weights, episodes, actions and minibatches.
+        threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees the possible places.
+        engine: Engine of the blasts; `"surrogate"` or a surrogate's file for predictions instead
+            of blasts.
+        cell_m: Side of the cells of gas dynamics; by default the engine's.
+        cells: Growth of the cells: `"uniform"`, `"coarse"` or `"fine"`; by default the engine's.
+        observation: Name of the observation; see `BlastBarrier-v0`.
+        hidden_threats: Charges per episode with a hidden threat. The expected reward does not
+            depend on it; with few charges, the same number of blasts covers more layouts.
+        evaluation_interval: Rollouts between two evaluations.
+        evaluation_cases: Number of held-out threats of an evaluation.
+        evaluation_engine: Engine that selects the best weights; by default that of the training,
+            or gas dynamics if a surrogate trains.
+        evaluation_first_seed: Offset of the seeds of these threats within the range for the
+            selection of weights (`SeedRange.SELECTION`).
         torch_threads: Threads for the network.
-        start_from: Run folder whose best weights the training began with; `None` for fresh ones.
+        start_from: Run folder whose best weights initialise the training; `None` for random ones.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -98,9 +98,9 @@ class TrainingSettings(BaseModel):
 
     @model_validator(mode="after")
     def _check_loads(self) -> "TrainingSettings":
-        """Refuse to show loads of modules where there is nothing that knows them.
+        """Refuse an observation with the loads of modules where these are not available.
 
-        A surrogate knows only their mean; for self-labelling they would take blasts of their own.
+        A surrogate predicts only their mean, and self-labelling would need additional blasts.
         """
         where = "with a surrogate" if self.guesses else "for self_labelling"
         nobody_knows = self.guesses or self.algorithm == SELF_LABELLING
@@ -112,38 +112,38 @@ class TrainingSettings(BaseModel):
 
     @property
     def blast_engine(self) -> Engine:
-        """The engine itself.
+        """The engine of the training, which may be a surrogate.
 
         Raises:
-            UnknownNameError: If there is no engine of that name.
-            BlastEnvError: If it has no such cells.
+            UnknownNameError: If no engine has that name.
+            BlastEnvError: If the engine does not support the cells.
         """
         return engine_to_train_on(self.engine, self.cell_m, self.cells)
 
     @property
     def guesses(self) -> bool:
-        """Whether a surrogate says what blasts would do."""
+        """Whether a surrogate predicts the loads."""
         return is_surrogate(self.engine)
 
     @property
     def real_engine(self) -> Engine:
-        """The engine that runs the blasts; gas dynamics where a surrogate guesses it.
+        """The engine that simulates blasts: gas dynamics if a surrogate trains.
 
-        A surrogate's file need not be there (any more).
+        A surrogate's file need not exist (any more).
 
         Raises:
-            UnknownNameError: If there is no engine of that name.
-            BlastEnvError: If it has no such cells.
+            UnknownNameError: If no engine has that name.
+            BlastEnvError: If the engine does not support the cells.
         """
         return find_engine(JUDGE) if self.guesses else self.blast_engine
 
     @property
     def judge(self) -> Engine:
-        """The engine by which the best weights are chosen, and the agent is evaluated.
+        """The engine that selects the best weights and evaluates the agent.
 
         Raises:
-            UnknownNameError: If there is no engine of that name.
-            BlastEnvError: If it guesses: weights are chosen by blasts.
+            UnknownNameError: If no engine has that name.
+            BlastEnvError: If it is a surrogate: weights are selected by blasts.
         """
         if self.evaluation_engine is not None:
             if is_surrogate(self.evaluation_engine):
@@ -156,13 +156,13 @@ class TrainingSettings(BaseModel):
 
 
 class RunConfiguration(BaseModel):
-    """All that a run needs to be repeated, with the file of its scenario.
+    """The complete configuration of a run, which is reproducible from it and the scenario's file.
 
     Attributes:
-        format: Version of this form.
-        settings: What is trained on what.
-        hyperparameters: How.
-        scenario_hash: Content hash of the scenario; of sites, that of the first one.
+        format: Version of the file format.
+        settings: The settings.
+        hyperparameters: The hyperparameters.
+        scenario_hash: Content hash of the scenario; for generated sites, that of the first one.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -196,7 +196,7 @@ class RunConfiguration(BaseModel):
         return self.hyperparameters
 
     def document(self) -> dict[str, Any]:
-        """Return plain data."""
+        """Return the configuration as plain data."""
         return self.model_dump(mode="json")
 
 
@@ -204,9 +204,9 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
     """Return settings from plain values.
 
     Raises:
-        UnknownNameError: If there is no such algorithm, threat or observation; the message names
-            the nearest.
-        BlastEnvError: If a value is of no use; the message names its bound.
+        UnknownNameError: If the algorithm, threat or observation is unknown; the message names the
+            nearest one.
+        BlastEnvError: If a value is invalid; the message names its bound.
     """
     check_names("algorithm", [values.get("algorithm", ALGORITHMS[0])], ALGORITHMS)
     check_names("threat", [values.get("threat", THREATS[0])], THREATS)
@@ -219,17 +219,17 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
 
 @dataclass(frozen=True)
 class RolloutRow:
-    """What a rollout brought; of self-labelling, what a round did.
+    """Results of a rollout or, in self-labelling, of a round.
 
     Attributes:
         steps: Steps of training at its end.
-        episodes: Episodes that ended in it; or layouts that were tried.
-        reward: Mean over these episodes; or over the cases, the reduction by the best layout.
-        reduction: Mean over these episodes; or over these layouts.
+        episodes: Episodes that ended in the rollout; layouts tried in the round.
+        reward: Mean reward of these episodes; mean reduction of the best layouts of all cases.
+        reduction: Mean reduction of these episodes or layouts.
         modules: Mean number of modules or pieces of the layouts.
-        blasts: Blasts simulated since training began.
-        cache_hits: Loads that needed no blast since training began.
-        seconds: Time since training began.
+        blasts: Blasts simulated since the start of training.
+        cache_hits: Cached loads used since the start of training.
+        seconds: Time since the start of training, in s.
     """
 
     steps: int
@@ -249,11 +249,11 @@ class EvaluationRow:
     Attributes:
         steps: Steps of training.
         episodes: Episodes of training.
-        reduction: On the held-out threats.
+        reduction: Reduction on the held-out threats.
         low: Lower end of its 95 % interval.
-        high: Upper end.
+        high: Upper end of its 95 % interval.
         blasts: Blasts of training, without those of the evaluations.
-        seconds: Time since training began.
+        seconds: Time since the start of training, in s.
     """
 
     steps: int
@@ -269,10 +269,10 @@ Row = TypeVar("Row", RolloutRow, EvaluationRow)
 
 
 def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
-    """Write rows as CSV; the file is complete or as it was.
+    """Write rows as CSV, atomically.
 
     Raises:
-        BlastEnvError: If it cannot be written.
+        BlastEnvError: If the file cannot be written.
     """
     with (
         write_atomically(path) as temporary,
@@ -285,10 +285,10 @@ def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """Read rows.
+    """Read rows from CSV.
 
     Raises:
-        BlastEnvError: If there is no such file, or it is damaged.
+        BlastEnvError: If the file does not exist or is damaged.
     """
     with refusing(path, "missing or damaged"):
         return list(parse_csv(read_text(path), kind))
@@ -307,15 +307,15 @@ _PACKAGES: Final = (
 
 
 def check_format(path: Path, content: Any, wanted: int) -> None:
-    """Refuse a file of another version.
+    """Refuse a file of another format version.
 
     Args:
         path: The file, for the error.
-        content: What is in it.
-        wanted: The version.
+        content: Its content.
+        wanted: The required version.
 
     Raises:
-        BlastEnvError: If its `format` is another one.
+        BlastEnvError: If its `format` differs.
     """
     found = content.get("format") if isinstance(content, dict) else None
     if found != wanted:
@@ -324,11 +324,11 @@ def check_format(path: Path, content: Any, wanted: int) -> None:
 
 @contextmanager
 def refusing(path: Path, what: str = "damaged") -> Iterator[None]:
-    """Say of a file in which this block finds something wrong that it is damaged.
+    """Report document errors in this block as a damaged file.
 
     Args:
         path: The file.
-        what: What it is then.
+        what: Condition of the file, for the error.
 
     Raises:
         BlastEnvError: If the block raises a `DocumentError`.
@@ -351,22 +351,22 @@ class RunFolder:
 
     @property
     def checkpoint(self) -> Path:
-        """All that changes in a run: weights, the best ones too, optimiser, counters, tables."""
+        """The state of the run: weights, best weights, optimiser, counters and tables."""
         return self.path / "checkpoint.pt"
 
     @property
     def rollouts(self) -> Path:
-        """What each rollout brought, a row each, for people: the checkpoint has it too."""
+        """The results of the rollouts for readers, one per row; a copy of the checkpoint's."""
         return self.path / "rollouts.csv"
 
     @property
     def evaluations(self) -> Path:
-        """The evaluations on held-out threats, a row each; the checkpoint has them too."""
+        """The evaluations on held-out threats, one per row; a copy of the checkpoint's."""
         return self.path / "evaluations.csv"
 
     @property
     def learning_curve(self) -> Path:
-        """The learning curve as a picture."""
+        """The figure of the learning curve."""
         return self.path / "learning_curve.png"
 
     @property
@@ -376,12 +376,12 @@ class RunFolder:
 
     @property
     def is_run(self) -> bool:
-        """Whether a run has begun in the folder."""
+        """Whether the folder contains a run."""
         return self._configuration.exists()
 
     @property
     def command(self) -> str:
-        """What started the run.
+        """The command that started the run.
 
         Raises:
             BlastEnvError: If the file is missing or damaged.
@@ -390,7 +390,7 @@ class RunFolder:
 
     @property
     def versions(self) -> dict[str, str]:
-        """With which versions it was started.
+        """The versions of the software at the start of the run.
 
         Raises:
             BlastEnvError: If the file is missing or damaged.
@@ -404,7 +404,7 @@ class RunFolder:
 
     @property
     def blasts(self) -> Path:
-        """The blasts of a training that keeps them, for it to go on and for others."""
+        """The stored blasts of a training, for its continuation and for others."""
         return self.path / "blasts"
 
     @property
@@ -417,25 +417,25 @@ class RunFolder:
 
     @property
     def _unfinished(self) -> Path:
-        """The configuration while the folder is made; renamed, it makes the folder a run's."""
+        """The configuration during the creation of the folder; its renaming completes the run."""
         return self.path / ".config.json"
 
     @contextmanager
     def making(
         self, configuration: RunConfiguration, scenario: Scenario, command: str
     ) -> Iterator[None]:
-        """Make the folder and write what does not change; the block writes what does.
+        """Create the folder and write its constant files; the block writes the variable ones.
 
-        The folder is a run's when the block has ended well, by one rename. If this was interrupted
-        before, it begins anew in what is there.
+        One rename makes the folder a run folder after the block has succeeded. An interrupted
+        creation starts again in the same folder.
 
         Args:
-            configuration: Of the run.
-            scenario: The scenario; of sites, the first one.
-            command: What started the run.
+            configuration: Configuration of the run.
+            scenario: The scenario; for generated sites, the first one.
+            command: Command that started the run.
 
         Raises:
-            BlastEnvError: If the folder cannot be made, or anything else is in it.
+            BlastEnvError: If the folder cannot be created or contains other files.
         """
         make_folder(self.path)
         self._check_empty()
@@ -455,13 +455,13 @@ class RunFolder:
             ) from error
 
     def clear_temporaries(self) -> None:
-        """Remove what writers that were killed have left."""
+        """Remove temporary files of killed writers."""
         for path in self.path.iterdir():
             if is_temporary(path.name):
                 path.unlink(missing_ok=True)
 
     def _check_empty(self) -> None:
-        """Refuse a folder with a run, or with anything but what an interrupted making leaves."""
+        """Refuse a folder with a run, or with files other than those of an interrupted creation."""
         if self.is_run:
             raise BlastEnvError(f"{self.path}: has a run in it already; --resume goes on with it")
         if self._unfinished.exists():
@@ -474,7 +474,7 @@ class RunFolder:
         """Return the configuration of the run.
 
         Raises:
-            BlastEnvError: If there is none, or it is damaged.
+            BlastEnvError: If it does not exist or is damaged.
         """
         path = self._configuration
         if not path.exists():
@@ -492,11 +492,10 @@ class RunFolder:
         """Return the scenario of the run.
 
         Args:
-            configuration: Of the run.
+            configuration: Configuration of the run.
 
         Raises:
-            BlastEnvError: If there is none, it is damaged, or it is another one than that of the
-                configuration.
+            BlastEnvError: If it does not exist, is damaged, or is not that of the configuration.
         """
         try:
             scenario = load_scenario(self._scenario)
@@ -507,12 +506,12 @@ class RunFolder:
 
 
 def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: str) -> None:
-    """Refuse a scenario that is not the one of a run.
+    """Refuse a scenario other than that of a run.
 
     Args:
         scenario: The scenario.
-        configuration: Of the run.
-        place: Where the scenario comes from, for the error.
+        configuration: Configuration of the run.
+        place: Source of the scenario, for the error.
 
     Raises:
         BlastEnvError: If the hashes differ.

@@ -1,14 +1,14 @@
-"""Begin where the rules end, then learn from one's own best.
+"""Self-labelling: imitation of the rules, then of the best layouts found so far.
 
-Each case, a charge or a site, has a label: the best layout for it that is known. In the first round
-that is the best of the layouts of all rules, which the policy then learns to imitate. In every
-further round some of the cases get new layouts: what the policy proposes and draws, the label
-a little changed, the labels of the nearest charges. They race by blasts on the case's threats; the
-winner is the new label, from which the policy learns on.
+Each case, a charge or a site, has a label: its best known layout. In the first round that is the
+best of the layouts of all rules, which the policy learns to imitate. In each further round some
+cases get new layouts: the policy's layout and samples, small changes of the label, and the labels
+of the nearest charges. They race by blasts on the case's threats; the winner is the new label, on
+which the policy is trained further.
 
-Blasts are kept in the run folder, guesses of a surrogate are not. A round has seeds of its own and
-ends with a checkpoint, so that a run that was interrupted ends as if it had not been, and repeats
-none of its blasts.
+The run folder stores blasts, but not predictions of a surrogate. Each round has separate seeds and
+ends with a checkpoint, so that an interrupted run has the same result as an uninterrupted one, and
+repeats none of its blasts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,13 +48,13 @@ from blast_env.statistics import reductions
 
 @dataclass(frozen=True)
 class Step:
-    """A moment in the placing of a layout, and what may come next.
+    """A state in the placement of a layout, with the actions to imitate.
 
     Attributes:
-        observation: What the agent sees.
-        legal: Which actions are legal (actions,); the last one finishes.
-        wanted: Which of them lead to the layout (actions,); at least one.
-        value: What the layout is worth: the reduction of the impulse.
+        observation: Observation of the agent.
+        legal: Mask of the legal actions (actions,); the last one finishes.
+        wanted: Mask of those that lead to the layout (actions,); at least one.
+        value: Target of the critic: the reduction of the load by the layout.
     """
 
     observation: NDArray[np.uint8] | NDArray[np.float32]
@@ -65,18 +65,19 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """A layout that is worth being imitated.
+    """A layout to imitate.
 
-    A layout has no order: whatever part of it stands, each of its other modules or pieces is as
-    good a next one. So the policy learns from random parts of it, and from all the others at once.
+    A layout has no order: after any part of it, all remaining modules or pieces are equally good
+    next ones. The policy therefore learns from random parts, with all remaining elements as
+    targets.
 
     Attributes:
-        case: The case that it is for.
-        layout: The layout; it keeps every condition of the build zone.
-        reduction: By which share it lowers the impulse.
-        observation: Name of what the agent sees.
-        among_vehicles: Whether other scenarios of the training have vehicles, so that this one
-            shows that it has none.
+        case: The case of the layout.
+        layout: The layout; it satisfies all conditions of the build zone.
+        reduction: Relative reduction of the load.
+        observation: Name of the observation.
+        among_vehicles: Whether the training includes scenarios with vehicles, so that the
+            observation has the planes for them.
     """
 
     case: Case
@@ -86,10 +87,9 @@ class Demonstration:
     among_vehicles: bool = False
 
     def draw(self, rng: np.random.Generator) -> Step:
-        """Return a random moment in its placing, from nothing to all of it.
+        """Return a random state in its placement, from the empty to the complete layout.
 
-        The moment when all of it stands is left out where nothing more could be placed: there is
-        nothing to decide then.
+        The complete layout is excluded if nothing more could be placed: it leaves no decision.
         """
         elements = len(self.layout)
         standing = int(rng.integers(elements + (0 if self._is_full else 1))) if elements else 0
@@ -127,15 +127,14 @@ def logits_and_values(policy: Policy, observations: Tensor) -> tuple[Tensor, Ten
 
 
 def imitation_loss(logits: Tensor, legal: Tensor, wanted: Tensor) -> Tensor:
-    """Return how unlikely the policy finds what is wanted, mean over a batch.
+    """Return the cross-entropy of the policy to the uniform distribution over wanted actions.
 
-    The cross-entropy to the distribution in which every wanted action is as likely, among the
-    legal ones.
+    It is restricted to legal actions, and is the mean over a batch.
 
     Args:
-        logits: (batch, actions).
-        legal: Which actions are legal (batch, actions).
-        wanted: Which of them are wanted, at least one in a row (batch, actions).
+        logits: Logits of the policy (batch, actions).
+        legal: Mask of the legal actions (batch, actions).
+        wanted: Mask of the wanted ones among them, at least one per row (batch, actions).
     """
     likely = logits.masked_fill(~legal, -torch.inf).log_softmax(dim=1)
     shares = wanted / wanted.sum(dim=1, keepdim=True)
@@ -152,17 +151,17 @@ def imitate(
     max_grad_norm: float,
     rng: np.random.Generator,
 ) -> float:
-    """Let a policy learn from demonstrations, with its own optimiser.
+    """Train a policy on demonstrations, with the policy's optimiser.
 
     Args:
         policy: The policy.
         demonstrations: At least one.
-        updates: Minibatches.
-        batch_size: Moments in each of them.
-        learning_rate: Of the optimiser.
-        vf_coef: Weight of the critic's error: it learns what the layouts are worth.
-        max_grad_norm: Largest gradient.
-        rng: Draws demonstrations and moments.
+        updates: Number of minibatches.
+        batch_size: Steps per minibatch.
+        learning_rate: Learning rate of the optimiser.
+        vf_coef: Weight of the critic's error: it learns the reductions of the layouts.
+        max_grad_norm: Bound on the norm of the gradient.
+        rng: Draws demonstrations and steps.
 
     Returns:
         Mean loss of the imitation over the last tenth of the minibatches; NaN without any.
@@ -192,10 +191,10 @@ def imitate(
 
 
 _MOST_BYTES: Final = 2_000_000_000
-"""Most that the blasts of a run take on the disk; one takes some kilobytes."""
+"""Bound on the size of a run's blasts on disk; a blast takes some kilobytes."""
 
 _GUESSES: Final = 50_000
-"""Guesses that are remembered, so that none of a round is made twice."""
+"""Number of cached predictions, so that none of a round is repeated."""
 
 
 @dataclass(eq=False)
@@ -203,9 +202,9 @@ class Judge:
     """Runs the blasts of a training, several at a time.
 
     Attributes:
-        evaluators: Run the blasts and remember them.
-        processes: Worker processes; they change nothing but the time.
-        asked: How often a layout met a threat so far, known or not.
+        evaluators: Run the blasts and cache their loads.
+        processes: Worker processes; results do not depend on their number.
+        asked: Number of loads requested so far, cached or not.
     """
 
     evaluators: Evaluators
@@ -215,11 +214,11 @@ class Judge:
     def loads(
         self, asked: Sequence[tuple[Case, Layout]], threats: slice
     ) -> list[tuple[float, ...]]:
-        """Return the loads that count, one a threat, for each pair.
+        """Return the loads of each pair, one per threat, in the unit of the objective.
 
         Args:
             asked: Layouts with their cases.
-            threats: Which threats of each case they meet.
+            threats: Slice of the threats of each case.
         """
         blasts = [
             BlastAsked(case.scenario, layout, threat)
@@ -238,22 +237,22 @@ class Judge:
 
 
 Loads = Mapping[Layout, tuple[float, ...]]
-"""Layouts and the loads under the threats that they have met, in the objective's unit."""
+"""Layouts and their loads, one per threat simulated so far, in the objective's unit."""
 
 
 def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]]) -> list[Loads]:
-    """Let the layouts of each case race on its threats, by successive halving.
+    """Compare the layouts of each case on its threats, by successive halving.
 
-    All meet the first threat, the better half of them the second, the better quarter the next two,
-    and so on; the blasts of all cases run side by side.
+    All are simulated under the first threat, the better half under the second, the better quarter
+    under the next two, and so on; the blasts of all cases run in parallel.
 
     Args:
         judge: Runs the blasts.
-        cases: The cases, each with as many threats.
-        layouts: Of each case, none twice.
+        cases: The cases, all with the same number of threats.
+        layouts: Distinct layouts of each case.
 
     Returns:
-        For each case, what every layout met; those that met all threats are the last ones left.
+        For each case, the loads of every layout; the finalists have a load for every threat.
     """
     known: list[dict[Layout, tuple[float, ...]]] = [dict.fromkeys(each, ()) for each in layouts]
     alive = [list(each) for each in layouts]
@@ -277,25 +276,25 @@ class Lessons:
     """The cases of a training and their labels.
 
     Attributes:
-        cases: The cases, each with as many threats.
-        labels: A label a case; none before the first round.
+        cases: The cases, all with the same number of threats.
+        labels: One label per case; none before the first round.
     """
 
     cases: tuple[Case, ...]
     labels: list[CaseLabel] = field(default_factory=list)
 
     def reduction(self, index: int) -> float:
-        """Return by which share a case's label lowers the load; 0 where nothing arrives."""
+        """Return the relative reduction by a case's label; 0 if nothing arrives unprotected."""
         label, case = self.labels[index], self.cases[index]
         return _reduction(case, label.layout, label.load, label.unprotected)
 
     @property
     def demonstrations(self) -> list[int]:
-        """Which cases there is something to learn from: those with a layout that helps."""
+        """Indices of the cases to imitate: those whose label reduces the load."""
         return [index for index in range(len(self.labels)) if self.reduction(index) > 0.0]
 
     def begin(self, judge: Judge) -> list[float]:
-        """Make the best layouts by rule the labels; return the reduction of each one tried."""
+        """Label each case with the best layout by rule; return the reductions of all tried."""
         by_rule = [
             [*dict.fromkeys(layouts_by_rule(case.scenario, case.charge).values())]
             for case in self.cases
@@ -308,12 +307,12 @@ class Lessons:
     def improve(
         self, judge: Judge, indices: Sequence[int], layouts: Sequence[Sequence[Layout]]
     ) -> list[float]:
-        """Let layouts race against the labels of some cases; return the reduction of each.
+        """Race layouts, update the labels of some cases, and return the reductions of the layouts.
 
         Args:
             judge: Runs the blasts.
-            indices: The cases.
-            layouts: Of each of them; those that are the label already are left out.
+            indices: Indices of the cases.
+            layouts: Layouts of each of these cases; the present label is skipped.
         """
         fresh = [
             [each for each in dict.fromkeys(own) if each != self.labels[index].layout]
@@ -333,9 +332,9 @@ class Lessons:
         return tried
 
     def nearest(self, index: int, count: int) -> list[Layout]:
-        """Return the labels of the charges nearest to that of a case, as far as they may stand.
+        """Return the legal parts of the labels of the charges nearest to that of a case.
 
-        Of the same scenario; none where the charge is hidden, or a vehicle's.
+        The charges are of the same scenario; the list is empty for a hidden charge or a vehicle's.
         """
         case = self.cases[index]
         if not isinstance(case.charge, Charge):
@@ -356,15 +355,15 @@ class SelfLabelling:
     """A training between two rounds.
 
     Attributes:
-        folder: Of the run.
-        configuration: Of the run.
-        agent: The agent, whose policy learns.
-        lessons: What it learns from.
+        folder: The run folder.
+        configuration: Configuration of the run.
+        agent: The agent, whose policy is trained.
+        lessons: The cases with their labels.
         judge: Runs the blasts of the races.
-        selection: What the best weights are chosen by.
-        progress: What the run has come to so far.
+        selection: Cases that select the best weights.
+        progress: State of the run.
         logger: Writes for TensorBoard.
-        uncounted: Blasts in the run folder that no round has counted: of one that was interrupted.
+        uncounted: Blasts in the run folder that no round has counted, from an interrupted round.
     """
 
     folder: RunFolder
@@ -386,14 +385,14 @@ class SelfLabelling:
         selection: Selection,
         progress: Checkpoint,
     ) -> "SelfLabelling":
-        """Return the training as it was at a checkpoint.
+        """Return the training in the state of a checkpoint.
 
         Args:
-            folder: Of the run.
-            configuration: Of the run.
-            source: Gives the cases their scenario.
-            selection: What the best weights are chosen by.
-            progress: What the run has come to by then; goes on from there.
+            folder: The run folder.
+            configuration: Configuration of the run.
+            source: Source of the scenarios of the cases.
+            selection: Cases that select the best weights.
+            progress: The checkpoint, which training continues.
 
         Raises:
             BlastEnvError: If the checkpoint does not fit.
@@ -405,7 +404,7 @@ class SelfLabelling:
         progress.load_into(policy, folder.checkpoint)
         policy.set_training_mode(False)
         cases = training_cases(settings, source, hyperparameters.cases)
-        # Guesses cost less than to read them from a file.
+        # Predictions take less time than reading them from a file.
         cache = LoadsCache(_GUESSES) if settings.guesses else DiskCache(folder.blasts, _MOST_BYTES)
         scenarios = {case.scenario.content_hash for case in cases}
         evaluators = Evaluators(settings.blast_engine, cache, most=len(scenarios))
@@ -423,7 +422,7 @@ class SelfLabelling:
         )
 
     def do_round(self) -> None:
-        """Let layouts race, let the policy learn, and write it all down."""
+        """Race layouts, train the policy, and record the round."""
         began, before = perf_counter(), self.progress.counters
         blasts, hits = self.judge.evaluators.blasts, self.judge.evaluators.cache_hits
         hyperparameters, number = self.configuration.self_labelling, before.rollouts
@@ -436,7 +435,7 @@ class SelfLabelling:
             layouts = [self._candidates(index, rng) for index in indices]
             tried = self.lessons.improve(self.judge, indices, layouts)
             updates = hyperparameters.updates
-        self.judge.asked = max(self.judge.asked, before.steps + 1)  # every round ends some time
+        self.judge.asked = max(self.judge.asked, before.steps + 1)  # so that training ends
         loss = self._imitate(updates, rng)
         simulated = self.judge.evaluators.blasts - blasts + self.uncounted
         counters = replace(
@@ -446,7 +445,7 @@ class SelfLabelling:
             updates=before.updates + updates,
             episodes=before.episodes + len(tried),
             blasts=before.blasts + simulated,
-            # Each blast is run ahead, and then found.
+            # Each blast is run ahead, and then found in the cache.
             cache_hits=before.cache_hits + self.judge.evaluators.cache_hits - hits - simulated,
             seconds=before.seconds + perf_counter() - began,
         )
@@ -454,7 +453,7 @@ class SelfLabelling:
         self._write_down(tried, loss)
 
     def _turn(self, number: int) -> list[int]:
-        """Return the cases that get new layouts in a round after the first: one after another."""
+        """Return the cases with new layouts in a round after the first, in cyclic order."""
         count = len(self.lessons.cases)
         size = min(self.configuration.self_labelling.cases_per_round, count)
         first = (number - 1) * size
@@ -471,7 +470,7 @@ class SelfLabelling:
         moves, best = Moves(case.scenario), self.lessons.labels[index].layout
         for each in range(hyperparameters.neighbours):
             layout = best
-            for _ in range(1 + each % 2):  # every other one by two moves
+            for _ in range(1 + each % 2):  # every second one by two moves
                 layout = moves.neighbour(layout, rng)
             layouts.append(_sorted(layout))
         return layouts + self.lessons.nearest(index, hyperparameters.borrowed)
@@ -504,7 +503,7 @@ class SelfLabelling:
         )
 
     def _write_down(self, tried: Sequence[float], loss: float) -> None:
-        """Add a row, evaluate if it is time for it; the checkpoint decides, the tables follow."""
+        """Record a round, evaluate if due, and write first the checkpoint, then the tables."""
         progress, lessons, settings = self.progress, self.lessons, self.configuration.settings
         counters = progress.counters
         row = RolloutRow(
@@ -539,6 +538,6 @@ def _sorted(layout: Layout) -> Layout:
 def _reduction(
     case: Case, layout: Layout, load: tuple[float, ...], unprotected: tuple[float, ...]
 ) -> float:
-    """Return a reduction; 0 where nothing arrives without a barrier."""
+    """Return a relative reduction; 0 if nothing arrives without a barrier."""
     share = reductions(case.counted(load, layout), case.counted(unprotected))
     return float(np.nan_to_num(share))

@@ -1,4 +1,4 @@
-"""Training, and going on with a training that was interrupted."""
+"""Start and continuation of a training."""
 
 import shlex
 import sys
@@ -32,11 +32,11 @@ from blast_env.sites import FAMILIES
 
 @dataclass(frozen=True, eq=False)
 class TrainingResult:
-    """What a run has come to.
+    """The result of a run.
 
     Attributes:
         folder: The run folder.
-        configuration: Of the run.
+        configuration: Configuration of the run.
         progress: Counters and tables.
     """
 
@@ -54,13 +54,14 @@ def train(
     """Train an agent.
 
     Args:
-        settings: What is trained on what.
-        hyperparameters: How; `load_hyperparameters` has those that come with the package.
-        run: Folder for everything that comes of it; new or empty.
+        settings: Algorithm, scenario, engine and evaluation.
+        hyperparameters: The hyperparameters; `load_hyperparameters` returns the bundled ones.
+        run: New or empty folder for all results.
         progress: Called with the share of the steps that is done.
 
     Raises:
-        BlastEnvError: If the scenario or the folder is of no use, or something does not fit.
+        BlastEnvError: If the scenario or the folder is not usable, or the settings are not
+            consistent.
     """
     source = scenario_source(settings.scenario)
     scenario = source.representative
@@ -69,12 +70,12 @@ def train(
         hyperparameters=fitted(hyperparameters, settings, scenario),
         scenario_hash=scenario.content_hash,
     )
-    # Refuse an engine that does not fit before any writing: to train on, and to choose weights by.
+    # Refuse unsuitable engines, for training and for selection, before anything is written.
     BlastEvaluator(scenario, settings.blast_engine)
     selection = _selection(configuration, source)
     folder = RunFolder(Path(run))
     start = _start(configuration, scenario)
-    # Of the program its name: where it is installed is nobody's business who gets the run.
+    # Only the program's name: the place of its installation must not enter a shared run.
     command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
     with folder.making(configuration, scenario, command):
         start.save(folder.checkpoint)
@@ -86,9 +87,9 @@ def resume(
     scenario: str | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> TrainingResult:
-    """Go on with a run from its last checkpoint, up to the steps that it was begun for.
+    """Continue a run from its last checkpoint to the configured number of steps.
 
-    At most one rollout is lost, and the result is the one that it would have come to anyway.
+    At most one rollout is repeated, and the result is that of an uninterrupted run.
 
     Args:
         run: The run folder.
@@ -96,7 +97,7 @@ def resume(
         progress: Called with the share of the steps that is done.
 
     Raises:
-        BlastEnvError: If the folder is no run folder, damaged, or of another scenario.
+        BlastEnvError: If the folder is not a run folder, is damaged, or has another scenario.
     """
     folder = RunFolder(Path(run))
     configuration = folder.configuration()
@@ -117,7 +118,7 @@ def resume(
 
 
 def _start(configuration: RunConfiguration, scenario: Scenario) -> Checkpoint:
-    """Return the checkpoint that a run begins with: fresh weights, or those of another run."""
+    """Return the initial checkpoint of a run, with random weights or those of another run."""
     if configuration.settings.start_from is None:
         return Checkpoint.of_start(configuration)
     folder = RunFolder(Path(configuration.settings.start_from))
@@ -128,7 +129,7 @@ def _start(configuration: RunConfiguration, scenario: Scenario) -> Checkpoint:
 
 
 def _selection(configuration: RunConfiguration, source: ScenarioSource) -> Selection:
-    """Return the cases that the best weights are chosen by.
+    """Return the cases that select the best weights.
 
     Self-labelling runs their blasts in its worker processes.
     """
@@ -139,7 +140,7 @@ def _selection(configuration: RunConfiguration, source: ScenarioSource) -> Selec
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """What a run needs."""
+    """A run with its configuration and the sources of its scenarios and cases."""
 
     folder: RunFolder
     configuration: RunConfiguration
@@ -150,7 +151,7 @@ class _Run:
 def _run(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> TrainingResult:
     """Train from a checkpoint to the end."""
     settings = job.configuration.settings
-    so_far.write_tables(job.folder)  # a killed run may not have come to it
+    so_far.write_tables(job.folder)  # a killed run may have left them incomplete
     if so_far.counters.steps < settings.steps:
         learn = _learn_from_own_best if settings.algorithm == SELF_LABELLING else _learn_by_acting
         try:
@@ -170,7 +171,7 @@ def _run(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> Traini
 
 
 def _learn_from_own_best(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> None:
-    """Train by self-labelling, from a checkpoint on."""
+    """Train by self-labelling from a checkpoint."""
     training = SelfLabelling.of(job.folder, job.configuration, job.source, job.selection, so_far)
     while so_far.counters.steps < job.configuration.settings.steps:
         training.do_round()
@@ -178,7 +179,7 @@ def _learn_from_own_best(job: _Run, so_far: Checkpoint, show: Callable[[float], 
 
 
 def _learn_by_acting(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> None:
-    """Train by PPO or MaskablePPO, from a checkpoint on."""
+    """Train by PPO or MaskablePPO from a checkpoint."""
     settings = job.configuration.settings
     environments = make_environments(job.configuration, job.source)
     try:
@@ -197,6 +198,6 @@ def _learn_by_acting(job: _Run, so_far: Checkpoint, show: Callable[[float], None
         model.learn(left, callback=recorder, reset_num_timesteps=so_far.is_start)
         model.logger.close()
     finally:
-        # After Ctrl-C the processes have ended already.
+        # After Ctrl-C the processes have already ended.
         with suppress(EOFError, OSError):
             environments.close()
