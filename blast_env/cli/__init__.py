@@ -1,4 +1,4 @@
-"""The command line, `blast-env`: one module a command, imported when it is called."""
+"""The command line, `blast-env`: one module per command, imported when it is called."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""`blast-env advise`: what does a budget buy by each kind of measure, what does it cost to pass?"""
+"""`blast-env advise`: the protection for a budget by kind of measure, and the cost to pass."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,11 +44,11 @@ _HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judge
 class AdviseCommand(ChargeOptions):
     """Say what a budget buys by keeping the charge away, shielding, hardening, and all together.
 
-    Of each kind the cheapest layout that reaches the target is looked for, by gas dynamics; where
-    none does, the one with the least shortfall. What was found is judged again with finer cells,
-    and with peaks as sharp as Kingery and Bulmash's: cells clip peaks, and those of 0.5 m halve
-    them. A layout that fails there is searched for again with a margin to the target. Hardening
-    needs no blasts of its own.
+    For each kind the command searches for the cheapest layout that reaches the target, by gas
+    dynamics, or for the one with the least shortfall if none does. The layouts found are judged
+    again with finer cells, and with peaks as sharp as Kingery and Bulmash's: cells clip peaks, and
+    those of 0.5 m halve them. If a layout fails there, the search is repeated with a margin to the
+    target. Hardening needs no further blasts.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -145,7 +145,7 @@ class AdviseCommand(ChargeOptions):
         print_line(f"wrote {save_figure(figure, path)}")
 
     def _asked(self, scenario: Scenario) -> Scenario:
-        """Return the scenario with the target and the budget that were asked for."""
+        """Return the scenario with the requested target and budget."""
         target = wanted_level(self.target, scenario, LevelOfProtection.MEDIUM).label
         kept = scenario.objective.model_dump(
             include={"charges", "cvar_level", "measure"}, exclude_none=True
@@ -208,7 +208,7 @@ def _answer(
     found: list[Advice],
     judged: dict[Layout, Consequences],
 ) -> str:
-    """Return the answer in a line or two: what it costs to pass, and whether walls help."""
+    """Return the answer in a line or two: the cost to pass, and whether walls help."""
     by_kind = {each.kind: each for each in found}
     cost = Placement(scenario, best.layout).cost
     flagged = " (flagged)" if judged[best.layout].is_flagged else ""

@@ -1,6 +1,6 @@
-"""What the agent of a run proposes for threats that its training has not met.
+"""Proposals of the agent of a run, for threats outside its training.
 
-Imports torch, so the command imports this module only when it is asked for a run.
+Imports torch, so the command imports this module only for `--run`.
 """
 
 import json
@@ -73,10 +73,10 @@ _NO_BEST: Final = (
 
 
 def evaluate_run(run: Path, options: EvaluateOptions) -> None:
-    """Evaluate what the agent of a run folder proposes; print and write the result.
+    """Evaluate the proposals of the agent of a run folder; print and write the result.
 
     Raises:
-        BlastEnvError: If it is no run folder, or damaged, or an option is of no use.
+        BlastEnvError: If it is no run folder, or damaged, or an option does not apply.
     """
     folder = RunFolder(run)
     configuration = folder.configuration()
@@ -105,7 +105,7 @@ def _report_hidden(
     provenance: dict[str, Any],
     options: EvaluateOptions,
 ) -> None:
-    """One layout for all the places where the charge may be."""
+    """Report on one layout for all possible places of the charge."""
     evaluator = BlastEvaluator(
         source.scenario,
         _engine(settings, options),
@@ -123,7 +123,7 @@ def _report_cases(
     provenance: dict[str, Any],
     options: EvaluateOptions,
 ) -> None:
-    """A layout for each charge, or each site."""
+    """Report on one layout per charge, or per site."""
     seeds = options.seed_range
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
@@ -157,7 +157,7 @@ def _report_cases(
 
 
 def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
-    """Return the engine that judges: with the run's cells, if it judged by that one, too."""
+    """Return the engine that judges, with the run's cells if the run judged by the same engine."""
     own = settings.judge
     engine = own if own.name == options.engine else options.engine
     return find_engine(engine, options.cell_m, options.until, options.cells)
@@ -235,7 +235,7 @@ def _plans(comparison: Comparison, provenance: dict[str, Any]) -> dict[str, Layo
 def _write_sites(
     settings: TrainingSettings, plans: dict[str, LayoutPlan], folder: Path
 ) -> list[Path]:
-    """Write the scenario beside each layout for a generated site: nobody else has it as a file."""
+    """Write the scenario of a generated site beside each layout: no other file holds it."""
     if settings.scenario not in FAMILIES:
         return []
     paths = [folder / f"{name}_site.toml" for name in plans]
@@ -262,7 +262,7 @@ def _provenance(run: Path, settings: TrainingSettings, weights: str) -> dict[str
 
 
 def _overlap(settings: TrainingSettings, seeds: range) -> str:
-    """Return what there is to say if the threats are those that the weights were chosen by."""
+    """Return a note if the weights were selected by some of the threats; else an empty text."""
     if settings.scenario in FAMILIES:  # other sites, whatever the seeds
         return ""
     chosen_by = SeedRange.SELECTION.seeds(settings.evaluation_first_seed, settings.evaluation_cases)

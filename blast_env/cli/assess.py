@@ -1,4 +1,4 @@
-"""`blast-env assess`: does the building pass, does the barrier stand, what brings better glass?"""
+"""`blast-env assess`: verdicts on buildings and barrier, and the effect of better glass."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -68,10 +68,9 @@ _NEIGHBOURS: Final = (
 class AssessCommand(ChargeOptions):
     """Say what charges do to the buildings: panes, panels, level of protection.
 
-    By gas dynamics, a blast a charge, with and without the layout; the barrier is judged as well.
-    Structures need a facade in the
-    scenario file; what stands without one is taken for an ordinary house. What better glass would
-    bring needs no further blast, and is printed as well.
+    Gas dynamics runs one blast per charge, with and without the layout; the barrier is judged as
+    well. A structure needs a facade in the scenario file; one without is judged as an ordinary
+    house. The effect of better glass needs no further blast, and is printed as well.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -221,7 +220,7 @@ class AssessCommand(ChargeOptions):
             print_line(f"wrote {save_figure(figure, path)}")
 
     def _write_table(self, path: Path, scenario: Scenario, found: dict[str, Consequences]) -> Path:
-        """Write the bays; a workbook has the barrier's pieces as well."""
+        """Write the table of the bays; a workbook also holds the barrier's pieces."""
         bays = bay_table(found)
         if path.suffix.lower() == ".csv":
             return write_csv(bays, path)
@@ -243,7 +242,7 @@ class AssessCommand(ChargeOptions):
 
 
 def _worst_rows(found: dict[str, Consequences]) -> list[tuple[str, BuildingResponse]]:
-    """Return the building and the charge that govern the verdict, a layout each."""
+    """Return the governing building and charge of the last layout, one row per layout."""
     judged = list(found.values())[-1]
     number = judged.responses.index(governing(judged.responses, lambda each: each.severity))
     return [(name, each.responses[number]) for name, each in found.items()]

@@ -1,4 +1,4 @@
-"""`blast-env bench`: how fast blasts and the environment are on this machine."""
+"""`blast-env bench`: the speed of blasts and of the environment on this machine."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ _ELSEWHERE: Final = (
 class BenchCommand(Command):
     """Time blasts and the environment on this machine, and measure the memory.
 
-    Processor times are medians of one core; times by the clock need idle cores.
+    Processor times are medians on one core; wall-clock times need idle cores.
     """
 
     scenario: tuple[str, ...] = option(

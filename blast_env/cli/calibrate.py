@@ -39,8 +39,8 @@ Burst = Literal["hemispherical", "spherical"]
 class CalibrateCommand(ProcessOptions, ClusterOptions):
     """Run blasts at many distances, fit the three laws, and store one as a calibration.
 
-    Finished blasts are kept in NAME.ENGINE.runs.jsonl: after an interruption, the same command
-    goes on from there.
+    Finished blasts are stored in NAME.ENGINE.runs.jsonl: after an interruption, the same command
+    resumes from there.
     """
 
     name: str = option(..., "Name of the calibration and of its files.")
@@ -77,7 +77,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
     out: Path = option(Path("out/calibration"), "Folder for all files.", writes=FOLDER)
 
     def how_to_resume(self) -> str:
-        """Return how to go on after Ctrl-C."""
+        """Return the way to resume after Ctrl-C."""
         return "the same command goes on from the blasts that are finished"
 
     @property

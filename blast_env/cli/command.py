@@ -1,7 +1,7 @@
-"""A command is a dataclass: its fields are the options, its docstring the help, a call the work.
+"""A command is a dataclass: its fields are the options, its docstring the help, its call the work.
 
-So an option is written once: with its name, type, default and help where the command keeps its
-value. Typer gets a function that is made of the fields; its parser, help and completion stay.
+So each option is written once, as a field with its name, type, default and help. Typer gets a
+function made from the fields, and still provides the parser, the help and the completion.
 """
 
 import inspect
@@ -26,7 +26,7 @@ from blast_env.option_fields import option as option
 from blast_env.values import is_plain_number, plain_number
 
 MARKUP: Final = "markdown"
-"""How help is written: Rich's own markup takes [row, column] for a style."""
+"""Markup of the help texts: Rich's markup would read [row, column] as a style."""
 
 _UNITS: Final = re.compile(r"_(m|m2|deg)$")
 _COUNTS: Final = MappingProxyType({2: "two", 3: "three"})
@@ -34,27 +34,26 @@ _COUNTS: Final = MappingProxyType({2: "two", 3: "three"})
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """Base class of all commands, and of the groups of options that several have in common.
+    """Base class of all commands, and of the groups of options that several share.
 
     Each field is an `option` or an `argument` (`blast_env.option_fields`); one of the type
-    `tuple[TYPE, ...]` may be given again and again. Help shows the options of a class before those
-    of its bases.
+    `tuple[TYPE, ...]` may be repeated. Help lists the options of a class before those of its bases.
     """
 
     def __call__(self) -> None:
-        """Do the work.
+        """Run the command.
 
         Raises:
-            BlastEnvError: If an option is of no use; the user reads its message.
+            BlastEnvError: If an option is invalid or does not apply; the user reads its message.
         """
         raise NotImplementedError
 
     def how_to_resume(self) -> str:
-        """Return how to go on after Ctrl-C, where the command can."""
+        """Return the way to resume after Ctrl-C; empty if there is none."""
         return ""
 
     def targets(self) -> list[Target]:
-        """Return where the command is to write: the options with `Writes` that are given."""
+        """Return the targets of the command: the values of the given options with `writes`."""
         return [
             Target(each.flag, path, each.text.writes)
             for each in options_of(type(self))
@@ -65,13 +64,13 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class OptionField:
-    """A field of a command, as the command line has it.
+    """A field of a command, as an option of the command line.
 
     Attributes:
         name: The field's name.
         hint: Its type.
-        default: Its default; `inspect.Parameter.empty` where it must be given.
-        text: What the command line says of it.
+        default: Its default; `inspect.Parameter.empty` if it is required.
+        text: Its help, flag and settings on the command line.
     """
 
     name: str
@@ -81,36 +80,36 @@ class OptionField:
 
     @property
     def flag(self) -> str:
-        """What one writes on the command line: the name without its unit."""
+        """The flag on the command line: the name without its unit, unless set otherwise."""
         if self.text.flag is not None:
             return self.text.flag
         return f"--{_UNITS.sub('', self.name).replace('_', '-')}"
 
     @property
     def is_repeated(self) -> bool:
-        """Whether it may be given again and again."""
+        """Whether it may be repeated."""
         return get_origin(self.hint) is tuple and get_args(self.hint)[1:] == (...,)
 
     @property
     def numbers(self) -> int:
-        """How many numbers with commas between each value of a repeated option has; 0: a text."""
+        """Count of comma-separated numbers in each value of a repeated option; 0 for a text."""
         item = get_args(self.hint)[0] if self.is_repeated else None
         return len(get_args(item)) if get_origin(item) is tuple else 0
 
     @property
     def is_number(self) -> bool:
-        """Whether the command line has plain numbers for it; texts of several have commas."""
+        """Whether its values are single numbers; values of several numbers are texts."""
         return not self.numbers and bool({int, float} & {*_leaves([self.hint])})
 
     @property
     def parameter(self) -> inspect.Parameter:
-        """The same for Typer, which has lists where our commands have tuples."""
+        """The parameter for Typer, which has lists in place of the commands' tuples."""
         text, hint, default = self.text, self.hint, self.default
         if self.is_repeated:
             hint = list[str if self.numbers else get_args(hint)[0]]  # type: ignore[misc]
             default = default or None
             hint = hint if default else hint | None
-        # Of a flag that is set, Typer makes one more that takes it back.
+        # For a flag that is on by default, Typer adds one that turns it off.
         names = () if default is True or text.is_argument else (self.flag,)
         kind = typer.Argument if text.is_argument else typer.Option
         info = kind(*names, help=text.help, rich_help_panel=text.panel, **text.settings)
@@ -120,10 +119,10 @@ class OptionField:
         )
 
     def value(self, given: Any) -> Any:
-        """Return what Typer gives as the field has it.
+        """Return the value of the field from that of Typer.
 
         Raises:
-            BlastEnvError: If a text is no numbers with commas between.
+            BlastEnvError: If a text does not consist of comma-separated numbers.
         """
         if not self.is_repeated:
             return given
@@ -145,7 +144,7 @@ def _leaves(kinds: Iterable[Any]) -> Iterator[Any]:
 
 
 def options_of(kind: type[Command]) -> Iterator[OptionField]:
-    """Yield the options of a command: its own, and then those that it has in common with others."""
+    """Yield the options of a command, those of the class before those of its bases."""
     hints, known = get_type_hints(kind), {each.name: each for each in fields(kind)}
     names = (name for each in kind.__mro__ for name in inspect.get_annotations(each))
     for name in dict.fromkeys(names):
@@ -161,7 +160,7 @@ def options_of(kind: type[Command]) -> Iterator[OptionField]:
 
 
 def function_of(kind: type[Command]) -> Callable[..., None]:
-    """Return the function that Typer makes a command of: it has a parameter for each option."""
+    """Return the function from which Typer makes a command, with one parameter per option."""
     options = tuple(options_of(kind))
 
     def call(**values: Any) -> None:
@@ -175,7 +174,7 @@ def function_of(kind: type[Command]) -> Callable[..., None]:
 
 
 def _run(kind: type[Command], values: Mapping[OptionField, Any]) -> None:
-    # Here, because the list of commands is shown without what they need.
+    # Here, because the list of commands is shown without these imports.
     from blast_env.cli.output import user_errors
 
     with user_errors():
@@ -185,7 +184,7 @@ def _run(kind: type[Command], values: Mapping[OptionField, Any]) -> None:
 
 
 def _check_numbers(parameter: Any) -> None:
-    """Let a parameter refuse what Python reads as a number and nobody means: `1_000`, `nan`."""
+    """Make a parameter refuse numbers that only Python accepts: `1_000`, `nan`."""
     process = parameter.process_value
 
     def checked(context: Any, given: Any) -> Any:
@@ -199,7 +198,7 @@ def _check_numbers(parameter: Any) -> None:
 
 
 def _texts(given: Any) -> Iterator[str]:
-    """Yield the texts of what the command line has for one option; a default may be no text."""
+    """Yield the texts given for one option; a default may be no text."""
     if isinstance(given, str):
         yield given
     elif isinstance(given, list | tuple):
@@ -208,7 +207,7 @@ def _texts(given: Any) -> Iterator[str]:
 
 
 class LazyCommand(TyperCommand):
-    """A command that is imported when it is called: until then, name and summary are enough.
+    """A command that is imported when it is called; until then it has only a name and a summary.
 
     Args:
         name: Its name.
@@ -238,18 +237,18 @@ class LazyCommand(TyperCommand):
         return command
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
-        """Parse the command line by the command itself, which then runs."""
+        """Parse the command line with the imported command, which then runs."""
         return self.loaded.make_context(*arguments, **options)
 
 
 class LazyGroup(TyperGroup):
     """A group of commands that are imported one by one, when they are called.
 
-    Each is a class of a module of this package, both named after it: `SearchCommand` of `search`.
+    Each is a class in a module of this package, both named after it: `SearchCommand` in `search`.
 
     Attributes:
         summaries: The first sentence of the help of each command, by its name.
-        modules: Modules that have another name than their command.
+        modules: Modules whose name differs from that of their command, by command.
     """
 
     summaries: ClassVar[Mapping[str, str]] = {}

@@ -21,9 +21,9 @@ _SCENARIO: Final = "courtyard"
 class EvaluateCommand(EvaluateOptions):
     """Compare layouts with no barrier, both exposed to the same threats.
 
-    Each seed draws a charge from the scenario; for particles also the fan and the air. With --run
-    an agent that was trained on visible charges proposes a layout for each of them, any other one
-    layout for all.
+    Each seed draws a charge from the scenario; for particles, also the fan and the air. With --run,
+    an agent trained on visible charges proposes one layout per charge, any other agent one layout
+    for all.
     """
 
     layout: Path | None = option(None, "JSON file of the (row, column) cells.")
@@ -33,7 +33,7 @@ class EvaluateCommand(EvaluateOptions):
     )
 
     def __call__(self) -> None:
-        """Run the blasts; print and write what they say."""
+        """Run the blasts; print and write the results."""
         check_cvar_level(self.cvar_level)
         with running_on(self.cluster):
             if self.run is not None:
@@ -51,7 +51,7 @@ class EvaluateCommand(EvaluateOptions):
         report_layout(plan, BlastEvaluator(scenario, engine, cache=self.cache), self)
 
     def _evaluate_run(self, run: Path) -> None:
-        """Evaluate the agent of a run; refuse options that say what the run folder says."""
+        """Evaluate the agent of a run; refuse options that the run folder already fixes."""
         if self.layout is not None:
             raise BlastEnvError(
                 "--layout and --run exclude each other: a run's agent proposes the layouts"

@@ -1,4 +1,4 @@
-"""The options of `blast-env evaluate`, and what it prints and writes."""
+"""The options of `blast-env evaluate`, and its printed and written output."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ from blast_env.units import PA_PER_PSI
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions, JsonOptions):
-    """The options that a layout's file and a run have in common; see `evaluate`."""
+    """The options common to a layout file and a run; see `evaluate`."""
 
     seeds: int = option(32, "Number of threats.", min=1)
     first_seed: int | None = option(
@@ -78,7 +78,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
     )
 
     def targets(self) -> list[Target]:
-        """Return where the command is to write; `check_target` looks at the suffix of `export`."""
+        """Return the targets of the command; `check_target` checks the suffix of `export`."""
         targets = super().targets()
         if self.export is None:
             return targets
@@ -89,9 +89,9 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         return targets
 
     def threats(self, scenario: Scenario, engine: Engine) -> tuple[Threat, ...]:
-        """Return the threats that the seeds draw, with what the user has fixed of their charges.
+        """Return the threats drawn by the seeds, with the user's place and mass of the charge.
 
-        Without noise, a charge has one realisation: of threats that all have the same, one is left.
+        Without noise a charge has one realisation: if all threats share their charge, one is left.
         """
         drawn = draw_threats(scenario, self.seed_range)
         threats = tuple(
@@ -102,19 +102,19 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
 
     @property
     def seed_range(self) -> range:
-        """The seeds of the threats: those that judge, unless the user wants others."""
+        """The seeds of the threats, by default those of judgement."""
         if self.first_seed is None:
             return SeedRange.JUDGEMENT.seeds(0, self.seeds)
         return range(self.first_seed, self.first_seed + self.seeds)
 
     def prepare_files(self, layouts: int) -> None:
-        """Refuse targets of no use before the blasts, so that no result is lost for want of one.
+        """Check the targets before the blasts, so that no result is lost.
 
         Args:
-            layouts: How many layouts there are to be.
+            layouts: Number of layouts to write.
 
         Raises:
-            BlastEnvError: If `out` cannot be a folder, or `export` is of no use.
+            BlastEnvError: If `out` cannot be a folder, or `export` cannot be written.
         """
         if self.export is not None:
             check_target(self.export, layouts)
@@ -124,13 +124,13 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
 
 
 def cache_record(evaluator: BlastEvaluator | Evaluators) -> dict[str, float]:
-    """Return how many blasts were run and how many were known already."""
+    """Return the number of blasts run, the number found in the cache, and the hit rate."""
     blasts, hits = evaluator.blasts, evaluator.cache_hits
     return {"blasts": blasts, "hits": hits, "hit_rate": evaluator.cache_hit_rate}
 
 
 def cache_text(evaluator: BlastEvaluator | Evaluators) -> str:
-    """Return the same for people."""
+    """Return the record of the cache in words."""
     record = cache_record(evaluator)
     return (
         f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
@@ -139,14 +139,14 @@ def cache_text(evaluator: BlastEvaluator | Evaluators) -> str:
 
 
 def interval(estimate: Estimate) -> str:
-    """Return an interval of shares; a dash where one threat says nothing about the others."""
+    """Return an interval of shares in words; a dash for a single threat."""
     if isnan(estimate.low):
         return "-"
     return f"{percent(estimate.low)} to {percent(estimate.high)}"
 
 
 def threats_text(count: int, seeds: range) -> str:
-    """Return what the means are over."""
+    """Return the threats of the means in words."""
     if count == 1:
         return f"seed {seeds[0]}"
     return f"means over {count} threats (seeds {seeds[0]} to {seeds[-1]})"
@@ -157,7 +157,7 @@ _NOT_IN_SHORT: Final = ("scenario", "threats", "modules", "cases")
 
 
 def print_record(record: Mapping[str, object], options: EvaluateOptions) -> None:
-    """Print a record as JSON, in short or all of it."""
+    """Print a record as JSON, short or complete."""
     shown = {key: each for key, each in record.items() if key not in _NOT_IN_SHORT}
     print_json(record if options.json_all else shown)
 
@@ -174,7 +174,7 @@ _HEADERS: Final = (
 
 
 def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: EvaluateOptions) -> None:
-    """Evaluate a layout on threats that the seeds draw; print and write the result."""
+    """Evaluate a layout on the threats drawn by the seeds; print and write the result."""
     engine = evaluator.engine
     threats = options.threats(plan.scenario, engine)
     options.prepare_files(1)
@@ -230,7 +230,7 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 
 
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:
-    """Print the buildings' mean loads, and what the layout does over all threats."""
+    """Print the buildings' mean loads, and the effect of the layout over all threats."""
     count = len(evaluation.threats)
     print_line(engine.describe([evaluation.scenario]))
     table = ResultTable(
@@ -257,7 +257,7 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine
 
 
 def _print_totals(evaluation: LayoutEvaluation) -> None:
-    """Print what there is to say about the protected structures together."""
+    """Print the loads on the protected structures together, and the worst threat."""
     worst, objective = evaluation.worst, evaluation.scenario.objective
     comparison = evaluation.comparison
     print_means(comparison, objective)
@@ -279,7 +279,7 @@ def _print_totals(evaluation: LayoutEvaluation) -> None:
 
 
 def _objective_text(objective: ObjectiveSection) -> str:
-    """Return what a scenario counts, and over which charges: `peak overpressure, worst charge`."""
+    """Return an objective in words: `peak overpressure, worst of the charges`."""
     over = {"mean": "mean over", "cvar": "mean of the worst", "worst": "worst of"}
     noun = "impulse and peak" if objective.quantity == "both" else objective.noun
     return f"{noun}, {over[objective.charges]} the charges"
@@ -290,7 +290,7 @@ def print_means(comparison: Comparison, objective: ObjectiveSection) -> None:
 
     Args:
         comparison: The loads.
-        objective: What they are.
+        objective: Their quantity and unit.
     """
     reduction = comparison.reduction
     print_line(

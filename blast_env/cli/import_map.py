@@ -30,8 +30,8 @@ _HEADERS = (
 class ImportCommand(ImportOptions, Command):
     """Make a scenario of a map or drawing: GeoJSON, OpenStreetMap, DXF.
 
-    The site is turned to the direction of most walls and buildings are cut into modules of 0.5 m;
-    the table says how far each is from its outline.
+    The site is turned to the direction of most walls, and buildings are cut into modules of 0.5 m;
+    the table gives the deviation of each building from its outline.
     """
 
     file: Path = argument(".geojson, .osm, .osm.pbf or .dxf.")
@@ -42,7 +42,7 @@ class ImportCommand(ImportOptions, Command):
     as_json: bool = option(False, "Print the report as JSON.", flag="--json")
 
     def __call__(self) -> None:
-        """Convert the file, write the scenario and say how far it is from the file."""
+        """Convert the file, write the scenario and print its deviations from the file."""
         # Here, because maps need the extra `maps`.
         from blast_env.importing import import_site
 

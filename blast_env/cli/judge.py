@@ -1,4 +1,4 @@
-"""`blast-env judge`: submissions to the benchmark, played again by gas dynamics."""
+"""`blast-env judge`: submissions to the benchmark, judged by gas dynamics."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,8 +45,8 @@ _OWN_SITES: Final = 8
 class JudgeCommand(ProcessOptions, CacheOptions):
     """Play submissions to the benchmark again by gas dynamics, and show the standings.
 
-    A submission is a file of layouts. Without one, the table of those that come with the package is
-    shown. With --method a method of your own is run first, and its submission is written.
+    A submission is a file of layouts. Without one, the command shows the standings that come with
+    the package. With --method, it first runs your method and writes its submission.
     """
 
     submissions: tuple[Path, ...] = argument("Files of submissions, judged ones too.", default=())
@@ -73,14 +73,14 @@ class JudgeCommand(ProcessOptions, CacheOptions):
     page: Path | None = option(None, "Write the standings as a page: .md.", writes=(".md",))
 
     def how_to_resume(self) -> str:
-        """Return how to go on after Ctrl-C: with the runs that are written, if they are."""
+        """Return the way to resume after Ctrl-C: from the written runs, if there are any."""
         kept = super().how_to_resume()
         through = "the same command goes on with the runs that are through"
         return kept if self.out is None or self.method is None else f"{through}; {kept}"
 
     def __call__(self) -> None:
         """Judge, and print the table."""
-        find_engine(JUDGE, self.cell_m)  # refuses what it cannot judge with before methods run
+        find_engine(JUDGE, self.cell_m)  # refuses unusable cells before methods run
         if self.out is not None:
             make_folder(self.out)
         submitted = [_submission(path) for path in self.submissions]
@@ -132,11 +132,11 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         return submission
 
     def _journal(self, method: str) -> str:
-        """Return a file name of the runs that a call may go on with: same method, same cells."""
+        """Return the file name of the runs that a call may resume: same method, same cells."""
         return f"runs_{_file_name(method)}_{self.search_cell_m:g}.jsonl"
 
     def _references(self, definitions: Mapping[str, Definition]) -> Mapping[str, ScoreReference]:
-        """Return the stored ones, or for secret sites what rules and the package's search find."""
+        """Return the stored references; for secret sites, those of rules and package search."""
         if self.secret is None:
             return stored_references()
         from blast_agents.benchmark import find_method, reference_of
@@ -185,7 +185,7 @@ def _file_name(method: str) -> str:
 
 
 def _submission(path: Path) -> Submission:
-    """Read a submission, or one that was judged before."""
+    """Read a submission, also one judged before."""
     try:
         content = read_runs(path)
     except BlastEnvError as error:
@@ -196,7 +196,7 @@ def _submission(path: Path) -> Submission:
 
 
 def _print_standings(judged: Sequence[JudgedSubmission]) -> None:
-    """Print a row a submission, the best first; those on other problems are other tables."""
+    """Print one row per submission, the best first, in one table per set of problems."""
     for each in standings_tables(judged):
         print_table(each.title, each.headers, each.rows)
     if not judged:

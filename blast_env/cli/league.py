@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 class LeagueCommand(ProcessOptions, ClusterOptions):
     """Compare searches, rules and trained agents on the same held-out cases and seeds.
 
-    An interrupted league goes on when it is called again with the same folder.
+    An interrupted league resumes when it is called again with the same folder.
     """
 
     out: Path = option(
@@ -93,11 +93,11 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
 
     def how_to_resume(self) -> str:
-        """Return how to go on after Ctrl-C."""
+        """Return the way to resume after Ctrl-C."""
         return "the same command goes on with what is through"
 
     def __call__(self) -> None:
-        """Play the tracks, and write what came of it."""
+        """Play the tracks, and write the results."""
         # Here, because its figures need the extra `render`, and because it imports pandas.
         from blast_agents.league import ResultStore, find_tracks
         from blast_agents.league.report import write_league
@@ -120,7 +120,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         print_written(written)
 
     def _by_site(self) -> str:
-        """Return the engine that the sites take: those that are named, or of the track's family."""
+        """Return the default engine of the named sites, or of the track's family."""
         # Here, because it takes half a second to import.
         from blast_env.envs.strategies import scenario_source
 
@@ -156,7 +156,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         return Contest(track, entries, store, engine)
 
     def _own_methods(self) -> tuple[str, ...]:
-        """Return optimisers of the user's own, which may lie in the folder of the call."""
+        """Return the user's optimisers, which may lie in the current folder."""
         for place in self.method:
             if ":" not in place:
                 raise BlastEnvError(f"--method is {place!r}, must be MODULE:OBJECT")
@@ -179,7 +179,7 @@ def _load_runs(runs: Sequence[Path], tracks: "Sequence[Track]") -> "list[Trained
 
 
 def _print_outlook(contests: "Sequence[Contest]") -> None:
-    """Say what is to come before it begins."""
+    """Print the number of blasts to come, before they start."""
     total = 0
     for contest in contests:
         outlook = contest.outlook()
@@ -215,7 +215,7 @@ def _budgets(flag: str, text: str) -> list[int]:
     """Return the budgets of a list with commas.
 
     Raises:
-        BlastEnvError: If one is no whole number from 1 on, or is there twice.
+        BlastEnvError: If one is no whole number from 1 on, or occurs twice.
     """
     names = _names(text)
     if any(not name.isdecimal() or int(name) < 1 for name in names) or len(set(names)) < len(names):

@@ -1,4 +1,4 @@
-"""Options that commands and studies have in common, with one name and one meaning in all."""
+"""Options that commands and studies share, with one name and one meaning in all."""
 
 import logging
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ def running_on(cluster: str | None) -> Iterator[None]:
     if cluster is None:
         yield
         return
-    # What happens to workers, Dask says in its own words; what matters of it becomes an error.
+    # Dask logs the fate of its workers; `on_cluster` turns serious losses into errors.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with on_cluster(cluster) as size:
         now = f"{size.workers} workers with {size.threads} threads now"
@@ -63,12 +63,12 @@ CVAR_HELP: Final = "0.8: the mean of the worst 20 %, beside or instead of that o
 def wanted_level(
     label: str | None, scenario: Scenario, otherwise: LevelOfProtection
 ) -> LevelOfProtection:
-    """Return the level of protection that is asked for, else the scenario's target.
+    """Return the requested level of protection, else the scenario's target.
 
     Args:
-        label: What the user asked for, if anything.
+        label: Label of the requested level, if any.
         scenario: Its objective may have a target.
-        otherwise: The level where it has none.
+        otherwise: The level if it has none.
 
     Raises:
         UnknownNameError: If there is no such level.
@@ -81,7 +81,7 @@ def wanted_level(
 
 @dataclass(frozen=True, kw_only=True)
 class ChargeOptions(Command):
-    """The charge, where the user says where it is and how large."""
+    """The place and the mass of the charge, if the user gives them."""
 
     charge_m: tuple[float, float] | None = option(
         None, "Where the charge is, m, instead of drawing it.", metavar="X Y"
@@ -95,7 +95,7 @@ class ChargeOptions(Command):
 
         Args:
             scenario: The scenario.
-            drawn: The charge that is drawn otherwise; with a place it is in no vehicle.
+            drawn: The charge drawn without them; with a given place, it is in no vehicle.
 
         Raises:
             ScenarioError: If it is out of bounds, or not clear of a structure or the border.
@@ -118,21 +118,21 @@ class ProcessOptions(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class ClusterOptions(Command):
-    """A cluster in the place of this machine's processes."""
+    """A cluster instead of processes on this machine."""
 
     cluster: str | None = option(None, CLUSTER_HELP)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CacheOptions(Command):
-    """Blasts that are kept."""
+    """A cache of blasts."""
 
     cache: Path | None = option(
         None, "Folder in which blasts are kept for the next run.", writes=FOLDER
     )
 
     def how_to_resume(self) -> str:
-        """Return how to go on after Ctrl-C: with the blasts that are kept, if they are."""
+        """Return the way to resume after Ctrl-C: from the cached blasts, if there is a cache."""
         if self.cache is None:
             return "with --cache FOLDER the blasts would have been kept for the next call"
         return f"the same command goes on with the blasts that are kept in {self.cache}"
@@ -140,7 +140,7 @@ class CacheOptions(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class JsonOptions(Command):
-    """The result as JSON, in short or all of it."""
+    """The result as JSON, short or complete."""
 
     as_json: bool = option(False, "Print the result as JSON, in short.", flag="--json")
     json_all: bool = option(False, "Print as JSON all that there is to know of it.")
@@ -149,7 +149,7 @@ class JsonOptions(Command):
         """Refuse both at once.
 
         Raises:
-            BlastEnvError: If both are asked for.
+            BlastEnvError: If both are given.
         """
         if self.as_json and self.json_all:
             raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")

@@ -1,4 +1,4 @@
-"""What all commands share: consoles, tables, errors, a progress bar."""
+"""Output of all commands: consoles, tables, errors, a progress bar."""
 
 import json
 import os
@@ -41,7 +41,7 @@ LAYOUT_PICTURE: Final = "layout.png"
 def result_console() -> Console:
     """Return the console for results (standard output).
 
-    In a pipe it is wide enough for most tables, unless `COLUMNS` says how wide it is to be.
+    In a pipe it is wide enough for most tables, unless `COLUMNS` sets the width.
     """
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     width = None if known else _PIPE_COLUMNS
@@ -49,7 +49,7 @@ def result_console() -> Console:
 
 
 def print_line(text: str, style: str | None = None) -> None:
-    """Print a line to standard output as it is: not wrapped, no markup in it."""
+    """Print a line to standard output verbatim: without wrapping or markup."""
     result_console().print(printable(text), soft_wrap=True, style=style)
 
 
@@ -59,20 +59,20 @@ def message_console() -> Console:
 
 
 def _plain(**options: Any) -> Console:
-    """Return a console that shows texts as they are: a path may look like markup or an emoji."""
+    """Return a console that shows texts verbatim: a path may look like markup or an emoji."""
     return Console(highlight=False, markup=False, emoji=False, **options)
 
 
 def printable(text: str) -> str:
-    """Return a text with escapes for the characters that would steer the terminal."""
+    """Return a text with its terminal control characters escaped."""
     return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 class InterruptedCommandError(Exception):
-    """A command was interrupted after it had a part of its result, which it has written.
+    """A command was interrupted after it had written a part of its result.
 
     Args:
-        parts: What is kept, and how to go on.
+        parts: Sentences on the results kept and the way to resume.
     """
 
     def __init__(self, *parts: str) -> None:
@@ -87,7 +87,7 @@ def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
     SIGTERM (`timeout`, a batch system, a shutdown) ends the block as Ctrl-C does.
 
     Args:
-        resume: Says how to go on after an interruption, where a command can.
+        resume: Returns the way to resume after an interruption; empty if there is none.
     """
     with _sigterm_as_interrupt() as terminated:
         try:
@@ -108,10 +108,10 @@ def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
 
 @contextmanager
 def _sigterm_as_interrupt() -> Iterator[list[int]]:
-    """Raise `KeyboardInterrupt` on SIGTERM; yield a list that then has the signal in it.
+    """Raise `KeyboardInterrupt` on SIGTERM; yield a list that then holds the signal.
 
-    Where signals are not ours to handle, in threads or because the parent lets them be ignored,
-    nothing is changed.
+    Nothing changes in threads other than the main one, or if SIGTERM has no default handler, as
+    when the parent ignores it.
     """
     received: list[int] = []
     if current_thread() is not main_thread() or getsignal(SIGTERM) is not SIG_DFL:
@@ -135,7 +135,7 @@ def print_json(content: Mapping[str, object]) -> None:
 
 
 def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
-    """Save pictures, or say that there are none for want of the extra `render`.
+    """Save pictures, or print a note if the extra `render` is not installed.
 
     Args:
         save: Saves them, and returns their paths.
@@ -148,7 +148,7 @@ def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
 
 
 def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Path) -> Path:
-    """Draw a layout on its site, from above and obliquely; return the file.
+    """Draw the plan and the oblique view of a layout on its site; return the file.
 
     Raises:
         MissingExtraError: If the extra `render` is not installed.
@@ -163,15 +163,15 @@ def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Pat
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on standard error; it is gone when the work is done.
+    """Show a progress bar on standard error, and remove it at the end of the work.
 
-    Where standard error is no terminal, as in a log file, a line every half minute instead.
+    If standard error is no terminal, as in a log file, print a line every half minute instead.
 
     Args:
-        label: What is going on.
+        label: The current work.
 
     Yields:
-        A function to call with the share that is done.
+        A function to call with the completed share, 0 to 1.
     """
     console = message_console()
     if not console.is_terminal:
@@ -184,7 +184,7 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
 
 
 def _progress_lines(console: Console, label: str) -> Callable[[float], None]:
-    """Return a function that writes the share that is done, but not too often."""
+    """Return a function that writes the completed share, at most every half minute."""
     began = told = perf_counter()
 
     def show(share: float) -> None:
@@ -198,15 +198,15 @@ def _progress_lines(console: Console, label: str) -> Callable[[float], None]:
 
 
 class ResultTable(Table):
-    """A table whose columns get narrower by wrapping between words, never inside of one.
+    """A table whose columns get narrower by wrapping between words, never inside a word.
 
-    Rich's own table cuts words where columns do not fit. Here the columns are then shown in
-    several tables one below the other, each with the first column, so that rows keep their names.
+    Rich's table cuts words if columns do not fit. This one then splits the columns into several
+    tables one below the other, each with the first column, so that rows keep their names.
 
     Args:
-        title: What stands above it.
+        title: Its title.
         headers: The headers.
-        text_columns: How many of the first columns are text; numbers are set to the right.
+        text_columns: Number of leading text columns; the others are aligned to the right.
     """
 
     def __init__(self, title: str, headers: Sequence[str], text_columns: int = 1) -> None:
@@ -232,7 +232,7 @@ class ResultTable(Table):
             yield self._part(group, _shared([widths[index] for index in group], room))
 
     def _groups(self, widths: Sequence[Measurement], width: int) -> list[list[int]]:
-        """Return which columns stand in which table, by the width of their longest words."""
+        """Return the column numbers of each table, by the width of their longest words."""
         names = [0] if self._has_names and widths else []
         groups = [[*names]]
         for index in range(len(names), len(widths)):
@@ -254,10 +254,10 @@ class ResultTable(Table):
 
 
 def _shared(widths: Sequence[Measurement], room: int) -> list[int]:
-    """Return the widths of columns: their longest words, and what is left to spare second lines."""
+    """Return the widths of columns: their longest words, and a share of the space left."""
     shared = [each.minimum for each in widths]
     left = room - sum(shared)
-    # The smallest wish first: it takes least to spare a column a second line.
+    # The smallest demand first: it takes the least space to avoid a second line.
     for index in sorted(range(len(widths)), key=lambda each: widths[each].span):
         given = min(widths[index].span, max(left, 0))
         shared[index] += given
@@ -276,13 +276,13 @@ def print_table(
 
 
 def print_written(paths: Iterable[Path]) -> None:
-    """Say which files were written."""
+    """Print the files written."""
     for path in paths:
         print_line(f"wrote {path}")
 
 
 def percent(share: float) -> str:
-    """Return a share for people; a dash for one that does not exist."""
+    """Return a share in per cent; a dash for NaN."""
     return "-" if isnan(share) else f"{100.0 * share:.1f} %"
 
 
@@ -294,11 +294,11 @@ _MOST_PIECES: Final = 12
 
 
 def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
-    """Print what becomes of a barrier's pieces, those that move most first; nothing without any.
+    """Print the outcome for each of a barrier's pieces, the largest movement first, if any.
 
     Args:
         pieces: As `GasResult.pieces`.
-        title: Of the table, before how many do what.
+        title: Title of the table, before the counts of the outcomes.
     """
     if not len(pieces):
         return
@@ -323,5 +323,5 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
 
 
 def outcome_counts(pieces: "pd.DataFrame") -> dict[str, int]:
-    """Return how many pieces do what, the most frequent first."""
+    """Return the number of pieces by outcome, the most frequent first."""
     return {str(word): int(n) for word, n in pieces["outcome"].value_counts().items()}

@@ -11,8 +11,8 @@ from blast_env.cli.output import message_console, print_line
 class AppCommand(Command):
     """Open a local web page to design on: draw a site, place barriers, blast, compare, search.
 
-    Open the address that is printed: without its token the page lets nobody in. Everything is kept
-    in the folder at every step. Ctrl-C ends the page.
+    Open the printed address: without its token, the page admits nobody. Every step is saved in the
+    folder. Ctrl-C ends the page.
     """
 
     port: int = option(8080, "Port of the page.", min=1, max=65535)
@@ -54,7 +54,7 @@ def check_run(folder: Path) -> None:
     """Refuse a folder that is no run, before anything is started.
 
     Raises:
-        BlastEnvError: If it is none.
+        BlastEnvError: If it is no run folder.
     """
     from blast_agents.training.run_folder import RunFolder  # here, because it imports torch
 

@@ -19,14 +19,14 @@ if TYPE_CHECKING:  # takes a third of a second to import
 class PaperCommand(Command):
     """Work out the paper's Tables 1 to 4 and Figure 5 again, from its own columns.
 
-    Nothing is simulated. Says of each table how far the printed cells are off, and where the
-    paper contradicts itself.
+    Nothing is simulated. The command gives the deviation from the printed cells of each table, and
+    the contradictions in the paper.
     """
 
     out: Path = option(Path("out/paper"), "Folder for the tables and the figure.", writes=FOLDER)
 
     def __call__(self) -> None:
-        """Print the tables and what is to be said of them; write them and the figure."""
+        """Print the tables with their deviations; write them and the figure."""
         # Here, because pandas takes a third of a second to import.
         from blast_env.fitting.paper import (
             CONTRADICTIONS,
@@ -79,7 +79,7 @@ def rich_table(
 
 
 def largest_deviation(table: "pd.DataFrame", decimals: tuple[int, int, int]) -> str:
-    """Return a sentence about how far the printed cells are from ours."""
+    """Return the largest deviation of the computed cells from the printed ones, in words."""
     from blast_env.fitting.paper import deviations
 
     largest = abs(deviations(table, decimals)).max()
@@ -90,7 +90,7 @@ def largest_deviation(table: "pd.DataFrame", decimals: tuple[int, int, int]) -> 
 
 
 def coefficient_table() -> Table:
-    """Return the coefficients of the paper's text and of its columns, and what they give."""
+    """Return the coefficients of the paper's text and of its columns, with their errors."""
     from blast_env.fitting.paper import PAPER_LAWS, TABLE_4_DECIMALS, metrics_row
 
     headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")

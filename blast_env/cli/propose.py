@@ -1,4 +1,4 @@
-"""`blast-env propose`: a layout from what comes with the package, weights or a surrogate."""
+"""`blast-env propose`: a layout from the packaged weights, surrogate or rules."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -41,13 +41,12 @@ _NOTHING: Final = "no barrier"
 class ProposeCommand(ChargeOptions, ProcessOptions):
     """Propose a layout for any site, with a catalogue in seconds without a blast.
 
-    It comes from weights that were trained for the very scenario, if some come with the package; if
-    not, from the surrogate of gas dynamics, which was fitted to other sites. That takes seconds,
-    and no blast. Where there is no catalogue, of which the surrogate knows nothing, it is the best
-    rule's layout: that takes a blast of gas dynamics for each rule and threat, some minutes, which
-    are told before; fewer with --budget. Nothing is proposed where no layout is expected to take
-    off 3 %. Without --charge it is for all places where the charge may
-    be.
+    The layout comes from packaged weights trained for the same scenario, if there are any; if not,
+    from the surrogate of gas dynamics, fitted to other sites. Both take seconds, and no blast. On a
+    site without a catalogue, outside the surrogate's range, the best rule proposes: one blast of
+    gas dynamics for each rule and threat, some minutes; the command prints the estimate first, and
+    --budget lowers it. Nothing is proposed if the expected reduction is below 3 %. Without
+    --charge, the layout is for all possible places of the charge.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -65,7 +64,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
     )
 
     def __call__(self) -> None:
-        """Propose, judge the proposal if that is asked for, and write it."""
+        """Propose a layout, judge it if requested, and write it."""
         scenario = load_scenario(self.scenario)
         scenario.zone  # noqa: B018  # refuses a scenario without one
         engine = find_engine(JUDGE, cells=self.cells)
@@ -80,7 +79,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
             self._write(scenario, result.layout, chosen.source, self.out)
 
     def _charge(self, scenario: Scenario) -> Charge | None:
-        """Return the charge if the user says where it is."""
+        """Return the charge at the user's place; `None` without one."""
         if self.charge_m is None:
             if self.tnt_kg is not None:
                 raise BlastEnvError("--tnt-kg is given without --charge: where is it?")
@@ -100,7 +99,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         return charge
 
     def _proposed(self, problem: LayoutProblem) -> tuple[Chosen, SearchResult]:
-        """Return the proposal, with the time that it took where it took no blast."""
+        """Return the proposer and its proposal; print the time of one without blasts."""
         chosen = chosen_for(problem)
         if chosen.budget:
             print_line(
@@ -126,7 +125,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         return chosen, replace(result, by=f"{result.by}{words}, in {ms:,.0f} ms")
 
     def _verify(self, problem: LayoutProblem, layout: Layout) -> None:
-        """Let gas dynamics judge a proposal beside no barrier and rules, within the budget."""
+        """Judge a proposal by gas dynamics beside no barrier and the rules, within the budget."""
         case, rules = problem.case, layouts_by_rule(problem.scenario, problem.told)
         layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
         if self.budget is not None:
@@ -162,7 +161,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
 
 
 def _words(scenario: Scenario, result: SearchResult) -> str:
-    """Return what is proposed, what it costs and what it is expected to gain."""
+    """Return the proposal in words, with its cost and its expected gain."""
     if not result.layout:
         return "nothing is proposed"
     placement = Placement.of(scenario, result.layout)
@@ -172,7 +171,7 @@ def _words(scenario: Scenario, result: SearchResult) -> str:
 
 
 def _print_verdict(loads: Mapping[str, float], case: Case) -> None:
-    """Print a row a layout, the best last but for the proposal."""
+    """Print one row per layout: no barrier, the rules with the best last, and the proposal."""
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     objective = case.scenario.objective
     headers = ("layout", f"load ({objective.unit})", "reduction")

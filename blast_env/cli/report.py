@@ -1,4 +1,4 @@
-"""`blast-env report`: what an engineer hands over."""
+"""`blast-env report`: the report of an engineer to a client."""
 
 from contextlib import suppress
 from dataclasses import dataclass, fields
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 class ReportCommand(ProcessOptions, CacheOptions):
     """Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.
 
-    A verdict first, then what was assumed: site and threats, bill of quantities, loads with two
-    sizes of cells, damage, film stills, what each item is worth, other masses and places, where
-    every number comes from, and everything to repeat it. Stopped (Ctrl-C) after the loads with the
-    coarser cells, it writes what is done.
+    The verdict comes first, then the assumptions: site and threats, bill of quantities, loads with
+    two sizes of cells, damage, film stills, the worth of each item, other masses and places, the
+    source of every number, and everything to repeat it. If it is stopped (Ctrl-C) after the loads
+    with the coarser cells, the command writes the parts finished so far.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -96,7 +96,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
             )
 
     def how_to_resume(self) -> str:
-        """Return how to go on after an interruption: with the loads that are kept, if they are."""
+        """Return the way to resume after an interruption: from the cached loads, if any."""
         kept = super().how_to_resume()
         return kept if self.cache is None else f"{kept}, and draws the threats again"
 
@@ -116,10 +116,10 @@ class ReportCommand(ProcessOptions, CacheOptions):
 
 
 def _cells(text: str) -> Cells:
-    """Return cells as they were given.
+    """Return the cells of a text: a side, m, or the name of growing cells.
 
     Raises:
-        BlastEnvError: If they are no length, nor a way of growing.
+        BlastEnvError: If it is neither.
     """
     with suppress(BlastEnvError):
         return plain_number("--cells", text)

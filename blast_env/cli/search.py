@@ -75,15 +75,15 @@ LAYOUT_NAME: Final = "layout.json"
 
 _SURROGATE: Final = "surrogate"
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "surrogate")
-"""Options that change nothing of what is found, or are said in another way."""
+"""Options that do not affect the result, or are recorded in another form."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions):
     """Search for the layout with the least load on the protected structures.
 
-    Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats that
-    the search has not met; those blasts do not count.
+    Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats
+    outside the search; those blasts do not count.
     """
 
     method: str = option("genetic", f"{', '.join(proposers())}.")
@@ -120,7 +120,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
     )
 
     def __call__(self) -> None:
-        """Search, check the result, and write what came of it."""
+        """Search, check the result, and write it."""
         with running_on(self.cluster):
             engine = find_engine(self.engine, self.cell_m, cells=self.cells)
             evaluator = BlastEvaluator(load_scenario(self.scenario), engine, cache=self.cache)
@@ -129,7 +129,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
             method, surrogate = self._method(evaluator.scenario)
             run = self._run(method, evaluator)
             if run.result.interrupted and not run.result.history:
-                raise KeyboardInterrupt  # nothing was found that could be kept
+                raise KeyboardInterrupt  # there is no layout to keep
             checked = self._check(run)
             print_search(run, checked)
             if self.out is not None:
@@ -144,7 +144,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
             )
 
     def _options(self) -> dict[str, Any]:
-        """Return the options that decide what is found, as plain data."""
+        """Return the options that affect the result, as plain data."""
         named = {each.name: getattr(self, each.name) for each in fields(self)}
         named["start_from"] = [str(path) for path in self.start_from]
         return {name: each for name, each in named.items() if name not in _NOT_OF_THE_SEARCH}
@@ -181,12 +181,12 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
         return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
 
     def _practice(self, scenario: Scenario, engine: Engine) -> Case:
-        """Return what the search may spend its blasts on."""
+        """Return the load cases of the search."""
         model = find_threat_model(self.threat, self.threats)
         realisations = find_realisations(self.realisations, self.threat, engine)
         risk = find_risk(self.risk, self.cvar_level)
         if not isinstance(model, HiddenThreat):
-            # The charge that is known is always that of the search's own seed.
+            # The known charge is always drawn by the seed of the search.
             charge = self.fixed(scenario, scenario.sample_charge(np.random.default_rng(self.seed)))
             return practice_visible(scenario, charge, realisations, self.seed, risk)
         for flag, value in (("--charge", self.charge_m), ("--tnt-kg", self.tnt_kg)):
@@ -213,9 +213,9 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
             return method.propose(problem, self.budget, self.seed, report)
 
     def _check(self, run: "SearchRun") -> LayoutEvaluation | None:
-        """Evaluate the layout on threats that judge; `None` if the search has met all of them.
+        """Evaluate the layout on threats of judgement; `None` if the search used all of them.
 
-        Without noise a charge is one blast: a charge that the search has met is not held out.
+        Without noise a charge is one blast: a charge used by the search is not held out.
         """
         problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, self.held_out)
         if self.threat == "hidden":
@@ -240,13 +240,13 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
 
 @dataclass(frozen=True, eq=False)
 class SearchRun:
-    """A search that has ended.
+    """A finished search.
 
     Attributes:
-        problem: What it was asked.
-        result: What it found.
-        seconds: How long it took.
-        cache_hits: Loads that it asked for and that were known already.
+        problem: Its problem.
+        result: Its result.
+        seconds: Its duration.
+        cache_hits: Number of its loads found in the cache.
     """
 
     problem: LayoutProblem
@@ -256,12 +256,12 @@ class SearchRun:
 
 
 def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
-    """Say what blasts cost before they begin, if the engine tells.
+    """Print the cost of blasts before they start, if the engine can estimate it.
 
     Args:
         evaluator: Will run them.
-        case: Its threats are what layouts meet.
-        blasts: How many there will be at most.
+        case: The load cases of the layouts.
+        blasts: Greatest number of blasts.
     """
     found = (evaluator.engine.cost(case.scenario, each.charge) for each in case.threats)
     costs = [each for each in found if each is not None]
@@ -272,7 +272,7 @@ def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
 
 
 def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
-    """Print what the layout does against the search's threats and against others, and the cost."""
+    """Print the effect of the layout on the search's threats and on others, and the cost."""
     result, problem = run.result, run.problem
     table = ResultTable(
         f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}",
@@ -314,7 +314,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
 def write_search(
     run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation | None, out: Path
 ) -> None:
-    """Write the layout, the history, the front and a figure, as far as there are such."""
+    """Write the layout and its picture; the history, its figure and the front, if there are any."""
     result = run.result
     scenario = run.problem.scenario
     provenance = _provenance(run, options, checked)
@@ -372,7 +372,7 @@ def _provenance(
 
 
 def _risk_text(problem: LayoutProblem) -> str:
-    """Return what the loads under the search's threats are."""
+    """Return the risk measure over the search's threats in words."""
     noun = problem.scenario.objective.noun
     words = f"{noun} of the protected structures"
     risk = problem.case.risk or problem.scenario.objective.risk

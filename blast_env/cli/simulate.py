@@ -1,4 +1,4 @@
-"""`blast-env simulate`: run one blast; print and write what it did."""
+"""`blast-env simulate`: run one blast; print its loads and write its files."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -60,8 +60,8 @@ _PARTICLES_PANEL: Final = "Particles only"
 class SimulateCommand(ChargeOptions, JsonOptions):
     """Run one blast and print what each structure took.
 
-    A picture answers the same question on either engine: --film how the blast spreads, --heat-map
-    where the load falls, --history when it comes.
+    Each picture shows the same for either engine: --film the spread of the blast, --heat-map the
+    places of the load, --history its course over time.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -135,7 +135,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         site = load_scenario(self.scenario)
         scenario = site if self.stand_off_m is None else site.at_stand_off(self.stand_off_m)
         scenario = scenario.with_simulation(self.preset)
-        # A layout is for the site of the file; preset and stand-off are this command's.
+        # A layout belongs to the site of the file, before preset and stand-off change it.
         layout: Layout = () if self.layout is None else tuple(load_layout(self.layout, site))
         engine = find_engine(
             self.engine or default_engine(scenario), self.cell_m, self.until, self.cells
@@ -159,7 +159,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
             print_written(written)
 
     def _check(self, engine: Engine, layout: Layout) -> None:
-        """Refuse options of no use before anything is run."""
+        """Refuse options that do not apply, before anything is run."""
         own = f"{engine.title} only"
         for each in options_of(type(self)):
             panel = each.text.panel or ""
@@ -183,14 +183,14 @@ _AnyResult = TypeVar("_AnyResult", BlastResult, "GasResult")
 
 
 class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
-    """A blast, and how its result is shown.
+    """A blast, and the output of its result.
 
     Args:
-        command: What is wanted of it.
+        command: The options.
         blast: The blast.
 
     Raises:
-        BlastEnvError: If an option is of no use for it.
+        BlastEnvError: If an option does not apply to it.
     """
 
     headers: tuple[str, ...]
@@ -201,10 +201,10 @@ class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
         self.check()
 
     def check(self) -> None:
-        """Refuse options of no use before anything is run."""
+        """Refuse options that do not apply, before anything is run."""
 
     def run(self, progress: Tell) -> tuple[_AnyResult | None, _AnyResult]:
-        """Run the blast, and the one without a barrier where it is to stand beside it."""
+        """Run the blast, and that without a barrier if it is shown beside it."""
         bare = replace(self.blast, layout=()) if self.command.side_by_side else None
         if self.command.film is not None:
             return self.write_film(self.command.film, bare, progress)
@@ -225,18 +225,18 @@ class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
 
     @abstractmethod
     def write_pictures(self, result: _AnyResult, bare: _AnyResult | None) -> list[Path]:
-        """Write the pictures that are wanted; return their files."""
+        """Write the requested pictures; return their files."""
 
     @abstractmethod
     def print_loads(self, result: _AnyResult) -> None:
-        """Print a table of the structures' loads, and how the run went."""
+        """Print a table of the structures' loads, and the end of the run."""
 
     def print_table(self, charge: Charge, more: str, rows: Sequence[Sequence[str]]) -> None:
         """Print the table of the structures' loads.
 
         Args:
             charge: The charge of the blast.
-            more: What else decides the result.
+            more: Other inputs of the result, in words.
             rows: The rows.
         """
         x_m, y_m = charge.position_m
@@ -249,7 +249,7 @@ class ShownBlast(ABC, Generic[_AnyBlast, _AnyResult]):
         )
 
     def print_end(self, result: _AnyResult, what: str, steps: str, notes: Sequence[str]) -> None:
-        """Print what ran, how it ended, and what there is to say of it."""
+        """Print the engine, the end of the run, notes and the digest."""
         print_line(
             f"{what}, {result.steps:,} {steps}, {MS_PER_S * result.time_s:.0f} ms simulated; ended "
             f"because {result.end_reason}"
@@ -282,7 +282,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         return (None if bare is None else results[0]), results[-1]
 
     def write_pictures(self, result: BlastResult, bare: BlastResult | None) -> list[Path]:
-        """Write the pictures; those of the empty site have files of their own."""
+        """Write the pictures; those of the empty site go into separate files."""
         asked = self.command
         if not any((asked.heat_map, asked.history, asked.scheme, asked.velocities)):
             return []
@@ -305,7 +305,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         return [figures.save_figure(draw(), path) for path, draw in pictures if path is not None]
 
     def print_loads(self, result: BlastResult) -> None:
-        """Print a table of the buildings' loads, and how the run went."""
+        """Print a table of the buildings' loads, and the end of the run."""
         blast, scene = result.blast, result.blast.scene
         scaled = {
             each.name: _scaled(result, each.name) for each in result.obstacles if each.cells is None
@@ -340,7 +340,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
 def _mean_of(
     parts: Sequence[ModularObstacle], scaled: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Return the impulse on a building: the mean over its parts by their weights."""
+    """Return the impulse on a building: the mean over its parts by their weights; empty if none."""
     counted = [each for each in parts if each.protected] or parts
     found = [scaled.get(each.name, {}) for each in counted]
     if not all("pa_s" in each for each in found):
@@ -371,7 +371,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     )
 
     def check(self) -> None:
-        """Refuse options of no use before anything is run."""
+        """Refuse options that do not apply, before anything is run."""
         asked = self.command
         for flag, value in (
             ("--film-height", asked.film_height_m),
@@ -406,7 +406,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
 
     @property
     def _recorders(self) -> "Recorders":
-        """What records the ground, where a map of it is wanted."""
+        """The recorders of the ground, if a map of it is requested."""
         asked = self.command
         if not any((asked.impulse_map, asked.peak_map, asked.risk_map)):
             return lambda _: ()
@@ -434,7 +434,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         return (None if bare is None else results[0]), results[-1]
 
     def write_pictures(self, result: "GasResult", bare: "GasResult | None") -> list[Path]:
-        """Write the pictures; the empty site is in each beside the other."""
+        """Write the pictures, each with the empty site beside the layout if requested."""
         asked = self.command
         maps = (asked.impulse_map, asked.peak_map, asked.risk_map)
         if not any((asked.heat_map, asked.history, *maps)):
@@ -456,7 +456,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         return [save_figure(draw(), path) for path, draw in pictures if path is not None]
 
     def print_loads(self, result: "GasResult") -> None:
-        """Print tables of the buildings' loads and of the gauges, and how the run went."""
+        """Print tables of the buildings' loads and of the gauges, and the end of the run."""
         scaled = {name: _scaled(result, name) for name in result.structures["structure"]}
         in_range = {
             name: all(scaled[each.name]["in_range"] for each in parts)
@@ -492,7 +492,7 @@ def _section(text: str | None) -> "VerticalSection | None":
     """Return the section of `--film-section`.
 
     Raises:
-        BlastEnvError: If it is none.
+        BlastEnvError: If it is no section.
         MissingExtraError: If the extra `render` is not installed.
     """
     if text is None:
@@ -524,7 +524,7 @@ def _print_gauges(gauges: "pd.DataFrame") -> None:
 
 
 def _to_come_text(row: Mapping[Any, Any]) -> str:
-    """Return about how much of an impulse is still to come; `?` if not all waves have come."""
+    """Return an estimate of the impulse still to come, Pa s; `?` if some waves are yet to come."""
     if row["complete"]:
         return "complete"
     return "?" if isnan(row["to_come_pa_s"]) else f"{row['to_come_pa_s']:,.1f}"
@@ -535,7 +535,7 @@ def _number(value: float, form: str) -> str:
 
 
 def _scaled(result: "BlastResult | GasResult", name: str) -> dict[str, Any]:
-    """Return the impulse on a structure in Pa s, or the error where there is none."""
+    """Return the impulse on a structure in Pa s and psi s, or the error without one."""
     try:
         impulse = result.impulse(name)
     except BlastEnvError as error:
@@ -557,9 +557,9 @@ def _notes(scaled: Mapping[str, Any]) -> tuple[str, ...]:
 def _record(
     result: "BlastResult | GasResult", written: Sequence[Path], *, all_of_it: bool
 ) -> dict[str, object]:
-    """Return the result as plain data; numbers that do not exist are null.
+    """Return the result as plain data; missing numbers are null.
 
-    In short it has neither the modules nor every parameter, which the preset stands for.
+    The short form leaves out the modules and the single parameters, which the preset implies.
     """
     content: dict[str, object] = {
         "run": {

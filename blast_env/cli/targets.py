@@ -1,4 +1,4 @@
-"""Where a command is to write: looked at before its work begins, tidied up after it."""
+"""The targets of a command: checked before its work, tidied up after it."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -9,16 +9,16 @@ from typing import NamedTuple
 from blast_env.errors import BlastEnvError
 
 PICTURES = (".png", ".svg", ".pdf")
-"""Suffixes of pictures, as `rendering.figures.FIGURE_SUFFIXES`; known without that extra."""
+"""Suffixes of pictures, equal to `rendering.figures.FIGURE_SUFFIXES`, without its extra."""
 
 
 class Target(NamedTuple):
     """A file or folder that a command is to write.
 
     Attributes:
-        option: The option that says so.
-        path: Where.
-        suffixes: Those that the file may have; none for a folder.
+        option: The option that names it.
+        path: Its path.
+        suffixes: The allowed suffixes of a file; none for a folder.
     """
 
     option: str
@@ -28,13 +28,13 @@ class Target(NamedTuple):
 
 @contextmanager
 def checked_targets(targets: Sequence[Target]) -> Iterator[None]:
-    """Refuse targets of no use before the block, and leave no empty folders after it.
+    """Refuse unusable targets before the block, and remove new empty folders after it.
 
-    So no result is lost for want of a place, and a command that fails or is interrupted leaves no
-    folder behind that it has put nothing into.
+    So no result is lost because it cannot be written, and a command that fails or is interrupted
+    leaves no empty folders.
 
     Args:
-        targets: The files and folders, with their options; folders need not be there.
+        targets: The files and folders, with their options; folders need not exist.
 
     Raises:
         BlastEnvError: If a file or folder cannot be written, or two options name one file.
@@ -57,7 +57,7 @@ def checked_targets(targets: Sequence[Target]) -> Iterator[None]:
         for folder, missing in before.items():
             for path in (*_folders_in(folder), *missing):
                 if path not in present:
-                    with suppress(OSError):  # there is something in it, or it was never made
+                    with suppress(OSError):  # it is not empty, or was never created
                         path.rmdir()
 
 
@@ -85,7 +85,7 @@ def _check_folder(option: str, folder: Path) -> None:
 
 
 def _missing_above(folder: Path) -> list[Path]:
-    """Return a folder and those above it that are not there, the lowest first."""
+    """Return the missing folders among a folder and its parents, the lowest first."""
     path, missing = folder.resolve(), []
     while not path.exists():
         missing.append(path)
@@ -94,5 +94,5 @@ def _missing_above(folder: Path) -> list[Path]:
 
 
 def _folders_in(folder: Path) -> list[Path]:
-    """Return the folders in a folder, the lowest first."""
+    """Return a folder and all folders below it, the lowest first."""
     return [Path(place) for place, _, _ in os.walk(folder.resolve(), topdown=False)]

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 _DEFAULT_ALGORITHM: Final = "maskable_ppo"
 _POLICIES: Final = {"features": "MlpPolicy", "image": "CnnPolicy"}
-"""Policies for what are no planes, which those of the YAML files look at."""
+"""Policies of the observations other than planes, for which the YAML files hold policies."""
 _DEFAULT_SCENARIO: Final = "courtyard"
 _WITH_RESUME: Final = ("resume", "scenario", "cluster")
-"""Options that go with `--resume`; the run folder says the others."""
+"""Options allowed with `--resume`; the run folder fixes the others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,7 @@ class TrainCommand(ClusterOptions):
     )
 
     def how_to_resume(self) -> str:
-        """Return how an interrupted training goes on."""
+        """Return the way to resume an interrupted training."""
         folder = self.resume or self.run
         if folder is None:
             return ""
@@ -102,7 +102,7 @@ class TrainCommand(ClusterOptions):
         return "the run had not begun: the same command begins anew"
 
     def __call__(self) -> None:
-        """Train, and print what came of it."""
+        """Train, and print the result."""
         with running_on(self.cluster):
             if self.resume is not None:
                 result = self._go_on(self.resume)
@@ -177,7 +177,7 @@ def _print_result(result: "TrainingResult") -> None:
 
 
 def _draw_proposal(folder: "RunFolder", scenario: Scenario, threat: str) -> Path:
-    """Draw what the agent proposes on the run's scenario, a known charge drawn; return the file."""
+    """Draw the agent's proposal for the run's scenario, with a charge if known; return the file."""
     from blast_agents.training import load_agent, newest_weights
 
     agent = load_agent(folder.path, newest_weights(folder.path))

@@ -14,13 +14,13 @@ from blast_env.scenario import find_problems
 class ValidateCommand(Command):
     """Check scenario files: what is wrong with each, or what it is (not) good for.
 
-    The exit code is 0 when all files are good, 1 when one has a problem.
+    The exit code is 0 if all files are valid, 1 if one has a problem.
     """
 
     files: tuple[str, ...] = argument("Scenario files, or bundled names.")
 
     def __call__(self) -> None:
-        """Print what there is to say of each file."""
+        """Print the problems of each file, or its uses and limits."""
         bad_files = 0
         for name in self.files:
             problems = find_problems(name)
@@ -34,7 +34,7 @@ class ValidateCommand(Command):
 
 
 def _print_suitability(name: str) -> None:
-    """Print what a sound file is good for, and all that it is not good for."""
+    """Print the uses of a valid file, and its limits."""
     found = suitability(name)
     print_line(f"{name}: good for {'; '.join(found.uses)}", style="green")
     for limit in found.limits:
