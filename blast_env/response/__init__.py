@@ -1,1 +1,1 @@
-"""From load to consequence: what breaks, what stands, and what that costs."""
+"""From load to consequence: response and damage of facades, barriers, buildings and people."""

@@ -1,14 +1,14 @@
-"""Barriers as rigid bodies: does a piece stand, slide or overturn under what it stops?
+"""Barriers as rigid bodies that stand, slide, rock or overturn under a blast.
 
 A piece of mass M, height H and base width B stands on the ground. The pressures on its two sides
-push it with a force F(t) that acts at half its height:
+exert a force F(t) at half its height:
 
-    sliding       M x'' = F(t) - mu M g sign(x'), from where |F| passes mu M g
+    sliding       M x'' = F(t) - mu M g sign(x'), once |F| exceeds mu M g
     overturning   I theta'' = F(t) H / 2 cos theta - M g (B / 2 cos theta - H / 2 sin theta)
 
-about the far edge of its base, with I = M (H^2 + B^2) / 3. It overturns when its middle passes the
-edge. An anchored piece neither slides nor rocks until its anchors' capacity is passed, and then
-goes on as one that is not anchored.
+about the far edge of its base, with I = M (H^2 + B^2) / 3. It overturns when its centre passes the
+edge. An anchored piece does not move if the force stays within its anchors' capacity; otherwise it
+is treated as unanchored throughout.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 
 CONCRETE_KG_M3: Final = 2400.0
-"""Density of what a piece is made of, unless its mass is given."""
+"""Density of a piece, unless its mass is given."""
 
 FRICTION: Final = 0.5
 """Coefficient of friction of a piece on the ground, unless given: an assumption."""
@@ -33,7 +33,7 @@ _AFTER_S: Final = 3.0
 
 
 class Standing(StrEnum):
-    """What becomes of a piece."""
+    """Outcome of a blast for a piece."""
 
     STANDS = "stands"
     SLIDES = "slides"
@@ -50,7 +50,7 @@ class RigidPiece:
         base_m: Width of its base.
         mass_kg_m: Mass per metre of length.
         friction: Coefficient of friction with the ground.
-        anchor_n_m: Horizontal force that its anchors hold, N per metre; 0 without anchors.
+        anchor_n_m: Horizontal capacity of its anchors, N per metre; 0 without anchors.
     """
 
     height_m: float
@@ -70,16 +70,16 @@ class RigidPiece:
         friction: float | None = None,
         anchorage_n: float = 0.0,
     ) -> "RigidPiece":
-        """Return a piece by its size; what is not given is that of a solid block of concrete.
+        """Return a piece of a given size, by default a solid block of concrete.
 
         Args:
-            length_m: Length, across the push.
-            thickness_m: Thickness, along the push.
+            length_m: Length, perpendicular to the force.
+            thickness_m: Thickness, parallel to the force.
             height_m: Height.
-            mass_kg: Mass of the whole piece.
-            base_width_m: Width of its base; its thickness unless given.
-            friction: Coefficient of friction with the ground.
-            anchorage_n: Horizontal force that all its anchors hold together.
+            mass_kg: Mass of the whole piece; that of solid concrete by default.
+            base_width_m: Width of its base; its thickness by default.
+            friction: Coefficient of friction with the ground; `FRICTION` by default.
+            anchorage_n: Horizontal capacity of all its anchors together.
         """
         block_kg = CONCRETE_KG_M3 * length_m * thickness_m * height_m
         return cls(
@@ -108,12 +108,12 @@ class RigidPiece:
 
 @dataclass(frozen=True, eq=False)
 class PieceResponses:
-    """What pieces did.
+    """Responses of pieces to a blast.
 
     Attributes:
-        slide_m: How far they slid, m (pieces,).
-        tilt: Largest tilt over that at which they overturn (pieces,); 1 and more have overturned.
-        overturn_s: When they overturned; infinite where they did not (pieces,).
+        slide_m: Largest sliding displacement, m (pieces,).
+        tilt: Largest tilt over the tilt of overturning (pieces,); 1 and more have overturned.
+        overturn_s: Time of overturning; infinite if they do not overturn (pieces,).
         held: Whether the anchors held (pieces,).
     """
 
@@ -124,7 +124,7 @@ class PieceResponses:
 
     @property
     def standing(self) -> list[Standing]:
-        """In a word, one a piece: the worst that happened."""
+        """Worst outcome of each piece; tilts up to 0.05 and slides up to 10 mm are neglected."""
         return [
             Standing.OVERTURNS
             if tilt >= 1.0
@@ -140,15 +140,15 @@ class PieceResponses:
 def piece_responses(
     pieces: Sequence[RigidPiece], time_s: FloatArray, pressure_pa: FloatArray
 ) -> PieceResponses:
-    """Return what each piece does under the difference of the pressures on its sides.
+    """Return the response of each piece to the difference of the pressures on its sides.
 
     Args:
         pieces: The pieces.
         time_s: Times of the histories, ascending (times,).
-        pressure_pa: Mean pressure on one side less that on the other, a piece (pieces, times).
+        pressure_pa: Mean pressure on one side less that on the other (pieces, times).
 
     Raises:
-        BlastEnvError: If the histories are not one a piece.
+        BlastEnvError: If there is not one history per piece.
     """
     if pressure_pa.shape != (len(pieces), len(time_s)):
         raise BlastEnvError(

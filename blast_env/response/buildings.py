@@ -1,7 +1,8 @@
 """Whole buildings and people on the ground: probabilities from side-on pressure and impulse.
 
-For neighbours without a facade description, and for contours on the ground. Probits give a
-probability P = normal(Y - 5); P_s is the side-on peak in Pa, i_s the side-on impulse in Pa s:
+For neighbouring buildings without a facade description, and for contours on the ground. A probit Y
+gives a probability P = normal(Y - 5); P_s is the side-on peak in Pa, i_s the side-on impulse in
+Pa s:
 
     minor damage      Y = 5 - 0.26 ln[(4600 / P_s)^3.9 + (110 / i_s)^5.0]
     major damage      Y = 5 - 0.26 ln[(17500 / P_s)^8.4 + (290 / i_s)^9.3]
@@ -49,7 +50,7 @@ _BUILDINGS = {
 def building_damage_probability(
     damage: BuildingDamage, peak_pa: FloatArray, impulse_pa_s: FloatArray
 ) -> FloatArray:
-    """Return how likely a house is damaged so badly.
+    """Return the probability that a house has at least the given damage.
 
     Args:
         damage: The damage.
@@ -64,13 +65,13 @@ def building_damage_probability(
 
 
 def eardrum_rupture_probability(peak_pa: FloatArray) -> FloatArray:
-    """Return how likely an eardrum ruptures at side-on peak overpressures (places,)."""
+    """Return the probability of eardrum rupture at side-on peak overpressures in Pa (places,)."""
     with np.errstate(divide="ignore"):
         return _probability(-15.6 + 1.93 * np.log(np.asarray(peak_pa)))
 
 
 def eardrum_peak_pa(probability: float) -> float:
-    """Return the side-on peak overpressure at which so many eardrums rupture."""
+    """Return the side-on peak overpressure for a probability of eardrum rupture, Pa."""
     from scipy.special import ndtri
 
     return float(np.exp((5.0 + ndtri(probability) + 15.6) / 1.93))
@@ -78,12 +79,12 @@ def eardrum_peak_pa(probability: float) -> float:
 
 @dataclass(frozen=True)
 class GroundThreshold:
-    """A side-on peak overpressure from which something must be expected on the ground.
+    """A side-on peak overpressure from which an effect must be expected on the ground.
 
     Attributes:
-        words: What.
-        peak_pa: From which peak.
-        source: Where that was read.
+        words: The effect.
+        peak_pa: Least side-on peak overpressure for it.
+        source: Source of the value.
     """
 
     words: str
@@ -98,7 +99,7 @@ _EISENBERG = "the probit of Eisenberg and others, 1975"
 
 
 def ground_thresholds() -> tuple[GroundThreshold, ...]:
-    """Return the thresholds that assembly points are chosen by, the smallest peak first."""
+    """Return the thresholds for the choice of assembly points, the smallest peak first."""
     return (
         GroundThreshold("one window in ten broken", 2070.0, _CLANCEY),
         GroundThreshold("windows usually shattered", 3400.0, _CLANCEY),
@@ -115,7 +116,7 @@ def _probability(probit: FloatArray) -> FloatArray:
 
 
 class LevelOfProtection(IntEnum):
-    """Level of protection of a building in the terms of UFC 4-010-01, the better the larger."""
+    """Level of protection of a building in the terms of UFC 4-010-01; a higher value is better."""
 
     BELOW_STANDARDS = 0
     VERY_LOW = 1
@@ -125,15 +126,15 @@ class LevelOfProtection(IntEnum):
 
     @property
     def label(self) -> str:
-        """Its name in lower case."""
+        """Name in lower case."""
         return self.name.lower().replace("_", " ")
 
     @classmethod
     def named(cls, label: str) -> "LevelOfProtection":
-        """Return the level of a name; it has to be one that a building can be meant to reach.
+        """Return the level with a label; `BELOW_STANDARDS` is not allowed as a target.
 
         Raises:
-            UnknownNameError: If there is none; the message has the nearest one.
+            UnknownNameError: If no level has that label; the message suggests the nearest one.
         """
         levels = {each.label: each for each in cls if each is not cls.BELOW_STANDARDS}
         if label not in levels:
@@ -142,13 +143,13 @@ class LevelOfProtection(IntEnum):
 
 
 def level_of_protection(worst: DamageLevel) -> LevelOfProtection:
-    """Return the level that a component's damage allows a building.
+    """Return the level of protection that corresponds to a building's worst component damage.
 
-    Superficial damage is in keeping with a high level, moderate with medium, heavy with low, and
-    hazardous failure with very low (PDC-TR 06-08 bands the four levels of UFC 4-010-01 by the
-    damage of its components; non-structural exterior walls are taken as they are here).
+    Superficial damage corresponds to a high level, moderate to medium, heavy to low, and hazardous
+    failure to very low (PDC-TR 06-08 assigns the four levels of UFC 4-010-01 by the damage of the
+    components; these are its bands for non-structural exterior walls).
 
     Args:
-        worst: The worst damage among its components.
+        worst: The worst damage among the components.
     """
     return LevelOfProtection(DamageLevel.BLOWOUT - worst)

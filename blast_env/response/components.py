@@ -1,8 +1,8 @@
-"""What facades are made of: a catalogue of ordinary components, and own ones.
+"""Components of facades: a catalogue of common ones, and those of a scenario.
 
 A component fills a bay: windows, wall panels, or both side by side. The catalogue is
-`data/components.toml`; every entry says where its properties come from. A scenario may define
-components of its own with the same keys, by section properties where none of the kinds fits.
+`data/components.toml`; every entry gives the source of its properties. A scenario may define
+further components with the same keys, by section properties if none of the kinds fits.
 """
 
 import tomllib
@@ -25,10 +25,10 @@ class _Component(BaseModel):
     """Base of components.
 
     Attributes:
-        title: For people.
-        source: Where its properties come from.
-        cost_m2: What it costs to put it in place of another one, per area; `None` if it is not
-            for sale.
+        title: Title for display.
+        source: Source of its properties.
+        cost_m2: Cost of installing it in place of another one, per m2; `None` if it is not
+            available as a replacement.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -39,16 +39,16 @@ class _Component(BaseModel):
 
 
 class Glazing(_Component):
-    """Windows: as many equal panes as the bay has room for, one at least.
+    """Windows: as many equal panes as fit into the bay, at least one.
 
     Attributes:
         width_m: Width of a pane.
         height_m: Height of a pane.
-        thickness_mm: Least thickness of the glass by its norm; of laminated glass that of all
-            plies together.
+        thickness_mm: Minimum thickness of the glass by its standard; of laminated glass, the sum
+            of all plies.
         glass: Heat treatment.
-        interlayer: Whether an interlayer or a film holds the fragments, and how well.
-        outer_thickness_mm: Of double glazing, the outer pane; 0 for single.
+        interlayer: Interlayer or film that retains the fragments; `None` without one.
+        outer_thickness_mm: Thickness of the outer pane of double glazing; 0 for single.
         sill_m: Height of the lower edge above the floor.
     """
 
@@ -63,7 +63,7 @@ class Glazing(_Component):
 
     @property
     def pane(self) -> Pane:
-        """One pane of it."""
+        """One of its panes."""
         return Pane(
             self.width_m,
             self.height_m,
@@ -79,9 +79,9 @@ class Wall(_Component):
     """A wall panel that spans from floor to floor.
 
     Attributes:
-        section: What it is made of.
-        supports: How it is held by the floors.
-        span_m: Its span; the height of the storey unless given.
+        section: Its section.
+        supports: Its support by the floors.
+        span_m: Its span; the height of the storey by default.
     """
 
     kind: Literal["wall"] = "wall"
@@ -90,7 +90,7 @@ class Wall(_Component):
     span_m: _Positive | None = None
 
     def panel(self, storey_m: float) -> Panel:
-        """Return a panel of it in a storey of such a height."""
+        """Return its panel in a storey of a given height."""
         return Panel(self.section, storey_m if self.span_m is None else self.span_m, self.supports)
 
 
@@ -102,10 +102,10 @@ _READ: Final[TypeAdapter[dict[str, Glazing | Wall]]] = TypeAdapter(dict[str, Com
 
 @cache
 def catalogue() -> dict[str, Glazing | Wall]:
-    """Return the components that come with the package, by name.
+    """Return the components of the package, by name.
 
     Raises:
-        BlastEnvError: If the file is not what it ought to be.
+        BlastEnvError: If the file is invalid.
     """
     text = files("blast_env.response").joinpath("data", "components.toml").read_text("utf-8")
     try:
@@ -115,10 +115,10 @@ def catalogue() -> dict[str, Glazing | Wall]:
 
 
 def find_component(name: str, own: dict[str, Glazing | Wall] | None = None) -> Glazing | Wall:
-    """Return a component by name: an own one, or one of the catalogue.
+    """Return a component by name, of a scenario (`own`) or else of the catalogue.
 
     Raises:
-        UnknownNameError: If there is none; the message has the nearest one.
+        UnknownNameError: If there is none; the message suggests the nearest one.
     """
     known = {**catalogue(), **(own or {})}
     if name not in known:

@@ -1,9 +1,9 @@
-"""Damage of bays as numbers, under each component that they have or may get.
+"""Damage of bays as numbers, for each component that they have or may be given.
 
-A damage grows within its level and from level to level: below 1 it allows a high level of
+A damage increases within its level and from level to level: below 1 it allows a high level of
 protection, from 1 medium, from 2 low, from 3 very low, from 4 to 5 none (`GlazingResponses.hazard`,
-`Limits.measure`). So there is something to climb everywhere. Other components need no new blast:
-what each of them would do is here.
+`Limits.measure`). A search thus has a gradient everywhere. The damage of other components needs no
+new blast.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,13 +18,13 @@ from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpe
 
 @dataclass(frozen=True)
 class Alternatives:
-    """A bay with what may stand in it.
+    """A bay with its possible components.
 
     Attributes:
         name: Name of the bay.
         structure: Name of its structure.
-        glazing: The windows that it may have, by the name of their component.
-        wall: The wall panels that it may have, by the name of their component.
+        glazing: Possible windows, by the name of their component.
+        wall: Possible wall panels, by the name of their component.
     """
 
     name: str
@@ -42,7 +42,7 @@ class BayDamage:
         structure: Name of its structure.
         area_m2: Its area.
         glazed_m2: Area of its panes.
-        damage: By the name of the component that it has or may get.
+        damage: Damage by the name of the component, present or possible.
     """
 
     name: str
@@ -58,17 +58,16 @@ def bay_damages(
     pressure_pa: FloatArray,
     peak_factor: float = 1.0,
 ) -> tuple[BayDamage, ...]:
-    """Return the damage of bays under each of their components.
+    """Return the damage of bays with each of their possible components.
 
-    Cells clip peaks. No search shall rest on that: the worse counts of histories as they are and of
-    sharper ones with the same impulse.
+    Cells clip peaks. To keep searches from exploiting that, the result is the worse of the damage
+    under the histories and under sharper ones of the same impulse.
 
     Args:
         bays: The bays.
         time_s: Times of the histories, ascending (times,).
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
-        peak_factor: What peaks are multiplied by to be as sharp as in the open; 1 where nothing
-            clips them.
+        peak_factor: Factor on peaks to make them as sharp as in the open; 1 without clipping.
     """
     places = [
         (index, name, filled)
@@ -90,7 +89,7 @@ def bay_damages(
 
 
 def _numbers(found: FacadeResponse) -> FloatArray:
-    """Return the damage of bays that have either windows or a wall panel."""
+    """Return the damage of bays with either windows or a wall panel (bays,)."""
     damage = np.zeros(len(found.bays))
     damage[found.glazed] = found.glazing.hazard
     damage[found.walled] = found.walls.damage
@@ -98,7 +97,7 @@ def _numbers(found: FacadeResponse) -> FloatArray:
 
 
 class TriangularLoads:
-    """Bays that all have one triangular load: a rough guess without histories.
+    """Bays under a common triangular load: a rough estimate without histories.
 
     Args:
         bays: The bays.
@@ -112,8 +111,8 @@ class TriangularLoads:
         """Return the damage of the bays.
 
         Args:
-            peak_pa: The peak, reached at once; from there it falls straight to 0.
-            impulse_pa_s: The impulse, which says how long that takes.
+            peak_pa: Peak, reached at once, from which the pressure falls linearly to 0.
+            impulse_pa_s: Impulse, which determines the duration.
         """
         if not self._bays:
             return ()
@@ -129,28 +128,28 @@ class TriangularLoads:
 
 
 def _kind(bay: Alternatives) -> tuple[object, ...]:
-    """Return what its response depends on, beside the load."""
+    """Return the properties that determine a bay's response, besides the load."""
     height_m = next(iter((*bay.glazing.values(), *bay.wall.values()))).bay.height_m
     return round(height_m, 6), *bay.glazing, None, *bay.wall
 
 
 def _areas(bay: Alternatives) -> tuple[float, float]:
-    """Return the area of a bay, and of its panes."""
+    """Return the area of a bay, and the largest area of panes of its components, m2."""
     filled = (*bay.glazing.values(), *bay.wall.values())
     glazed_m2 = max((each.glazed_m2 for each in filled), default=0.0)
     return filled[0].bay.area_m2, glazed_m2
 
 
 def level_of(worst_damage: float) -> LevelOfProtection:
-    """Return the level of protection that the worst damage among components allows."""
+    """Return the level of protection that corresponds to the worst damage of components."""
     return LevelOfProtection(max(4 - int(worst_damage), 0))
 
 
 def worst(damages: Iterable[float]) -> float:
-    """Return the largest of damages; 0 of none."""
+    """Return the largest damage; 0 if there is none."""
     return max(damages, default=0.0)
 
 
 def fails_from(target: LevelOfProtection) -> float:
-    """Return the damage from which a component does not allow a level any more."""
+    """Return the damage from which a component no longer allows a level of protection."""
     return float(5 - target)

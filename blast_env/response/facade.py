@@ -1,8 +1,8 @@
-"""Bays: the walls of a building divided by storeys and axes, and what becomes of each.
+"""Bays, the divisions of a building's walls by storeys and axes, and their response.
 
-A bay is a storey high and about a module of the facade wide. It holds components: windows, wall
-panels, or both side by side. Its load is the mean overpressure over the bay, so that one history
-serves all that stands in it.
+A bay is one storey high and about one module of the facade wide. It has components: windows, wall
+panels, or both side by side. Its load is the mean overpressure over the bay; all its components
+share that history.
 """
 
 from collections.abc import Sequence
@@ -22,15 +22,15 @@ from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane, g
 from blast_env.response.walls import DamageLevel, Panel, PanelResponses, panel_responses
 
 STOREY_M = 3.5
-"""Height of a storey unless a facade says otherwise."""
+"""Default height of a storey."""
 
 BAY_M = 3.0
-"""Width of a bay unless a facade says otherwise."""
+"""Default width of a bay."""
 
-_FINER = 4  # times are so much finer where histories are sharpened
+_FINER = 4  # refinement of the times of sharpened histories
 
 _CELLS_OF_HALF_A_PEAK: Final = 9.3
-"""Cells per m/kg^(1/3) of a charge with which peaks are about half of Kingery and Bulmash's."""
+"""Cells per m/kg^(1/3) at which peaks are about half of Kingery and Bulmash's."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Bay:
 
     Attributes:
         structure: Name of the structure.
-        wall: The side that it looks to: west, east, south or north.
+        wall: The side that it faces: west, east, south or north.
         storey: Counted from 1 at the ground.
         number: Counted from 1 along the wall, from west to east or from south to north.
-        left_m: Where it begins along the wall: x or y on the site.
-        right_m: Where it ends.
+        left_m: Its beginning along the wall: x or y on the site.
+        right_m: Its end along the wall.
         floor_m: Height of its floor above the ground.
         top_m: Height of its upper edge.
     """
@@ -79,7 +79,7 @@ class Bay:
 
 
 def storeys_in(rise_m: float, storey_m: float) -> int:
-    """Return how many storeys fit: what is left is one if it is at least half of one."""
+    """Return the number of storeys, at least 1; a remainder of half a storey or more is another."""
     return max(1, floor(rise_m / storey_m + 0.5))
 
 
@@ -94,17 +94,17 @@ def divide(
 ) -> tuple[Bay, ...]:
     """Return the bays of a block, wall by wall, storey by storey.
 
-    The uppermost storey takes what is left, if that is at least half of one, else it goes to the
-    storey below. Bays of a wall are equally wide, as near to the width asked for as they can be.
+    A remaining height of at least half a storey is the uppermost storey; a smaller one is added to
+    the storey below. The bays of a wall have equal widths, as close as possible to `bay_m`.
 
     Args:
         structure: Name of the structure.
-        ground_m: Where it stands.
-        height_m: Its height above the ground.
-        walls: Which walls: west, east, south, north.
+        ground_m: Its outline on the ground.
+        height_m: Height of its top above the ground.
+        walls: The walls to divide, of west, east, south, north.
         storey_m: Height of a storey.
-        bay_m: Width of a bay.
-        base_m: Height at which it begins.
+        bay_m: Intended width of a bay.
+        base_m: Height of its base above the ground.
 
     Raises:
         BlastEnvError: If a size is not positive.
@@ -143,12 +143,12 @@ def divide(
 
 @dataclass(frozen=True)
 class FilledBay:
-    """A bay with what stands in it.
+    """A bay with its components.
 
     Attributes:
         bay: The bay.
-        glazing: Its windows, if it has some.
-        wall: Its wall panel, if it has one.
+        glazing: Its windows; `None` without.
+        wall: Its wall panel; `None` without.
     """
 
     bay: Bay
@@ -175,7 +175,7 @@ class FilledBay:
 
     @property
     def panes(self) -> int:
-        """How many panes it has: as many as fit side by side."""
+        """Number of panes: as many as fit side by side."""
         if self.glazing is None:
             return 0
         return max(1, int(self.bay.width_m / self.glazing.width_m + 1e-9))
@@ -188,16 +188,16 @@ class FilledBay:
 
 @dataclass(frozen=True, eq=False)
 class FacadeResponse:
-    """What became of the bays of a facade under one blast.
+    """Response of the bays of a facade to one blast.
 
     Attributes:
         bays: The bays.
         time_s: Times of the histories (times,).
         pressure_pa: Mean overpressure on each bay (bays, times).
-        glazed: Which bays have windows, indices (glazed,).
-        glazing: What their panes did.
-        walled: Which bays have wall panels, indices (walled,).
-        walls: What those did.
+        glazed: Indices of the bays with windows (glazed,).
+        glazing: Responses of their panes.
+        walled: Indices of the bays with wall panels (walled,).
+        walls: Responses of the panels.
     """
 
     bays: tuple[FilledBay, ...]
@@ -209,7 +209,7 @@ class FacadeResponse:
     walls: PanelResponses
 
     def or_worse(self, other: "FacadeResponse") -> "FacadeResponse":
-        """Return for each pane and panel of the same bays what it did here or there, if worse."""
+        """Return the worse of two responses for each pane and panel of the same bays."""
         return replace(
             self,
             glazing=self.glazing.or_worse(other.glazing),
@@ -218,13 +218,13 @@ class FacadeResponse:
 
     @property
     def broken_panes(self) -> float:
-        """How many panes are expected to break."""
+        """Expected number of broken panes."""
         counts = np.array([self.bays[index].panes for index in self.glazed.tolist()])
         return float(counts @ self.glazing.break_probability) if len(counts) else 0.0
 
     @property
     def panes(self) -> int:
-        """How many panes there are."""
+        """Number of panes."""
         return sum(bay.panes for bay in self.bays)
 
     @property
@@ -234,7 +234,7 @@ class FacadeResponse:
 
     @property
     def worst_damage(self) -> DamageLevel:
-        """Damage of the worst wall panel; superficial where there are none."""
+        """Damage of the worst wall panel; superficial if there are none."""
         return max(self.walls.levels, default=DamageLevel.SUPERFICIAL)
 
     @property
@@ -244,33 +244,33 @@ class FacadeResponse:
 
     @property
     def total_damage(self) -> float:
-        """The damage of all components, added up."""
+        """Sum of the damage of all components."""
         return float(self.glazing.hazard.sum() + self.walls.damage.sum())
 
     @property
     def level_of_protection(self) -> LevelOfProtection:
-        """Level of protection of the building: what its worst component allows."""
+        """Level of protection of the building, that of its worst component."""
         return min(level_by_glass(self.worst_condition), level_of_protection(self.worst_damage))
 
     @cached_property
     def glass_levels(self) -> dict[int, LevelOfProtection]:
-        """What level the panes of each bay allow, by its index."""
+        """Level of protection by the panes of each bay, by its index."""
         conditions = map(GlazingCondition, map(int, self.glazing.condition.tolist()))
         return dict(zip(self.glazed.tolist(), map(level_by_glass, conditions), strict=True))
 
     @cached_property
     def wall_levels(self) -> dict[int, LevelOfProtection]:
-        """What level the wall panel of each bay allows, by its index."""
+        """Level of protection by the wall panel of each bay, by its index."""
         levels = map(level_of_protection, self.walls.levels)
         return dict(zip(self.walled.tolist(), levels, strict=True))
 
 
 def level_by_glass(condition: GlazingCondition) -> LevelOfProtection:
-    """Return the level of protection that the worst pane of a building allows.
+    """Return the level of protection that corresponds to a building's worst pane.
 
-    Its hazard counts, in the words of GSA's table 8-1: none and unbroken high, none and broken
-    medium, very low (3a) low, low (3b) very low, more below standards. That these hazards go with
-    those levels of UFC 4-010-01 is an assumption on the safe side.
+    By the hazards of GSA's table 8-1: none and unbroken is high, none and broken medium, very low
+    (3a) low, low (3b) very low, and more is below standards. This correspondence with the levels of
+    UFC 4-010-01 is a conservative assumption.
     """
     return {
         GlazingCondition.NO_BREAK: LevelOfProtection.HIGH,
@@ -281,9 +281,9 @@ def level_by_glass(condition: GlazingCondition) -> LevelOfProtection:
 
 
 def peak_factor(cell_m: float, tnt_kg: float) -> float:
-    """Return what peaks on cells must be multiplied by to be as sharp as Kingery and Bulmash's.
+    """Return the factor on peaks on cells that makes them as sharp as Kingery and Bulmash's.
 
-    A rule that errs on the safe side: 2 with 9.3 cells per m/kg^(1/3), 1.5 with twice as many
+    A conservative rule: 2 with 9.3 cells per m/kg^(1/3), 1.5 with twice as many
     (`python -m studies.response cells`).
 
     Args:
@@ -296,18 +296,18 @@ def peak_factor(cell_m: float, tnt_kg: float) -> float:
 def sharpened(
     time_s: FloatArray, pressure_pa: FloatArray, factor: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return histories with larger peaks, shorter by as much: impulses stay.
+    """Return histories with higher peaks and shorter durations, of the same impulse.
 
-    Cells smear a front and clip its peak, but keep its impulse. Each history is compressed about
-    the time at which it has risen to half of its peak.
+    Cells smear a front and clip its peak, but preserve its impulse. Each history is compressed in
+    time about its first rise to half of its peak.
 
     Args:
         time_s: Times of the histories, ascending (times,).
         pressure_pa: The histories (bays, times).
-        factor: What pressures are multiplied by, and times after that divided by.
+        factor: Factor on pressures, and divisor of the times from that rise.
 
     Returns:
-        Times, and histories (bays, times); there are more times than before.
+        Times (finer than before), and histories (bays, times).
     """
     steps = np.arange(_FINER * (len(time_s) - 1) + 1) / _FINER
     times_s = np.interp(steps, np.arange(len(time_s)), time_s)
@@ -322,11 +322,11 @@ def sharpened(
 def respond(
     bays: Sequence[FilledBay], time_s: FloatArray, pressure_pa: FloatArray
 ) -> FacadeResponse:
-    """Return what becomes of bays under their histories; no blast is run.
+    """Return the response of bays to their histories; no blast is run.
 
-    The suction that follows a blast pulls back what has been pushed in. No verdict rests on that:
-    each component meets its history with and without suction, and the worse of both counts. That is
-    what practice does, which leaves the negative phase out unless it makes rebound worse.
+    The suction that follows a blast can reduce the deflection inwards. To be conservative, each
+    component is computed with and without suction, and the worse response counts. This agrees with
+    the practice of neglecting the negative phase unless it worsens the rebound.
 
     Args:
         bays: The bays.
@@ -334,7 +334,7 @@ def respond(
         pressure_pa: Mean overpressure on each bay, inwards positive (bays, times).
 
     Raises:
-        BlastEnvError: If the histories are not one a bay.
+        BlastEnvError: If there is not one history per bay.
     """
     if pressure_pa.shape != (len(bays), len(time_s)):
         raise BlastEnvError(
@@ -361,12 +361,12 @@ def respond(
 
 
 def _panes(bays: Sequence[FilledBay]) -> list[Pane]:
-    """Return a pane of each bay with windows; equal ones share one, whose curve is costly."""
+    """Return a pane of each bay with windows; equal panes share one object and its costly curve."""
     return [_pane(each.glazing) for each in bays if each.glazing is not None]
 
 
 def _panels(bays: Sequence[FilledBay]) -> list[Panel]:
-    """Return the panel of each bay with a wall; equal ones share one."""
+    """Return the panel of each bay with a wall; equal panels share one object."""
     return [_panel(each.wall, each.bay.height_m) for each in bays if each.wall is not None]
 
 

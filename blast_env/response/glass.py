@@ -1,7 +1,7 @@
-"""Window panes: do they break, and how far do the fragments fly?
+"""Window panes: breakage, and flight of the fragments.
 
-Before it breaks, a pane is a plate that stiffens as it bends (`plate`): a system of one degree of
-freedom. The probability of breakage is Beason & Morgan's, as in ASTM E1300, with k, m and E of
+Until it breaks, a pane is a single-degree-of-freedom system: a plate that stiffens as it bends
+(`plate`). The probability of breakage is Beason & Morgan's, as in ASTM E1300, with k, m and E of
 weathered glass. A pressure q of duration t breaks a share P of the panes:
 
     P = 1 - exp(-B)        B = k / (ab)^(m-1) (E h^2)^m R(q) (t / 60 s)^(m/16)
@@ -11,13 +11,13 @@ with the resistance of the bent pane as q:
 
     B = [ integral of B_60(q)^(16/m) dt / 60 s ]^(m/16)
 
-Tempered glass carries its glass type factor times as much. Both panes of double glazing bend as
-one: the air between them is shut in for the milliseconds of a blast.
+The resistance of heat-treated glass is larger by its glass type factor. Both panes of double
+glazing bend as one: the air between them cannot escape in the milliseconds of a blast.
 
-Broken, a pane is thrown with the speed that it had and the impulse that is still to come. It
-falls freely from its middle, without drag. Where it lands or hits says its performance condition
-(GSA, Facilities Standards P100, table 8-1). Laminated glass holds together on its interlayer, as a
-stretched membrane, until that tears.
+The fragments of a broken pane fly with its speed at breakage and the remaining impulse, and fall
+freely from its middle, without drag. The place of their impact determines the performance
+condition (GSA, Facilities Standards P100, table 8-1). The interlayer of laminated glass retains the
+fragments, as a stretched membrane, until it tears.
 """
 
 from collections.abc import Sequence
@@ -60,10 +60,10 @@ _PANEL_LOW_M: Final = 0.6
 _BELOW_1: Final = 1.0 - 1e-9
 _SLOWEST_M_S: Final = 1e-3
 _RISK_OF_DAMAGE: Final = WEIBULL_M / STATIC_FATIGUE
-"""B is Brown's integral to this power."""
+"""Exponent of Brown's integral in B."""
 
 _STIFFENING: Final = 3
-"""A pane bent to breaking is so much quicker than at rest: its steps are for that."""
+"""Refinement of the time step, for the shorter period of a pane near breakage than at rest."""
 
 
 class GlassKind(StrEnum):
@@ -75,12 +75,12 @@ class GlassKind(StrEnum):
 
     @property
     def type_factor(self) -> float:
-        """Load that it carries, over that of annealed glass (ASTM E1300, table 1)."""
+        """Load resistance over that of annealed glass (ASTM E1300, table 1)."""
         return {"annealed": 1.0, "heat_strengthened": 2.0, "fully_tempered": 4.0}[self.value]
 
 
 class GlazingCondition(IntEnum):
-    """Performance condition of a pane, GSA P100 table 8-1, the better the smaller."""
+    """Performance condition of a pane, GSA P100 table 8-1; a lower value is better."""
 
     NO_BREAK = 1
     RETAINED = 2
@@ -91,15 +91,15 @@ class GlazingCondition(IntEnum):
 
     @property
     def label(self) -> str:
-        """The name that GSA gives it: 1, 2, 3a, 3b, 4 or 5."""
+        """GSA's name of the condition: 1, 2, 3a, 3b, 4 or 5."""
         return ("1", "2", "3a", "3b", "4", "5")[self.value - 1]
 
 
 class Interlayer(BaseModel):
-    """What holds the fragments of laminated glass together.
+    """Interlayer of laminated glass, which retains the fragments.
 
-    The values for blast are an assumption of this project, with no public table behind them: PVB of
-    1.52 mm as a membrane with the tension of its cohesion, torn at a share of the short side.
+    The default values are an assumption of this project, without a published table: PVB of 1.52 mm
+    as a membrane with the tension of its cohesion, which tears at a share of the short side.
 
     Attributes:
         tension_n_m: Tension of the broken pane in its plane, N/m.
@@ -114,15 +114,15 @@ class Interlayer(BaseModel):
 
 @dataclass(frozen=True)
 class Pane:
-    """A pane of glass in a wall, on all four sides.
+    """A pane of glass in a wall, supported on all four sides.
 
     Attributes:
         width_m: Width.
         height_m: Height.
-        thickness_m: Thickness of the glass, at least that of its norm; of laminated glass, of all
-            plies together: at the speed of a blast they bend as one.
+        thickness_m: Minimum thickness of the glass by its standard; of laminated glass, the sum of
+            all plies, which bend as one at the rate of a blast.
         kind: Heat treatment.
-        interlayer: Of laminated glass; `None` for monolithic.
+        interlayer: Interlayer of laminated glass; `None` for monolithic.
         outer_thickness_m: Thickness of the outer pane of double glazing; 0 for single.
         sill_m: Height of its lower edge above the floor.
     """
@@ -191,11 +191,12 @@ class Pane:
 
     @cached_property
     def thrown_by(self) -> tuple[float, float, float, float, float]:
-        """What the flight of its fragments depends on, beside the load.
+        """Properties that determine the flight of its fragments, besides the load.
 
         Load-mass factor, mass per area, height of its middle above the floor; stiffness of the
-        interlayer's membrane and deflection at which it tears, or -1 without one. A membrane of
-        tension N over sides a and b resists with N pi^2 (1/a^2 + 1/b^2) a unit of its deflection.
+        interlayer's membrane (0 without one) and deflection at which it tears (-1 without one). A
+        membrane of tension N and sides a and b resists with N pi^2 (1/a^2 + 1/b^2) per unit of
+        deflection.
         """
         holds = self.interlayer
         sides = 1.0 / self.width_m**2 + 1.0 / self.height_m**2
@@ -208,10 +209,10 @@ class Pane:
         )
 
     def risk(self, pressure_pa: float, duration_s: float) -> float:
-        """Return B of a constant pressure.
+        """Return B for a constant pressure.
 
         Args:
-            pressure_pa: Pressure on the pane; double glazing bears it with both panes.
+            pressure_pa: Pressure on the pane; both panes of double glazing carry it.
             duration_s: Its duration.
         """
         own = self.curve
@@ -219,9 +220,9 @@ class Pane:
         return float(np.exp(risk) * (duration_s / _REFERENCE_S) ** (WEIBULL_M / STATIC_FATIGUE))
 
     def load_resistance_pa(self, probability: float = 0.008, duration_s: float = 3.0) -> float:
-        """Return the pressure that breaks such a share of panes, Pa (E1300's NFL times its factor).
+        """Return the pressure that breaks a share of panes, Pa (E1300's NFL times its factor).
 
-        Of double glazing it is borne by both panes, and breaks the inner one.
+        For double glazing, both panes carry the pressure, and the inner one breaks.
 
         Args:
             probability: Share of panes that break.
@@ -236,13 +237,13 @@ class Pane:
 
 @dataclass(frozen=True, eq=False)
 class PaneCurve:
-    """What a pane does over the deflection of its middle.
+    """Load and risk of a pane over the deflection of its middle.
 
     Attributes:
-        deflection_m: Ascending (points,).
-        load_pa: Static pressure that bends it so far, both panes (points,).
-        risk_60: B of the inner pane after 60 s there (points,).
-        load_mass_factor: K_LM where it breaks, about.
+        deflection_m: Deflections, ascending (points,).
+        load_pa: Static pressure for that deflection, both panes (points,).
+        risk_60: B of the inner pane after 60 s at that deflection (points,).
+        load_mass_factor: Approximate K_LM at breakage.
     """
 
     deflection_m: FloatArray
@@ -256,7 +257,7 @@ class PaneCurve:
         own = _single(pane, pane.thickness_m)
         weaker = own.load_pa / pane.kind.type_factor
         risk = np.exp(np.interp(np.log(weaker), np.log(own.load_pa), np.log(own.risk_60)))
-        below = weaker < own.load_pa[0]  # risk goes with the power m of the load there
+        below = weaker < own.load_pa[0]  # there, the risk is proportional to the load to the m
         risk[below] = own.risk_60[0] * (weaker[below] / own.load_pa[0]) ** WEIBULL_M
         load = own.load_pa
         if pane.outer_thickness_m:
@@ -281,16 +282,16 @@ class PaneCurve:
 
     @cached_property
     def wear(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Logarithms of the deflection and of the rate of a damage, and the slope (points,).
+        """Logarithms of the deflection and the rate of Brown's integral, and slopes (points,).
 
-        Damage that grows at that rate becomes B.
+        The integral of that rate over time in units of 60 s, to the power m / 16, is B.
         """
         log_m, log_rate = np.log(self.deflection_m), np.log(self.risk_60) / _RISK_OF_DAMAGE
         return log_m, log_rate, _slopes(log_m, log_rate)
 
 
 def _slopes(points: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the slopes of a polyline's segments, each at its end; 0 at the first point."""
+    """Return the slopes of a polyline's segments, each at its end point; 0 at the first point."""
     return np.append(0.0, np.diff(values) / np.diff(points))
 
 
@@ -307,20 +308,21 @@ def _single(pane: Pane, thickness_m: float) -> PaneCurve:
 
 @dataclass(frozen=True, eq=False)
 class GlazingResponses:
-    """What panes did under their histories.
+    """Responses of panes to their histories.
 
     Attributes:
-        peak_m: Largest deflection of a pane that does not break, m (panes,).
+        peak_m: Largest deflection of an unbroken pane, m (panes,).
         break_probability: Share of such panes that break (panes,).
-        break_time_s: When the median of those that break does, s (panes,).
-        speed_m_s: Speed of the fragments of those that break, m/s (panes,); 0 if they are retained.
-        retained: Whether an interlayer holds the fragments (panes,).
-        flight_m: How far they fly before they are on the floor, m (panes,).
-        hit_height_m: Where they hit a panel 3 m behind, above the floor (panes,); below 0 if not.
-        condition: `GlazingCondition` of those that break, or `NO_BREAK` where fewer break than the
-            limit (panes,).
-        hazard: The condition as a number that grows within it: below 1 no break, from 1 retained,
-            from 2 within 1 m, from 3 within 3 m, from 4 to 5 farther (panes,).
+        break_time_s: Median time of breakage of those that break, s (panes,).
+        speed_m_s: Speed of their fragments, m/s; 0 if retained (panes,).
+        retained: 1 if an interlayer retains the fragments, else 0 (panes,).
+        flight_m: Distance of flight to the floor, m (panes,).
+        hit_height_m: Height of impact on a panel 3 m behind, above the floor, m; below 0 if the
+            fragments land before it (panes,).
+        condition: `GlazingCondition` of broken panes; `NO_BREAK` if no larger share than the limit
+            breaks (panes,).
+        hazard: The condition as a number that increases within it: below 1 no break, from 1
+            retained, from 2 within 1 m, from 3 within 3 m, from 4 to 5 farther (panes,).
     """
 
     peak_m: FloatArray
@@ -334,7 +336,7 @@ class GlazingResponses:
     hazard: FloatArray
 
     def or_worse(self, other: "GlazingResponses") -> "GlazingResponses":
-        """Return for each pane what it did here or there, where its hazard is larger."""
+        """Return for each pane the response with the larger hazard."""
         worse = other.hazard > self.hazard
         return GlazingResponses(
             *(np.where(worse, getattr(other, name), own) for name, own in vars(self).items())
@@ -347,16 +349,16 @@ def glazing_responses(
     pressure_pa: FloatArray,
     limit_probability: float = 0.008,
 ) -> GlazingResponses:
-    """Return what each pane does under its own history.
+    """Return the response of each pane to its history.
 
     Args:
         panes: The panes.
         time_s: Times of the histories, ascending (times,).
-        pressure_pa: A history a pane, inwards positive (panes, times).
-        limit_probability: Share of panes that may break and the verdict is still "no break".
+        pressure_pa: One history per pane, inwards positive (panes, times).
+        limit_probability: Largest share of broken panes for the condition `NO_BREAK`.
 
     Raises:
-        BlastEnvError: If the histories are not one a pane.
+        BlastEnvError: If there is not one history per pane.
     """
     if pressure_pa.shape != (len(panes), len(time_s)):
         raise BlastEnvError(
@@ -385,7 +387,7 @@ def glazing_responses(
     klm, mass, middle_m, stiffness, tear_m = np.reshape(
         [each.thrown_by for each in panes], (len(panes), 5)
     ).T
-    # The net impulse so far is K_LM m v: broken, the pane flies on with it and what is to come.
+    # The net impulse so far is K_LM m v: fragments fly on with it and the remaining impulse.
     thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
     stretched = _stretched_share(thrown_m_s, break_m, mass, stiffness, tear_m)
     retained = stretched <= 1.0
@@ -397,7 +399,7 @@ def glazing_responses(
         GlazingCondition.NO_BREAK,
         np.where(retained, GlazingCondition.RETAINED, flight_condition(flight, hit)),
     )
-    # In each condition: how far it is on the way to the next. Risk goes with the power m of a load.
+    # Progress within each condition to the next. The risk is proportional to the load to the m.
     shares = (
         (probability / limit_probability) ** (1.0 / WEIBULL_M),
         stretched,
@@ -421,7 +423,7 @@ def glazing_responses(
 
 
 def flight_condition(flight_m: FloatArray, hit_height_m: FloatArray) -> FloatArray:
-    """Return the conditions of panes whose fragments fly so far, or hit the panel so high."""
+    """Return the conditions of broken panes by distance of flight and height of impact, in m."""
     near = np.where(
         np.asarray(flight_m) <= _NEAR_M, GlazingCondition.WITHIN_1_M, GlazingCondition.WITHIN_3_M
     )
@@ -431,7 +433,7 @@ def flight_condition(flight_m: FloatArray, hit_height_m: FloatArray) -> FloatArr
 
 
 def _hit_height_m(middle_m: FloatArray, speed_m_s: FloatArray) -> FloatArray:
-    """Return where the middle hits a panel 3 m behind; -1 if it is on the floor before."""
+    """Return the height at which the middle hits a panel 3 m behind; -1 if it lands before."""
     falls_s = _PANEL_M / np.maximum(speed_m_s, _SLOWEST_M_S)
     height = middle_m - 0.5 * _GRAVITY_M_S2 * falls_s**2
     return np.where(height > 0.0, height, -1.0)
@@ -444,9 +446,10 @@ def _stretched_share(
     stiffness_pa_m: FloatArray,
     tear_m: FloatArray,
 ) -> FloatArray:
-    """Return the motion over what interlayers take up before they tear; infinite without one.
+    """Return the kinetic energy over the energy that an interlayer absorbs until it tears.
 
-    They move in a shape of half waves, and what moves is all the glass.
+    Infinite without an interlayer. The shape of the motion is a half wave in each direction; the
+    mass is that of all the glass.
     """
     # mean(phi) = 4 / pi^2 and mean(phi^2) = 1 / 4 of half waves
     middle_m_s = thrown_m_s * (4.0 / np.pi**2) / 0.25

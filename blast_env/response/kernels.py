@@ -1,7 +1,7 @@
-"""Compiled loops of the response: apart from the rest, because Numba takes half a second to import.
+"""Compiled loops of the response, in a separate module because Numba takes 0.5 s to import.
 
-The leapfrog method throughout: places at the ends of steps, speeds in their middles. The impulse of
-a history goes into each step exactly.
+The deflections use the leapfrog method, with positions at the ends of steps and speeds at their
+middles; each step has the exact impulse of the history.
 """
 
 from typing import Final
@@ -12,12 +12,12 @@ from numba import njit
 from blast_env.arrays import FloatArray
 
 _MOST_TIMES: Final = 50
-"""What falls is followed for so many times the load and a period."""
+"""Limit of the number of steps, in multiples of those for the load and one period."""
 
 
 @njit(cache=True)
 def end_of_segment(points: FloatArray, at: float, begin: int) -> int:
-    """Return the end of a polyline's segment at a place; it is looked for from `begin` on."""
+    """Return the index of the end of a polyline's segment at a place, searched from `begin`."""
     upper = begin
     while upper < len(points) - 1 and points[upper] < at:
         upper += 1
@@ -28,7 +28,7 @@ def end_of_segment(points: FloatArray, at: float, begin: int) -> int:
 
 @njit(cache=True)
 def straight(points: FloatArray, values: FloatArray, at: float, upper: int) -> float:
-    """Return the value at a place on the straight line through a polyline's segment."""
+    """Return the value at a place on the line through a polyline's segment that ends at `upper`."""
     slope = (values[upper] - values[upper - 1]) / (points[upper] - points[upper - 1])
     value: float = values[upper - 1] + slope * (at - points[upper - 1])
     return value
@@ -36,7 +36,7 @@ def straight(points: FloatArray, values: FloatArray, at: float, upper: int) -> f
 
 @njit(cache=True)
 def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
-    """Return a polyline's value; odd below 0, straight on beyond its end."""
+    """Return a polyline's value, as an odd function, extrapolated linearly beyond its end."""
     size = abs(at)
     value = straight(points, values, size, end_of_segment(points, size, 1))
     return value if at >= 0.0 else -value
@@ -46,9 +46,10 @@ def polyline(points: FloatArray, values: FloatArray, at: float) -> float:
 def impulse_until(
     time_s: FloatArray, pressure_pa: FloatArray, impulse_pa_s: FloatArray, begin: int, at_s: float
 ) -> tuple[float, int]:
-    """Return the impulse of a history until a time, and where in the history that is.
+    """Return the impulse of a history until a time, and the index of the history's segment.
 
-    The impulse at the points of the history is given: a load shorter than a step keeps its own.
+    `impulse_pa_s` is the impulse until each point of the history, so that a load shorter than a
+    step has its exact impulse.
     """
     if at_s <= time_s[0]:
         return 0.0, begin
@@ -79,7 +80,10 @@ def integrate(
     least_steps: int,
     out: FloatArray,
 ) -> None:
-    """Integrate one system until it comes back; `out` gets the fields of `Responses`."""
+    """Integrate one system until it rebounds; write the fields of `Responses` to `out`.
+
+    Ends at the first step after `least_steps` at which the system moves back towards 0.
+    """
     x, offset, is_cracked = 0.0, 0.0, 0.0
     largest, resistance = 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
@@ -128,17 +132,17 @@ def bend(
     steps: int,
     out: FloatArray,
 ) -> None:
-    """Bend a pane that does not break, and find where the median of those that break does.
+    """Integrate the bending of an unbroken pane, and find the median breakage.
 
-    `out` gets the largest deflection, the share that breaks; of the median the time, the place, the
-    speed, and the positive impulse that is still to come. Slopes are those of the segments before
-    the points; damage to the power of `exponent` is the risk B.
+    Writes to `out` the largest deflection and the share of panes that break, then the time, the
+    deflection, the speed and the remaining positive impulse at the median breakage. Slopes are
+    those of the segments before the points; the damage to the power `exponent` is the risk B.
     """
     x, damage, peak = 0.0, 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
     v = pushed / mass
     track, per_step = np.empty((3, steps)), step_s / 60.0
-    bent, worn = 1, 1  # segments of the two polylines: from step to step they hardly move
+    bent, worn = 1, 1  # segments of the two polylines, which change little between steps
     for step in range(steps):
         x += step_s * v
         at_s = time_s[0] + (step + 1) * step_s
@@ -176,7 +180,7 @@ def bend(
 
 @njit(cache=True)
 def slide(force: FloatArray, mass: float, friction: float, step_s: float) -> float:
-    """Return the largest distance from where it stood, per metre of length."""
+    """Return the largest sliding displacement; force, mass and friction are per metre of length."""
     x, v, most = 0.0, 0.0, 0.0
     for push in force:
         if v == 0.0:
@@ -185,7 +189,7 @@ def slide(force: FloatArray, mass: float, friction: float, step_s: float) -> flo
             net = push - friction * (1.0 if v > 0.0 else -1.0)
         new_v = v + net / mass * step_s
         if v != 0.0 and new_v * v < 0.0:
-            new_v = 0.0  # friction stops it, and does not push it back
+            new_v = 0.0  # friction stops it, but does not reverse it
         x += 0.5 * (v + new_v) * step_s
         v = new_v
         most = max(most, abs(x))
@@ -196,7 +200,10 @@ def slide(force: FloatArray, mass: float, friction: float, step_s: float) -> flo
 def rock(
     force: FloatArray, mass: float, height: float, base: float, step_s: float
 ) -> tuple[float, float]:
-    """Return the largest tilt over that at which it overturns, and when it did."""
+    """Return the largest tilt over the tilt of overturning, and the time of overturning in s.
+
+    The time counts from the first step and is infinite if the piece does not overturn.
+    """
     inertia = mass * (height * height + base * base) / 3.0
     limit = np.arctan(base / height)
     angle, speed, most = 0.0, 0.0, 0.0
@@ -211,7 +218,7 @@ def rock(
         speed += moment / inertia * step_s
         new_angle = angle + speed * step_s
         if angle != 0.0 and new_angle * angle < 0.0:
-            new_angle, speed = 0.0, 0.0  # it comes down on its base, and stays
+            new_angle, speed = 0.0, 0.0  # it lands on its base without bouncing
         angle = new_angle
         most = max(most, abs(angle))
         if most >= limit:

@@ -1,21 +1,22 @@
-"""Large deflection of a simply supported glass plate: von Karman's equations, solved once.
+"""Large deflection of a simply supported glass plate by von Karman's equations.
 
-Everything is dimensionless, so that one table serves all panes. With the short side b, the
+All quantities are dimensionless, so that one table serves all panes. With the short side b, the
 thickness h, Young's modulus E and the pressure q
 
     load        q b^4 / (E h^4)
     deflection  w / h
     stress      sigma b^2 / (E h^2)
 
-The edges carry no moment, do not deflect, and slip freely in the plane of the plate, as a pane in
-its gaskets does and as ASTM E1300 assumes:
+The edges carry no moment, do not deflect, and slip freely in the plane of the plate, like a pane in
+gaskets and as ASTM E1300 assumes:
 
     D lap^2 w = q + h L(w, F)          lap^2 F = -(E / 2) L(w, w)
     L(u, v)   = u_xx v_yy - 2 u_xy v_xy + u_yy v_xx
     w = w_nn = 0 and F = F_n = 0 along the edge
 
-(Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, chapter 13). Galerkin's method:
-cosines for w, clamped polynomials for F, Newton's method in small steps of load.
+(Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells, chapter 13). The solution uses
+Galerkin's method with cosines for w and clamped polynomials for F, and Newton's method in small
+steps of load.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 
 POISSON_RATIO: Final = 0.22
-"""Of soda-lime glass, as in ASTM E1300."""
+"""Poisson's ratio of soda-lime glass, as in ASTM E1300."""
 
 _COSINES: Final = 9
 _POLYNOMIALS: Final = 9
@@ -45,12 +46,12 @@ class PlateState:
 
     Attributes:
         load: q b^4 / (E h^4).
-        deflection: Of the centre, w / h.
+        deflection: Deflection of the centre, w / h.
         volume: Mean deflection over the plate, w / h.
         shape_square: Mean of the squared shape (w / w_centre)^2, for the mass factor.
         principal: Principal stresses sigma b^2 / (E h^2) at the points of a quarter, larger first
             (2 faces, points, points, 2); the face away from the load first.
-        weights: Share of the plate's area that a point stands for (points, points); they sum to 1.
+        weights: Share of the plate's area for each point (points, points); they sum to 1.
     """
 
     load: float
@@ -125,7 +126,7 @@ class Plate:
 
     @cached_property
     def _weights(self) -> FloatArray:
-        """Quadrature weights of a quarter (points,), the area of a quarter in all."""
+        """Quadrature weights of a quarter (points,); they sum to its area."""
         weights = np.outer(self._points[1], self._points[1]).ravel()
         return weights * self._half[0] * self._half[1]
 
@@ -133,7 +134,7 @@ class Plate:
     def _stiffness(self) -> FloatArray:
         """Bending stiffness with D / (E h^3) (functions, functions)."""
         _, w_xx, w_yy, _ = self._bending
-        laplacian = w_xx + w_yy  # edges neither deflect nor carry a moment: the rest vanishes
+        laplacian = w_xx + w_yy  # the other terms vanish at these edges
         return (laplacian * self._weights) @ laplacian.T / (12.0 * (1.0 - POISSON_RATIO**2))
 
     @cached_property
@@ -144,7 +145,7 @@ class Plate:
         return np.asarray(np.linalg.inv((laplacian * self._weights) @ laplacian.T), np.float64)
 
     def _solved(self, coefficients: FloatArray, load: float) -> FloatArray:
-        """Return the coefficients of w under a load, beginning with those under a smaller one."""
+        """Return the coefficients of w under a load, starting from those under a smaller load."""
         pushed = load * (self._bending[0] @ self._weights)
         for _ in range(_MOST_ITERATIONS):
             residual, tangent = self._residual(coefficients, pushed)
@@ -167,7 +168,7 @@ class Plate:
         basis = self._bending[0]
         residual = self._stiffness @ coefficients - pushed
         residual -= basis @ (self._weights * _bracket(w, f))
-        changed = _bracket(self._bending[1:], f)  # of w alone, F as it is
+        changed = _bracket(self._bending[1:], f)  # variation of w with F fixed
         with_w = _bracket(self._bending[1:], w)
         moved = -self._compliance @ ((self._membrane[0] * self._weights) @ with_w.T)
         by_membrane = moved.T @ _bracket(self._membrane[1:], w)

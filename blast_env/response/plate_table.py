@@ -1,9 +1,9 @@
-"""The table of plates that glass is judged with: made once by `plate`, and read here.
+"""Precomputed table of glass plates, made with `plate`.
 
-    python -m blast_env.response.plate_table    # makes the table anew, in some 10 s
+    python -m blast_env.response.plate_table    # recomputes the table, in some 10 s
 
-Each row is a plate of one aspect ratio bent to one deflection, everything dimensionless as in
-`plate`. The risk integral is Beason & Morgan's, over both faces:
+Each row is a plate of one aspect ratio at one deflection, dimensionless as in `plate`. The risk
+integral is Beason & Morgan's, over both faces:
 
     R = mean((c sigma ab / (E h^2))^m) over the plate, sigma the larger principal stress, tension
     c = [2 / pi * integral of (cos^2 t + n sin^2 t)^m dt]^(1/m), n the ratio of principal stresses
@@ -34,7 +34,7 @@ _NAME: Final = "glass_plates.csv"
 
 @dataclass(frozen=True, eq=False)
 class PlateCurve:
-    """What a plate of one aspect ratio does over its deflection.
+    """Load, risk and shape of a plate of one aspect ratio over its deflection.
 
     Attributes:
         deflection: w / h of the centre, ascending (points,).
@@ -53,7 +53,7 @@ class PlateCurve:
 
 @cache
 def plate_curve(aspect_ratio: float) -> PlateCurve:
-    """Return the curve of a plate, between those of the table.
+    """Return the curve of a plate, interpolated between those of the table.
 
     Args:
         aspect_ratio: Long over short side, from 1 to 5.
@@ -88,7 +88,7 @@ def _table() -> tuple[FloatArray, FloatArray]:
 def curve_values(aspect_ratio: float) -> FloatArray:
     """Return load, risk, K_LM and mean(phi) over the table's deflections (deflections, 4).
 
-    Solves von Karman's equations: half a second.
+    Solves von Karman's equations, in half a second.
     """
     states = Plate(aspect_ratio).states(_LOADS)
     found = np.array([_values(state, aspect_ratio) for state in states])
@@ -124,7 +124,7 @@ def _biaxial_power(ratio: FloatArray) -> FloatArray:
 
 
 def table_text() -> str:
-    """Return the table as text, with how it was made."""
+    """Return the table as text, with a comment on its origin."""
     lines = [
         "# von Karman plates, edges held and free to slip: blast_env.response.plate_table",
         "aspect_ratio,deflection,load,risk,load_mass_factor,load_factor",

@@ -1,16 +1,16 @@
 """Single-degree-of-freedom systems under a pressure history.
 
-A component of mass per area m deflects by x, measured where it deflects most, in a shape phi:
+A component of mass m per area deflects with a shape phi; x is the largest deflection:
 
     K_LM m x'' + r(x) = p(t)        K_LM = mean(phi^2) / mean(phi)
 
 (Biggs, Introduction to Structural Dynamics, chapter 5; UFC 3-340-02, section 3-13). The resistance
-follows a polyline up to a cap, where the component yields; it unloads parallel to the beginning of
-the polyline. Beyond the deflection at which it cracks it follows a second polyline instead.
+follows a polyline up to a cap, at which the component yields; it unloads parallel to the first
+segment. After the component has cracked, the resistance follows a second polyline instead.
 
-The equation is integrated by the leapfrog method with steps of a hundredth of the shortest period:
-the peak of an elastic system is then right to a thousandth. Pressure runs straight between the
-points of its history, and each step gets its impulse exactly, however short the load is.
+The equation is integrated by the leapfrog method with steps of 1/100 of the shortest period, which
+gives the peak of an elastic system to 0.1 %. The pressure is linear between the points of its
+history, and each step has its exact impulse, however short the load.
 """
 
 from collections.abc import Sequence
@@ -35,13 +35,13 @@ class Resistance:
     """Resistance of a component over its deflection, per loaded area.
 
     Attributes:
-        deflection_m: From 0, ascending (points,).
-        pressure_pa: From 0 (points,); beyond the last point the last slope goes on.
-        cap_pa: Where it yields; infinite for what does not.
-        rebound_cap_pa: The same against rebound.
-        crack_m: Deflection at which it cracks; infinite for what does not.
-        cracked_deflection_m: Deflections of what is left after cracking, ascending (points,).
-        cracked_pressure_pa: Its resistance (points,).
+        deflection_m: Deflections, ascending from 0 (points,).
+        pressure_pa: Resistance from 0 (points,); extrapolated with the last slope.
+        cap_pa: Yield resistance; infinite without yield.
+        rebound_cap_pa: Yield resistance in rebound.
+        crack_m: Deflection at which it cracks; infinite without cracking.
+        cracked_deflection_m: Deflections after cracking, ascending from 0 (points,).
+        cracked_pressure_pa: Resistance after cracking (points,).
 
     Raises:
         BlastEnvError: If deflections do not ascend from 0, or a first slope is not positive.
@@ -68,12 +68,12 @@ class Resistance:
 
     @property
     def stiffness_pa_m(self) -> float:
-        """Slope at no deflection, Pa/m."""
+        """Initial slope, Pa/m."""
         return float(self.pressure_pa[1] / self.deflection_m[1])
 
     @property
     def yield_m(self) -> float:
-        """Deflection at which it yields or cracks, m; infinite for what does neither."""
+        """Deflection at which it yields or cracks, m; infinite if it does neither."""
         if np.isinf(self.cap_pa):
             return self.crack_m
         return float(np.interp(self.cap_pa, self.pressure_pa, self.deflection_m))
@@ -108,12 +108,12 @@ class System:
 
     @cached_property
     def period_s(self) -> float:
-        """Natural period at no deflection, s."""
+        """Natural period at zero deflection, s."""
         return 2.0 * np.pi * self._time_scale_s(self.resistance.stiffness_pa_m)
 
     @cached_property
     def shortest_period_s(self) -> float:
-        """Natural period where it is stiffest, s."""
+        """Natural period at the largest stiffness, s."""
         slopes = np.diff(self.resistance.pressure_pa) / np.diff(self.resistance.deflection_m)
         return 2.0 * np.pi * self._time_scale_s(float(slopes.max()))
 
@@ -123,15 +123,15 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """What systems did under their histories.
+    """Responses of systems to their histories.
 
     Attributes:
         peak_m: Largest deflection inwards, m (systems,).
         rebound_m: Largest deflection outwards, m, 0 or below (systems,).
-        peak_time_s: When the largest deflection was reached, s (systems,).
+        peak_time_s: Time of the largest deflection inwards, s (systems,).
         largest_resistance_pa: Largest resistance inwards, Pa (systems,).
-        permanent_m: Deflection that stays, m (systems,).
-        cracked: Whether it cracked (systems,).
+        permanent_m: Permanent deflection, m (systems,).
+        cracked: 1 if it cracked, else 0 (systems,).
     """
 
     peak_m: FloatArray
@@ -148,16 +148,16 @@ def responses(
     pressure_pa: FloatArray,
     steps_per_period: int = STEPS_PER_PERIOD,
 ) -> Responses:
-    """Return what each system does under its own history.
+    """Return the response of each system to its history.
 
     Args:
         systems: The systems.
         time_s: Times of the histories, ascending (times,).
-        pressure_pa: A history a system; inwards is positive (systems, times).
+        pressure_pa: One history per system, inwards positive (systems, times).
         steps_per_period: Least number of steps in the shortest period of a system.
 
     Raises:
-        BlastEnvError: If the histories are not one a system, or times do not ascend.
+        BlastEnvError: If there is not one history per system, or times do not ascend.
     """
     if pressure_pa.shape != (len(systems), len(time_s)):
         raise BlastEnvError(
@@ -192,7 +192,7 @@ def responses(
 
 
 def impulses(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
-    """Return the impulse of histories until each of their points, Pa s (as the pressures)."""
+    """Return the impulse of histories until each point, Pa s, in the shape of the pressures."""
     steps = 0.5 * (pressure_pa[..., 1:] + pressure_pa[..., :-1]) * np.diff(time_s)
     impulse_pa_s = np.zeros(pressure_pa.shape)
     np.cumsum(steps, axis=-1, out=impulse_pa_s[..., 1:])

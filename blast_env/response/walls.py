@@ -1,12 +1,12 @@
 """Wall panels and slabs: resistance from the section, damage from ductility and support rotation.
 
 Panels span one way between two supports, per metre of width. Their resistance to a uniform pressure
-follows from virtual work, their load-mass factor from the deflected shape, integrated here; a panel
-fixed at both ends passes through an elastic-plastic range, which a single slope of equal work
-stands for (UFC 3-340-02, section 3-13).
+follows from virtual work, and their load-mass factor from integrals of the deflected shape. A panel
+fixed at both ends has an elastic-plastic range, represented by a single slope of equal work (UFC
+3-340-02, section 3-13).
 
 Damage levels are those of PDC-TR 06-08 (Single degree of freedom structural response limits for
-antiterrorism design, US Army Corps of Engineers, 2008). Each limit says where it was read.
+antiterrorism design, US Army Corps of Engineers, 2008). Each limit gives its source.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ _GRAVITY_M_S2: Final = 9.81
 
 
 class DamageLevel(IntEnum):
-    """Damage of a component in the terms of PDC-TR 06-08, the better the smaller."""
+    """Damage of a component in the terms of PDC-TR 06-08; a lower value is better."""
 
     SUPERFICIAL = 0
     MODERATE = 1
@@ -35,7 +35,7 @@ class DamageLevel(IntEnum):
 
 
 class Supports(StrEnum):
-    """How a panel is held along its two supports."""
+    """Support conditions of a panel."""
 
     SIMPLE = "simple"
     FIXED = "fixed"
@@ -44,13 +44,13 @@ class Supports(StrEnum):
 
 @dataclass(frozen=True)
 class Limits:
-    """Where the damage of a component passes from one level into the next.
+    """Limits between the levels of damage of a component.
 
     Attributes:
         ductility: Ductility at the end of superficial, moderate, heavy and hazardous damage; `None`
-            where it does not count.
-        rotation_deg: Support rotation there, degrees.
-        source: Where the limits were read; what is an assumption says so.
+            without a limit.
+        rotation_deg: Support rotation at these limits, degrees; `None` without a limit.
+        source: Source of the limits, or a statement that they are assumptions.
     """
 
     ductility: tuple[float | None, float | None, float | None, float | None]
@@ -60,9 +60,9 @@ class Limits:
     def measure(self, ductility: FloatArray, rotation_deg: FloatArray) -> FloatArray:
         """Return the damage as a number: below 1 superficial, from 1 moderate, from 4 blowout.
 
-        Between two limits it goes up evenly, so that a search has something to climb, and beyond
-        the last one towards 5. Where both ductility and rotation have a limit, the one that is
-        passed first decides. A level that only one of them bounds grows with that one.
+        It increases linearly between limits, to give searches a gradient, and beyond the last
+        one towards 5. If both ductility and rotation limit a level, the one exceeded first
+        decides; if only one of them does, the damage in that level increases with that one.
 
         Args:
             ductility: Largest deflection over that at yield (components,).
@@ -120,7 +120,7 @@ TIMBER_LIMITS: Final = Limits((1.0, 2.0, 3.0, 4.0), (None, None, None, None), _A
 
 
 class PanelSection(Protocol):
-    """What a panel is made of, per metre of width."""
+    """Section of a panel, per metre of width."""
 
     @property
     def mass_kg_m2(self) -> float:
@@ -136,7 +136,7 @@ class PanelSection(Protocol):
 
     @property
     def limits(self) -> Limits:
-        """Where its damage passes from level to level."""
+        """Limits between its levels of damage."""
 
 
 class _Section(BaseModel):
@@ -144,18 +144,19 @@ class _Section(BaseModel):
 
 
 class ReinforcedConcrete(_Section):
-    """Reinforced concrete, as much steel on both faces.
+    """Reinforced concrete, with equal steel at both faces.
 
-    Moment by equilibrium of steel and a rectangular block of concrete, stiffness from the mean of
-    whole and cracked section (UFC 3-340-02, sections 4-9 and 4-11), with dynamic strengths.
+    The moment follows from equilibrium of the steel and a rectangular stress block of concrete, the
+    stiffness from the mean of the uncracked and cracked sections (UFC 3-340-02, sections 4-9 and
+    4-11), with dynamic strengths.
 
     Attributes:
         thickness_m: Thickness.
-        steel_share: Area of tension steel over that of the section above its middle.
-        cover_m: Depth of the middle of the steel under the face.
+        steel_share: Area of tension steel over that of the section above the centre of the steel.
+        cover_m: Depth of the centre of the steel below the face.
         concrete_pa: Compressive strength.
         steel_pa: Yield strength.
-        dynamic_increase: Factor on both strengths at the speed of a blast.
+        dynamic_increase: Factor on both strengths at the strain rates of a blast.
     """
 
     kind: Literal["reinforced_concrete"] = "reinforced_concrete"
@@ -184,7 +185,7 @@ class ReinforcedConcrete(_Section):
 
     @property
     def bending_stiffness_n_m(self) -> float:
-        """E I, the mean of whole and cracked section."""
+        """E I, the mean of the uncracked and cracked sections."""
         concrete_e = 4700e6 * np.sqrt(self.concrete_pa / 1e6)
         ratio = 200e9 / concrete_e
         share = ratio * self.steel_share
@@ -200,11 +201,11 @@ class ReinforcedConcrete(_Section):
 
 
 class Masonry(_Section):
-    """Unreinforced brick or block: it cracks, then rocks on its own weight until it falls.
+    """Unreinforced brick or block: it cracks, then rocks under its weight until it falls.
 
     Attributes:
         thickness_m: Thickness of the wall.
-        density_kg_m3: Of the wall as built.
+        density_kg_m3: Density of the wall as built.
         flexural_pa: Flexural strength at which it cracks.
         young_pa: Young's modulus.
     """
@@ -227,7 +228,7 @@ class Masonry(_Section):
 
     @property
     def bending_stiffness_n_m(self) -> float:
-        """E I of the whole section."""
+        """E I of the uncracked section."""
         return self.young_pa * self.thickness_m**3 / 12.0
 
     @property
@@ -237,13 +238,13 @@ class Masonry(_Section):
 
 
 class Sheeting(_Section):
-    """Anything else that bends elastically and then yields: studs, timber, reinforced block.
+    """Other elastic-plastic sections: studs, timber, reinforced block.
 
     Attributes:
         moment_n: Yield moment per metre of width, N m per m.
         bending_stiffness_n_m: E I per metre of width.
         mass_kg_m2: Mass per area.
-        material: Decides the limits of damage.
+        material: Material, which determines the limits of damage.
     """
 
     kind: Literal["sheeting"] = "sheeting"
@@ -254,7 +255,7 @@ class Sheeting(_Section):
 
     @property
     def limits(self) -> Limits:
-        """Of the material."""
+        """Limits of the material."""
         known = {
             "steel": STEEL_LIMITS,
             "timber": TIMBER_LIMITS,
@@ -268,9 +269,9 @@ class Panel:
     """A wall panel or slab that spans one way.
 
     Attributes:
-        section: What it is made of.
-        span_m: Distance between its supports; of a cantilever its length.
-        supports: How it is held.
+        section: Its section.
+        span_m: Distance between its supports; length of a cantilever.
+        supports: Its support conditions.
     """
 
     section: ReinforcedConcrete | Masonry | Sheeting
@@ -291,10 +292,10 @@ class Panel:
     def _strength(self) -> tuple[float, float]:
         """Return stiffness and ultimate resistance per area, Pa/m and Pa.
 
-        Ultimate resistance by virtual work of the hinges: 8, 16 and 2 M / L^2. Elastic stiffness:
-        384 E I / (5 L^4), E I 384 / L^4 and 8 E I / L^4. Fixed at both ends, yield begins at 12
-        M / L^2, and goes on with the stiffness of a simple span; one slope of equal work stands for
-        both.
+        For simple, fixed and cantilever supports, the ultimate resistance by virtual work of the
+        hinges is 8, 16 and 2 M / L^2, and the elastic stiffness 384 E I / (5 L^4), 384 E I / L^4
+        and 8 E I / L^4. A panel fixed at both ends begins to yield at 12 M / L^2 and continues with
+        the stiffness of a simple span; a single slope of equal work represents both ranges.
         """
         moment, bending = self.section.moment_n, self.section.bending_stiffness_n_m
         length = self.span_m
@@ -311,10 +312,11 @@ class Panel:
         return cap / yield_m, cap
 
     def _rocking(self, stiffness_pa_m: float, cap_pa: float) -> Resistance:
-        """Return a resistance that is lost with the crack, but for the panel's own weight.
+        """Return a resistance that drops at cracking to that of the panel's weight.
 
-        Cracked at mid-height, its halves rock: at no deflection they resist with what lifts them,
-        4 m g h / L ... at a deflection of their thickness with nothing (Paulay & Priestley 1992).
+        Cracked at mid-height, the halves rock: their resistance falls from 4 m g h / L at zero
+        deflection to 0 at a deflection of the thickness h (Paulay & Priestley 1992). It is 0 at
+        zero deflection and rises over the first hundredth of the thickness.
         """
         section = self.section
         thickness = section.thickness_m  # type: ignore[union-attr]
@@ -335,9 +337,10 @@ class Panel:
 
 
 def load_mass_factors(supports: Supports) -> tuple[float, float]:
-    """Return K_LM = mean(phi^2) / mean(phi) of the elastic and of the plastic shape.
+    """Return K_LM = mean(phi^2) / mean(phi) of the elastic and plastic shapes.
 
-    Elastic is the static deflection under a uniform load, plastic the straight-sided mechanism.
+    The elastic shape is the static deflection under a uniform load, the plastic one the mechanism
+    with straight sides.
     """
     s = (np.arange(2000) + 0.5) / 2000.0
     if supports is Supports.SIMPLE:
@@ -353,7 +356,7 @@ def load_mass_factors(supports: Supports) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class PanelResponses:
-    """What panels did under their histories.
+    """Responses of panels to their histories.
 
     Attributes:
         motion: Their motion.
@@ -369,11 +372,11 @@ class PanelResponses:
 
     @property
     def levels(self) -> list[DamageLevel]:
-        """Levels of damage, one a panel."""
+        """Levels of damage, one per panel."""
         return damage_level(self.damage)
 
     def or_worse(self, other: "PanelResponses") -> "PanelResponses":
-        """Return for each panel what it did here or there, where its damage is larger."""
+        """Return for each panel the response with the larger damage."""
         worse = other.damage > self.damage
         motion = Responses(
             *(
@@ -392,15 +395,15 @@ class PanelResponses:
 def panel_responses(
     panels: Sequence[Panel], time_s: FloatArray, pressure_pa: FloatArray
 ) -> PanelResponses:
-    """Return what each panel does under its own history.
+    """Return the response of each panel to its history.
 
     Args:
         panels: The panels.
         time_s: Times of the histories, ascending (times,).
-        pressure_pa: A history a panel, inwards positive (panels, times).
+        pressure_pa: One history per panel, inwards positive (panels, times).
 
     Raises:
-        BlastEnvError: If the histories are not one a panel.
+        BlastEnvError: If there is not one history per panel.
     """
     motion = responses([panel.system for panel in panels], time_s, pressure_pa)
     most = np.maximum(motion.peak_m, -motion.rebound_m)
