@@ -1,4 +1,4 @@
-"""References, the laws that scale simulated impulses to them, and how well they agree."""
+"""Reference loads, the laws that scale simulated impulses to them, and their agreement."""
 
 from blast_env.calibration.laws import (
     FewDistancesWarning,

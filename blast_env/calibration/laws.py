@@ -1,10 +1,10 @@
-"""The laws that turn simulated impulses into those of a reference (paper, section 3).
+"""The laws that convert simulated impulses into those of a reference (paper, section 3).
 
-A fit takes one impulse a distance: `i_sim` in simulation units and `i_reference` in any unit, for
-the paper's column psi*s. The law answers in the unit of `i_reference`.
+A fit takes one impulse per distance: `i_sim` in simulation units and `i_reference` in any unit, for
+the paper's column psi*s. The law gives impulses in the unit of `i_reference`.
 
-Below them how well a law agrees with the reference (section 3.4), and how sure its coefficients
-are. Beyond the paper: the error at distances that the fit has not seen, and bootstrap intervals.
+The module also has the measures of agreement with the reference (section 3.4) and, beyond the
+paper, the error at distances left out of the fit and bootstrap intervals of the coefficients.
 """
 
 import warnings
@@ -28,12 +28,12 @@ LawName = Literal["proportional", "linear", "power"]
 """The laws that `blast-env calibrate` fits."""
 
 Numbers = Union[Sequence[float], NDArray[Any], "pd.Series"]
-"""Several numbers; a lone one is a float."""
+"""Several numbers; a single number is a float."""
 
 LEAST_DISTANCES: Final = 4
-"""A fit on fewer distances than this warns: two coefficients would pass through almost anything."""
+"""A fit on fewer distances warns: two coefficients then fit almost any data."""
 
-_CONSTANT: Final = 1e-12  # relative spread below which numbers count as equal
+_CONSTANT: Final = 1e-12  # relative spread up to which numbers count as equal
 
 
 class FewDistancesWarning(UserWarning):
@@ -53,7 +53,7 @@ class ScalingLaw(ABC):
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """The coefficients by the paper's names for them."""
+        """The coefficients by their names in the paper."""
         return asdict(self)
 
     @overload
@@ -80,7 +80,7 @@ class ScalingLaw(ABC):
     def inverse(self, i_reference: Numbers) -> FloatArray: ...
 
     def inverse(self, i_reference: float | Numbers) -> float | FloatArray:
-        """Return the simulated impulse that the law turns into `i_reference`.
+        """Return the simulated impulse that the law converts into `i_reference`.
 
         Args:
             i_reference: Impulses in the unit of the reference.
@@ -93,7 +93,7 @@ class ScalingLaw(ABC):
         if self.coefficients[slope] == 0.0:
             raise BlastEnvError(f"{self} has no inverse: {slope} is 0, so it is a constant")
         reference = checked_array("i_reference", i_reference)
-        with np.errstate(all="ignore"):  # whatever is out of reach is refused below
+        with np.errstate(all="ignore"):  # values out of reach are rejected below
             simulated = self._backward(reference)
         out_of_reach = ~(np.isfinite(simulated) & (simulated >= 0.0))
         if out_of_reach.any():
@@ -109,7 +109,7 @@ class ScalingLaw(ABC):
 
     @abstractmethod
     def _backward(self, i_reference: FloatArray) -> FloatArray:
-        """Solve the law for i_sim; out of reach is a negative number, infinity or NaN."""
+        """Solve the law for i_sim; values out of reach give a negative number, infinity or NaN."""
 
 
 Fit = Callable[[Numbers, Numbers], ScalingLaw]
@@ -137,7 +137,7 @@ class ProportionalLaw(ScalingLaw):
 class LinearLaw(ScalingLaw):
     """i_scaled = a + b i_sim (equation 7).
 
-    Not clipped: with a negative `a`, a small impulse becomes a negative one, as in the paper.
+    It is not clipped: with a negative `a`, a small impulse becomes negative, as in the paper.
 
     Attributes:
         a: Offset, unit of the reference.
@@ -159,8 +159,8 @@ class PowerLaw(ScalingLaw):
     """i_scaled = A i_sim^B (section 3.3).
 
     Attributes:
-        A: Unit of the reference; the impulse that i_sim = 1 becomes. Above 0.
-        B: Exponent, no unit.
+        A: Impulse for i_sim = 1, unit of the reference, above 0.
+        B: Exponent, dimensionless.
     """
 
     A: float
@@ -229,14 +229,14 @@ def checked_array(
     """Return numbers as an array of floats.
 
     Args:
-        name: What the numbers are, for the message.
+        name: Name of the numbers for the message.
         values: A number or an array of them.
-        least: Lower bound that is allowed itself.
-        above: Lower bound that is not allowed itself.
-        dimensions: Dimensions that the array must have; None: any.
+        least: Inclusive lower bound.
+        above: Exclusive lower bound.
+        dimensions: Required number of dimensions; `None` for any.
 
     Raises:
-        BlastEnvError: If a number is no number, not finite or out of bounds; the message gives
+        BlastEnvError: If a value is not a number, not finite or out of bounds; the message gives
             its place, its value and the bound.
     """
     try:
@@ -269,7 +269,7 @@ def _like_input(array: FloatArray) -> float | FloatArray:
 
 
 def _checked_pair(i_sim: Numbers, i_reference: Numbers) -> tuple[FloatArray, FloatArray]:
-    """Return the impulses of a fit as arrays (n,), after all checks."""
+    """Check the impulses of a fit and return them as arrays (n,)."""
     x = checked_array("i_sim", i_sim, least=0.0, dimensions=1)
     y = checked_array("i_reference", i_reference, above=0.0, dimensions=1)
     if len(x) != len(y):
@@ -294,7 +294,7 @@ def _checked_pair(i_sim: Numbers, i_reference: Numbers) -> tuple[FloatArray, Flo
 def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Return offset and slope of the least-squares line.
 
-    Equation (8) with both sums taken from the means, which is the same number with less rounding.
+    Equation (8) with deviations from the means, which is equal but has smaller rounding errors.
     """
     from_mean = x - x.mean()
     slope = float(from_mean @ (y - y.mean()) / (from_mean @ from_mean))
@@ -308,9 +308,9 @@ class FitMetrics:
     Attributes:
         mape_percent: Mean absolute percentage error.
         rmse: Root mean squared error, unit of the reference.
-        integral_error_percent: Difference of the areas under the two impulse-distance curves,
-            without its sign, by the trapezoidal rule, in percent of the reference's area. Errors
-            of opposite sign cancel in it.
+        integral_error_percent: Absolute difference of the areas under the two impulse-distance
+            curves, by the trapezoidal rule, in percent of the reference's area. Errors of opposite
+            sign cancel in it.
     """
 
     mape_percent: float
@@ -320,13 +320,13 @@ class FitMetrics:
 
 @dataclass(frozen=True, eq=False)
 class LeaveOneOut:
-    """What a fit says about each distance that it has not seen.
+    """Predictions at each distance by a fit to all others.
 
     Attributes:
         distance_m: Distances (n,).
         predicted: Impulse at each distance by the law of all others, unit of the reference (n,).
-        error_percent: predicted / reference - 1, in percent, with its sign (n,).
-        laws: The law without each distance (n,).
+        error_percent: predicted / reference - 1, in percent (n,).
+        laws: The law fitted without each distance (n,).
         metrics: The measures of `predicted` against the reference.
     """
 
@@ -361,14 +361,14 @@ def fit_metrics(distance_m: Numbers, predicted: Numbers, reference: Numbers) -> 
 
 
 def shape_rms_percent(i_sim: Numbers, expected: Numbers) -> float:
-    """Return how far impulses are from others in shape: rms of c i_sim / expected - 1, percent.
+    """Return the least rms of c i_sim / expected - 1 over c, percent: the difference in shape.
 
     Args:
-        i_sim: Simulated impulse at each distance (n,).
-        expected: Impulse at each distance that it should be proportional to, above 0 (n,).
+        i_sim: Simulated impulse at each distance, above 0 (n,).
+        expected: Impulse at each distance to which it should be proportional, above 0 (n,).
 
     Raises:
-        BlastEnvError: If the numbers are not usable or their numbers differ.
+        BlastEnvError: If a number is not finite or out of bounds, or the lengths differ.
     """
     wanted = checked_array("expected", expected, above=0.0, dimensions=1)
     share = _checked_column("i_sim", i_sim, len(wanted), above=0.0) / wanted
@@ -388,12 +388,13 @@ def leave_one_out(
         fit: One of the fits of `blast_env.calibration.laws`.
 
     Raises:
-        BlastEnvError: If the numbers are not usable, in all or without one of the distances.
+        BlastEnvError: If a number is out of bounds, or no fit is possible with all distances or
+            without one of them.
     """
     distance = _checked_distances(distance_m, least_count=3)
     simulated = _checked_column("i_sim", i_sim, len(distance), least=0.0)
     reference = _checked_column("i_reference", i_reference, len(distance), above=0.0)
-    fit(simulated, reference)  # warns and refuses as for the whole
+    fit(simulated, reference)  # warnings and errors of the fit to all distances
     laws = []
     with _quiet():
         for index, left_out_m in enumerate(distance):
@@ -421,17 +422,17 @@ def bootstrap_coefficients(
 ) -> dict[str, Estimate]:
     """Return percentile intervals of a law's coefficients from the scatter between seeds.
 
-    Whole seeds are drawn with replacement, so that what the distances of a seed have in common
-    stays together, and the law is fitted to the means of each draw. The intervals say how far
-    the coefficients depend on the seeds; they do not say how well the law fits the reference
-    (that is `leave_one_out`), and with fewer than about ten seeds they are too narrow.
+    Whole seeds are drawn with replacement, which preserves the correlation between the distances
+    of a seed, and the law is fitted to the means of each draw. The intervals show the dependence of
+    the coefficients on the seeds, not the agreement with the reference (see `leave_one_out`). With
+    fewer than about ten seeds they are too narrow.
 
     Args:
         i_sim_by_seed: Simulated impulses, simulation units (seeds, distances); at least two seeds.
         i_reference: Reference impulse at each distance, above 0 (distances,).
         fit: One of the fits of this package.
         resamples: Number of draws, at least 100.
-        confidence: Probability that the interval is made for, between 0 and 1.
+        confidence: Confidence level of the interval, between 0 and 1.
         rng_seed: Seed of the draws; one seed gives one result.
 
     Returns:
@@ -473,14 +474,14 @@ def _coefficients(simulated: FloatArray, reference: FloatArray, fit: Fit) -> lis
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep inner fits quiet: the caller was warned about the whole already."""
+    """Suppress the warning of inner fits, which the fit to all distances has issued."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FewDistancesWarning)
         yield
 
 
 def _checked_distances(distance_m: Numbers, least_count: int = 2) -> FloatArray:
-    """Return distances that ascend (n,)."""
+    """Check that distances ascend and return them (n,)."""
     distance = checked_array("distance_m", distance_m, least=0.0, dimensions=1)
     if len(distance) < least_count:
         raise BlastEnvError(
@@ -502,7 +503,7 @@ def _checked_column(
     least: float | None = None,
     above: float | None = None,
 ) -> FloatArray:
-    """Return numbers (count,), one a distance."""
+    """Check that there is one number per distance and return them (count,)."""
     column = checked_array(name, values, least=least, above=above, dimensions=1)
     if len(column) != count:
         raise BlastEnvError(f"{name} has {len(column)} values, must have {count}: one a distance")

@@ -1,6 +1,6 @@
-"""Calibrations: from simulated impulse to impulse per area, stored with all they depend on.
+"""Calibrations, from simulated impulse to impulse per area, stored with all their dependencies.
 
-Below them the unit that the loads of a blast of particles are shown in.
+The module also has the unit for displaying the loads of a blast of particles.
 """
 
 import json
@@ -31,7 +31,7 @@ from blast_env.units import MODULE_SIDE_M, PA_PER_PSI
 from blast_env.values import path_of
 
 SimulatedQuantity = Literal["impulse", "transferred_impulse"]
-"""The paper's sum of m |v|, or the momentum really transferred along the normals."""
+"""The paper's sum of m |v|, or the momentum actually transferred along the normals."""
 
 LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
     {"proportional": ProportionalLaw, "linear": LinearLaw, "power": PowerLaw}
@@ -47,8 +47,8 @@ class ScaledImpulse(NamedTuple):
 
     Attributes:
         pa_s: Impulse per area, Pa*s.
-        in_range: Whether the calibration was made for a case like this one.
-        notes: Why not, a sentence each.
+        in_range: Whether distance and charge are within the calibration's range.
+        notes: Reasons why not, one sentence each.
     """
 
     pa_s: float
@@ -71,13 +71,13 @@ class CalibrationSection(BaseModel):
 
 
 class ReferenceSection(CalibrationSection):
-    """What the law was fitted to.
+    """The reference of a fit.
 
     Attributes:
         source: The paper's UFC column, or Kingery-Bulmash.
-        quantity: What is compared, e.g. `reflected_impulse`.
-        burst: `hemispherical` or `spherical`; None where the source does not say.
-        charge_kg: TNT-equivalent mass; None where the source does not say.
+        quantity: The quantity compared, e.g. `reflected_impulse`.
+        burst: `hemispherical` or `spherical`; `None` if the source does not state it.
+        charge_kg: TNT-equivalent mass; `None` if the source does not state it.
     """
 
     source: Literal["paper UFC column", "Kingery-Bulmash"]
@@ -87,7 +87,7 @@ class ReferenceSection(CalibrationSection):
 
 
 class MetricsSection(CalibrationSection):
-    """How well the law agrees with the reference (`FitMetrics`), rmse in psi*s."""
+    """Agreement of the law with the reference (`FitMetrics`), rmse in psi*s."""
 
     mape_percent: float
     rmse: float
@@ -96,32 +96,32 @@ class MetricsSection(CalibrationSection):
 
 
 class Calibration(CalibrationSection):
-    """A law from simulated impulse to psi*s, and everything that it depends on.
+    """A law from simulated impulse to psi*s, with all its dependencies.
 
     Attributes:
         schema_version: Version of the file format.
         name: Name, as in `load_calibration("ballistic_ufc")`.
         law: Kind of the law.
-        coefficients: Its coefficients, by the paper's names.
+        coefficients: Its coefficients, by their names in the paper.
         coefficient_intervals: Their 95 % intervals (low, high) from the scatter between seeds.
-        reference: What it was fitted to.
+        reference: Reference of the fit.
         preset: Preset of the simulations.
         parameters_digest: Digest of all their parameters.
-        engine: Engine that ran them.
-        engine_version: Its version then.
-        blast_env_version: The package's version then.
+        engine: Engine of the simulations.
+        engine_version: Version of that engine at the time.
+        blast_env_version: Version of the package at the time.
         facade_width_m: Width of the reference structure's facade.
-        ball_radius_m: Radius of an air ball, by which a facade collects on either side.
-        simulated: Which sum over the collisions the law converts.
+        ball_radius_m: Radius of an air ball, by which the facade collects beyond either end.
+        simulated: The sum over the collisions that the law converts.
         tnt_kg: TNT-equivalent mass of the simulated charge.
-        tnt_range_kg: Masses between which the law was found to hold by Hopkinson-Cranz scaling
-            (`python -m studies.hopkinson_cranz`); None: it holds for `tnt_kg` alone.
+        tnt_range_kg: Range of masses in which the law holds with Hopkinson-Cranz scaling
+            (`python -m studies.hopkinson_cranz`); `None` for `tnt_kg` only.
         distances_m: Distances, ascending; the first and last are the range of validity.
         seeds: Seeds at every distance.
         i_sim: Mean simulated impulse at each distance.
         i_sim_ci95: Half-width of its 95 % confidence interval.
         i_reference_psi_s: Reference impulse at each distance.
-        metrics: How well the law agrees.
+        metrics: Agreement of the law with the reference.
     """
 
     schema_version: Literal[1] = 1
@@ -149,7 +149,7 @@ class Calibration(CalibrationSection):
 
     @model_validator(mode="after")
     def _check_parts(self) -> "Calibration":
-        """Refuse parts that do not fit each other."""
+        """Reject inconsistent parts."""
         names = {field.name for field in fields(LAWS[self.law])}
         for key in ("coefficients", "coefficient_intervals"):
             if set(getattr(self, key)) != names:
@@ -164,16 +164,16 @@ class Calibration(CalibrationSection):
         low_kg, high_kg = self.tnt_range_kg or (self.tnt_kg, self.tnt_kg)
         if not 0.0 < low_kg <= self.tnt_kg <= high_kg:
             raise ValueError("tnt_range_kg must be around tnt_kg, and above 0")
-        self.scaling_law  # noqa: B018  # refuses coefficients that are none
+        self.scaling_law  # noqa: B018  # rejects invalid coefficients
         return self
 
     @property
     def scaling_law(self) -> ScalingLaw:
-        """The law; it takes i_sim on the reference facade and gives psi*s."""
+        """The law from i_sim on the reference facade to psi*s."""
         return LAWS[self.law](**self.coefficients)
 
     def check(self, parameters: SimulationParameters, engine: str) -> None:
-        """Refuse a simulation that the calibration was not made with.
+        """Reject a simulation for which the calibration was not made.
 
         Raises:
             CalibrationError: If the engine or any parameter of the blast model differs.
@@ -196,18 +196,18 @@ class Calibration(CalibrationSection):
     ) -> ScaledImpulse:
         """Convert the impulse on a structure.
 
-        The law holds for the impulse on the reference facade. Another structure's impulse is
-        first taken per metre of the width that collects balls, times that width of the reference:
-        a wider building is hit by more balls without being loaded more. The width is the one that
-        the charge sees, and a ball radius on either side, from where balls touch it as well.
+        The law holds for the impulse on the reference facade. The impulse of another structure is
+        first scaled by the ratio of the collecting widths, that of the reference over its own,
+        because more balls hit a wider building without loading it more per area. The collecting
+        width is the width seen from the charge plus a ball radius on either side.
 
         With `tnt_range_kg`, distance and impulse are divided by the cube root of the charge's mass
         over `tnt_kg` before the law, and the result is multiplied by it (Hopkinson-Cranz).
 
         Args:
-            impulse_sim: The sum that `simulated` names, on the structure, simulation units.
+            impulse_sim: The sum `simulated` on the structure, simulation units.
             seen_width_m: Its width as seen from the charge; see `seen_width_m`.
-            distance_m: From the charge's centre to the structure.
+            distance_m: Distance from the charge's centre to the structure.
             tnt_kg: TNT-equivalent mass of the charge.
         """
         margin_m = 2.0 * self.ball_radius_m
@@ -241,7 +241,7 @@ class Calibration(CalibrationSection):
 
 
 def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:
-    """Return the width of a structure across the line from the charge to its centre, m."""
+    """Return a structure's width perpendicular to the line from the charge to its centre, m."""
     (x0, y0), (x1, y1) = charge_m, structure_m.centre
     along_x, along_y = x1 - x0, y1 - y0
     length = hypot(along_x, along_y)
@@ -253,17 +253,17 @@ SUFFIX: Final = ".json"
 
 
 def stored_calibrations() -> tuple[str, ...]:
-    """Return the names of the calibrations that come with the package."""
+    """Return the names of the calibrations in the package."""
     return tuple(sorted({name for name, _ in _stored_files()}))
 
 
 def calibrated_engines(name: str) -> tuple[str, ...]:
-    """Return the engines for which a calibration of that name comes with the package."""
+    """Return the engines for which the package has a calibration of that name."""
     return tuple(sorted(engine for stored, engine in _stored_files() if stored == name))
 
 
 def calibration_file(name: str, engine: str) -> str:
-    """Return the name of the file of a calibration: each engine has its own."""
+    """Return the name of the file of a calibration for an engine."""
     return f"{name}.{engine}{SUFFIX}"
 
 
@@ -272,13 +272,13 @@ def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Cal
 
     Args:
         name_or_path: The name, or the file.
-        engine: With a name: the engine whose calibration it is. By default the reference
-            engine, pymunk, where there is one for it.
+        engine: With a name: the engine of the calibration. By default the reference engine,
+            pymunk, if it has one, else the first in alphabetical order.
 
     Raises:
         UnknownNameError: If there is none of that name.
-        CalibrationError: If there is none for that engine, or the file cannot be read, was cut
-            short or was edited.
+        CalibrationError: If there is none for that engine, or the file cannot be read, is
+            truncated or was edited.
     """
     path = path_of(name_or_path)
     if path.suffix != SUFFIX:
@@ -306,15 +306,15 @@ def _of_the_package(name: str, engine: str) -> Calibration:
 
 
 def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
-    """Return the calibration that a scenario names, checked against its parameters.
+    """Return the calibration of a scenario, checked against its parameters.
 
     Args:
         scenario: The scenario.
         engine: Name of the engine that runs its blasts.
 
     Raises:
-        CalibrationError: If the scenario names no calibration, or one that was made with other
-            parameters or another engine.
+        CalibrationError: If the scenario has no calibration, or one made with other parameters or
+            for another engine.
         UnknownNameError: If there is no calibration of that name.
     """
     if scenario.calibration is None:
@@ -328,7 +328,7 @@ def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
 
 
 def save_calibration(calibration: Calibration, path: Path) -> None:
-    """Write a calibration to a file, with a checksum that shows later edits.
+    """Write a calibration to a file, with a checksum that detects later edits.
 
     Raises:
         BlastEnvError: If it cannot be written.
@@ -341,7 +341,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
 
 @cache
 def _stored_files() -> tuple[tuple[str, str], ...]:
-    """Return name and engine of the calibrations that come with the package."""
+    """Return name and engine of the calibrations in the package."""
     folder = files("blast_env.calibration") / "stored"
     stems = (entry.name.removesuffix(SUFFIX) for entry in folder.iterdir())
     pairs = (stem.rpartition(".") for stem in stems)
@@ -369,15 +369,15 @@ LOAD_LABEL: Final = "impulse per module (simulation units)"
 
 @dataclass(frozen=True)
 class LoadUnit:
-    """In what unit the loads of a blast of particles are shown: Pa s where a calibration gives it.
+    """Unit for displaying the loads of a blast of particles: Pa s with a calibration.
 
-    A calibration converts the load on a whole structure. A module's is its share of that, by m|v|
-    a metre of facade, with the factor of the protected structure that is loaded most.
+    A calibration converts the load on a whole structure. A module's load is its share of that by
+    m|v| per metre of facade, with the factor of the protected structure of the largest load.
 
     Attributes:
-        factor: From a module's m|v| to the unit.
-        label: What a module's load is, with the unit.
-        of_structures: The load on each structure in the unit, by its name; those that were hit.
+        factor: Factor from a module's m|v| to the unit.
+        label: Label of a module's load, with the unit.
+        of_structures: The loads on the structures that were hit, by name.
     """
 
     factor: float = 1.0
@@ -386,7 +386,7 @@ class LoadUnit:
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether it is Pa s."""
+        """Whether the unit is Pa s."""
         return bool(self.of_structures)
 
     @classmethod
@@ -396,14 +396,14 @@ class LoadUnit:
         charge: Charge,
         convert: Callable[[ModularObstacle], ScaledImpulse],
     ) -> "LoadUnit":
-        """Return the unit for a blast and those that are compared with it.
+        """Return the unit for a blast and the blasts compared with it.
 
-        Simulation units if nothing was hit.
+        Simulation units if no structure was hit.
 
         Args:
-            obstacles: The structures after the blast, perhaps with a barrier.
+            obstacles: The obstacles after the blast; barriers are ignored.
             charge: The charge.
-            convert: Gives the impulse per area on a structure.
+            convert: Returns the impulse per area on a structure.
         """
         structures = [obstacle for obstacle in obstacles if obstacle.cells is None]
         protected = [obstacle for obstacle in structures if obstacle.protected] or structures
@@ -420,19 +420,19 @@ class LoadUnit:
         return cls(factor, f"impulse per module (Pa s, calibrated on {main.name})", loads)
 
     def with_loads_of(self, other: "LoadUnit") -> "LoadUnit":
-        """Return this unit of modules with the loads on structures of another blast.
+        """Return this unit for modules with the loads on structures of another blast.
 
-        A law need not be linear, so each blast has its own factor of a structure's load.
+        A law need not be linear, so that the factors of a structure's load differ between blasts.
         """
         return replace(self, of_structures={**self.of_structures, **other.of_structures})
 
     def factor_of(self, structure: str) -> float | None:
-        """Return the factor from m|v| on a structure to Pa s, None where there is none."""
+        """Return the factor from m|v| on a structure to Pa s; `None` without a calibrated load."""
         load = self.of_structures.get(structure)
         return None if load is None else load.factor
 
     def of_structure(self, obstacle: ModularObstacle) -> str:
-        """Return the load on a structure so far, in words."""
+        """Return the current load on a structure as text, with the unit."""
         factor = self.factor_of(obstacle.name)
         if factor is None:
             return f"{obstacle.impulse:,.0f} (sim)"
@@ -441,11 +441,11 @@ class LoadUnit:
 
 @dataclass(frozen=True)
 class CalibratedLoad:
-    """The load on a structure through a calibration.
+    """The calibrated load on a structure.
 
     Attributes:
         impulse_sim: Sum of m |v|, simulation units.
-        scaled: The same per area, and whether the calibration was made for it.
+        scaled: Impulse per area, and whether it is within the calibration's range.
     """
 
     impulse_sim: float
@@ -453,5 +453,5 @@ class CalibratedLoad:
 
     @property
     def factor(self) -> float:
-        """From m |v| to Pa s."""
+        """Factor from m |v| to Pa s."""
         return self.scaled.pa_s / self.impulse_sim

@@ -1,4 +1,4 @@
-"""What simulated loads are compared with: the paper's table, Kingery & Bulmash, Friedlander."""
+"""References for simulated loads: the paper's table, Kingery & Bulmash, Friedlander."""
 
 import json
 from collections.abc import Mapping
@@ -35,13 +35,13 @@ Burst = Literal["hemispherical", "spherical"]
 """Hemispherical: the charge lies on rigid ground. Spherical: far from any surface."""
 
 CURVES_SCALED_M: Final = (0.0674, 40.0)
-"""Scaled distances, m/kg^(1/3), at which the curves of both bursts have peaks and impulses."""
+"""Range of scaled distances, m/kg^(1/3), of the peaks and impulses of both bursts."""
 
 SURFACE_BURST_SCALED_M: Final = 0.4
 """Scaled height of a charge, m/kg^(1/3), below which `burst_of` counts it as on the ground."""
 
 PAPER_UFC_LABEL: Final = "the paper's UFC column"
-"""What its i_ufc must be called: it matches no curve of UFC 3-340-02 at all distances."""
+"""Required name of its i_ufc, which matches no curve of UFC 3-340-02 at all distances."""
 
 PAPER_COLUMNS: Final = (
     Column("r_m", "m", "distance R"),
@@ -73,7 +73,7 @@ _BURST_KEYS: Final[Mapping[str, str]] = MappingProxyType(
     {"hemispherical": "hemispherical_surface_burst", "spherical": "spherical_free_air_burst"}
 )
 
-_ROUNDING: Final = 1e-9  # relative; R / W^(1/3) of a charge made for an end of the range
+_ROUNDING: Final = 1e-9  # relative; of R / W^(1/3) at an end of the range
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,9 @@ class _Curve:
 
 
 def paper_table() -> "pd.DataFrame":
-    """Return Tables 1 to 3 of the paper, one row a distance; see `PAPER_COLUMNS`.
+    """Return Tables 1 to 3 of the paper, one row per distance; see `PAPER_COLUMNS`.
 
-    A new frame in every call.
+    Every call returns a new frame.
     """
     import pandas as pd
 
@@ -125,9 +125,9 @@ def paper_table() -> "pd.DataFrame":
 def paper_ufc_column() -> "pd.Series":
     """Return the paper's UFC column, psi*s, by the distance in metres.
 
-    It is what the paper prints as UFC 3-340-02, not the standard itself: at 30 to 120 m it is
+    The paper ascribes it to UFC 3-340-02, but it differs from the standard: at 30 to 120 m it is
     within 8 % of Kingery and Bulmash's incident impulse of about 10 t TNT on the ground, at 15 m
-    1.9 times as large. For the standard's curves take `kingery_bulmash`.
+    1.9 times as large. For the standard's curves use `kingery_bulmash`.
     """
     import pandas as pd
 
@@ -166,14 +166,14 @@ def kingery_bulmash(
     with W^(1/3). Distance and mass are broadcast against each other.
 
     Args:
-        quantity: What to return: overpressures in Pa, impulses in Pa*s, times in s, the shock
-            speed in m/s. Reflected values are for normal incidence on an infinite rigid wall.
+        quantity: The parameter: overpressures in Pa, impulses in Pa*s, times in s, the shock speed
+            in m/s. Reflected values are for normal incidence on an infinite rigid wall.
         distance_m: Distance R from the charge, above 0.
         charge_kg: TNT-equivalent mass W, above 0.
         burst: `"hemispherical"`, a charge on rigid ground, or `"spherical"`, in free air.
 
     Raises:
-        UnknownNameError: If there is no such quantity or burst; names the nearest one.
+        UnknownNameError: If there is no such quantity or burst; the message suggests the nearest.
         BlastEnvError: If a number is not above 0, if distance and mass cannot be broadcast, or if
             Z is outside the range of the curve; the message gives Z and the range.
     """
@@ -200,15 +200,15 @@ def kingery_bulmash(
 
 
 def burst_of(height_m: float, charge_kg: float) -> Burst:
-    """Return the curves that hold for a charge over rigid ground.
+    """Return the type of burst whose curves apply to a charge over rigid ground.
 
-    UFC 3-340-02 (before it TM 5-1300), chapter 2, divides unconfined explosions into free-air, air
-    and surface bursts: on or very near the ground the reflected wave merges with the incident one
-    at once, and the burst is a surface burst. Its charts of air bursts, those of the triple point,
-    begin at a scaled height of 1 ft/lb^(1/3), 0.4 m/kg^(1/3): lower charges are surface bursts.
+    UFC 3-340-02 (formerly TM 5-1300), chapter 2, divides unconfined explosions into free-air, air
+    and surface bursts. On or very near the ground the reflected wave merges with the incident one
+    at once, which is a surface burst. The charts of air bursts, those of the triple point, begin at
+    a scaled height of 1 ft/lb^(1/3), 0.4 m/kg^(1/3): lower charges are surface bursts.
 
     Args:
-        height_m: Height of the middle of the charge above the ground.
+        height_m: Height of the charge's centre above the ground.
         charge_kg: TNT-equivalent mass, above 0.
     """
     low = height_m < SURFACE_BURST_SCALED_M * np.cbrt(charge_kg)
@@ -216,10 +216,11 @@ def burst_of(height_m: float, charge_kg: float) -> Burst:
 
 
 def largest_reflected_peak_pa(distance_m: FloatArray, charge_kg: float) -> FloatArray:
-    """Return the peak on a wall at right angles in the open, by the burst that makes most of it.
+    """Return the reflected peak at normal incidence in the open, for a hemispherical burst, Pa.
 
-    That is the hemispherical one. Beyond the range of the curve its end holds, which is too much
-    far away, and nearer too little; see `CURVES_SCALED_M`.
+    The hemispherical burst has the larger peaks. Outside the range of the curve, the value at its
+    end is used, which is too high at larger and too low at smaller distances; see
+    `CURVES_SCALED_M`.
 
     Args:
         distance_m: Distances from the charge, above 0.
@@ -271,7 +272,7 @@ def _read(name: str) -> str:
     return (files("blast_env.calibration") / "data" / name).read_text(encoding="utf-8")
 
 
-_SERIES_BELOW: Final = 0.5  # of b; the closed forms lose digits there
+_SERIES_BELOW: Final = 0.5  # of b, where the closed form loses digits
 _SERIES: Final = tuple((-1.0) ** order / factorial(order + 2) for order in range(16))
 _BISECTIONS: Final = 64
 
@@ -281,10 +282,10 @@ class Friedlander:
     """p(t) = p_2 (1 - t / t_2) exp(-b t / t_2), with t from the arrival (equation 1).
 
     Attributes:
-        peak: Peak overpressure p_2, Pa; or the unit of the history that it was fitted to.
+        peak: Peak overpressure p_2, Pa; or the unit of a fitted history.
         positive_duration_s: Duration t_2 of the positive phase.
-        decay: The wave parameter b, no unit; 0 is a triangle.
-        arrival_s: Time at which the shock arrives.
+        decay: The wave parameter b, dimensionless; 0 is a triangle.
+        arrival_s: Arrival time of the shock.
     """
 
     peak: float
@@ -296,8 +297,8 @@ class Friedlander:
         """Check the values.
 
         Raises:
-            BlastEnvError: If peak or duration is not above 0, decay or arrival below 0, or any of
-                them not a finite number.
+            BlastEnvError: If peak or duration is not above 0, decay or arrival is below 0, or any
+                value is not a finite number.
         """
         for name in ("peak", "positive_duration_s"):
             checked_array(name, getattr(self, name), above=0.0, dimensions=0)
@@ -310,20 +311,20 @@ class Friedlander:
     ) -> "Friedlander":
         """Return the waveform with a given peak, duration and impulse.
 
-        A waveform that decays has an impulse below that of the triangle, peak * duration / 2. From
-        there on no decay coefficient of at least 0 solves for it; then the waveform is the
-        triangle with this peak and this impulse, so that equation (2) still holds, and its
-        duration is 2 impulse / peak, UFC 3-340-02's equivalent triangle. `is_triangular` says so.
+        A decaying waveform has an impulse below that of the triangle, peak * duration / 2. For
+        larger impulses there is no decay coefficient of at least 0. The waveform is then the
+        triangle with this peak and this impulse, so that equation (2) still holds, and its duration
+        is 2 impulse / peak, as of UFC 3-340-02's equivalent triangle; see `is_triangular`.
 
         Args:
             peak: Peak overpressure, Pa.
             positive_duration_s: Duration of the positive phase.
             impulse: Impulse of the positive phase, Pa*s.
-            arrival_s: Time at which the shock arrives.
+            arrival_s: Arrival time of the shock.
 
         Raises:
-            BlastEnvError: If a number is not finite or out of bounds, or if the impulse is so far
-                below that of the triangle that the decay coefficient is no finite number.
+            BlastEnvError: If a number is not finite or out of bounds, or the impulse is so far
+                below that of the triangle that the decay coefficient is not a finite number.
         """
         for name, value in (
             ("peak", peak),
@@ -378,7 +379,7 @@ class Friedlander:
     def impulse_until(self, time_s: Numbers) -> FloatArray: ...
 
     def impulse_until(self, time_s: float | Numbers) -> float | FloatArray:
-        """Return the impulse that has come by each time, unit of `peak` times s.
+        """Return the impulse until each time, unit of `peak` times s.
 
         Args:
             time_s: Times, from the detonation.
@@ -400,7 +401,7 @@ def impulse_share_until(x: FloatArray, decay: float | FloatArray) -> FloatArray:
         decay: The coefficient b, at least 0; broadcast against `x`.
     """
     z = np.asarray(decay * x)
-    # (1 - s) = (1 - x) + (x - s), and the second part is the whole wave in a shorter time.
+    # (1 - s) = (1 - x) + (x - s); the second part is a complete wave of shorter duration.
     level = np.ones_like(z)
     np.divide(-np.expm1(-z), z, out=level, where=z > 0.0)
     share: FloatArray = x * ((1.0 - x) * level + x * _impulse_share(z))
@@ -420,8 +421,8 @@ def _impulse_share(decay: float | FloatArray) -> FloatArray:
 def _solve_decay(share: float) -> float:
     """Return the b > 0 with `_impulse_share(b) == share`, for a share between 0 and 1/2.
 
-    The share falls with b and lies between 1 / (b + 2) and 1 / b, so b lies in an interval of
-    width 2.
+    The share decreases with b and lies between 1 / (b + 2) and 1 / b, which bounds b to an interval
+    of width 2.
     """
     low, high = max(1.0 / share - 2.0, 0.0), 1.0 / share
     for _ in range(_BISECTIONS):

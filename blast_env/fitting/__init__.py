@@ -1,1 +1,1 @@
-"""Fitting a calibration on many blasts in a free field, and the paper's own tables."""
+"""Fitting of calibrations to blasts in a free field, and the paper's tables."""

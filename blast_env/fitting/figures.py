@@ -26,7 +26,7 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, ScalarFormatter
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
+# Okabe and Ito's colours, distinguishable with any colour vision.
 _LAWS = {
     "proportional": ("#E69F00", "--", "s"),
     "linear": ("#56B4E9", "-.", "^"),
@@ -46,7 +46,7 @@ _SIMULATED, _REFERENCE = "#0072B2", "#000000"
 
 
 def calibration_figure(report: CalibrationReport, name: str) -> Figure:
-    """Return the simulated impulse, the three laws beside the reference, and their residuals.
+    """Return a figure of the simulated impulse, of the laws and the reference, and of residuals.
 
     Args:
         report: The report.
@@ -95,7 +95,7 @@ def _draw_scaled(axes: Axes, report: CalibrationReport) -> None:
     for name, law in report.laws.items():
         colour, line, marker = _LAWS[name]
         scaled = law(report.summary.i_sim.to_numpy())
-        shown = np.where(scaled > 0.0, scaled, np.nan)  # the linear law can go below 0
+        shown = np.where(scaled > 0.0, scaled, np.nan)  # the linear law can be negative
         label = f"{name}: MAPE {report.metrics[name].mape_percent:.1f} %"
         axes.plot(distance_m, shown, color=colour, ls=line, marker=marker, label=label)
     axes.set_title("Scaled impulse and reference")
@@ -145,7 +145,7 @@ def _set_impulse_axis(axes: Axes) -> None:
 
 
 def _spread_out(distances_m: list[float]) -> list[float]:
-    """Return the distances without those whose labels would touch on a logarithmic axis."""
+    """Return the largest distance and those below it whose labels do not touch on a log axis."""
     kept = distances_m[-1:]
     for distance_m in reversed(distances_m[:-1]):
         if distance_m * _LEAST_TICK_RATIO <= kept[-1]:
@@ -154,7 +154,7 @@ def _spread_out(distances_m: list[float]) -> list[float]:
 
 
 def figure_5() -> Figure:
-    """Return the paper's Figure 5 for all three laws, with their deviations below."""
+    """Return the paper's Figure 5 for all three laws, with the deviations below it."""
     figure = Figure(figsize=(7.0, 7.2), layout="constrained")
     impulse, deviation = figure.subplots(2, 1, sharex=True, height_ratios=(2.1, 1.0))
     paper = paper_table()

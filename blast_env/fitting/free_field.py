@@ -49,12 +49,13 @@ class FreeFieldRun:
     """One blast of a study.
 
     Attributes:
-        key: Hash of scenario and charge, seed, engine and its version; tells runs apart.
-        distance_m: From the charge's centre to the facade.
+        key: Identity of the run: hash of the scenario with the charge, seed, engine and its
+            version.
+        distance_m: Distance from the charge's centre to the facade.
         seed: Seed of the blast.
         impulse_sim: Sum of m |v| over the hits on the structure, simulation units.
-        transferred_impulse_sim: Momentum really transferred to it, simulation units.
-        first_hit_s: Time of the first hit; None where nothing hit it.
+        transferred_impulse_sim: Momentum actually transferred to it, simulation units.
+        first_hit_s: Time of the first hit; `None` without a hit.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -74,7 +75,7 @@ class FreeFieldStudy:
     Attributes:
         scenario: A scenario with one point charge and one structure, such as `free_field`.
         distances_m: Distances from the charge's centre to the facade, ascending.
-        seeds: Seeds; every distance gets all of them.
+        seeds: Seeds at every distance.
         engine: Name of the engine.
     """
 
@@ -87,7 +88,8 @@ class FreeFieldStudy:
         """Check the arguments.
 
         Raises:
-            BlastEnvError: If distances are not ascending, or seeds are repeated or missing.
+            BlastEnvError: If distances do not ascend or are missing, or seeds are repeated or
+                missing.
         """
         for before, after in zip(self.distances_m, self.distances_m[1:], strict=False):
             if not before < after:
@@ -105,20 +107,20 @@ class FreeFieldStudy:
         store: Path | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> pd.DataFrame:
-        """Run all blasts that the store does not hold yet.
+        """Run all blasts that are missing in the store.
 
         Args:
             processes: Worker processes.
-            store: File of finished runs, one JSON object a line; each run is added as it ends,
-                so that an interrupted study goes on where it was. A last line that was cut short
-                is run again.
-            progress: Called with the share of the blasts that is done.
+            store: File of finished runs, one JSON object per line; each run is added as it ends,
+                so that an interrupted study continues from there. A truncated last line is run
+                again.
+            progress: Called with the finished share of the blasts.
 
         Returns:
-            One row a blast, by distance and seed; the columns are `RUN_COLUMNS`.
+            One row per blast, by distance and seed; the columns are `RUN_COLUMNS`.
 
         Raises:
-            BlastEnvError: If the store is not one, or cannot be written.
+            BlastEnvError: If the store is invalid, was edited, or cannot be written.
         """
         journal = None if store is None else Journal(store, FreeFieldRun)
         finished = {} if journal is None else {each.key: each for each in journal.read()}
@@ -152,7 +154,7 @@ class FreeFieldStudy:
 def free_field(tnt_kg: float | None = None, side_modules: int | None = None) -> Scenario:
     """Return `free_field` with another charge, or a facade of another width.
 
-    The strip behind the facade stays as wide as it was.
+    The strip behind the structure keeps its width.
     """
     document = load_scenario("free_field").model_dump()
     (source,), (structure,) = document["charge"], document["structures"]
@@ -169,7 +171,7 @@ def free_field(tnt_kg: float | None = None, side_modules: int | None = None) -> 
 def impulse_by_seed(
     runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse"
 ) -> NDArray[np.float64]:
-    """Return the impulses, simulation units (seeds, distances), from the table of a study."""
+    """Return the impulses of a study's table, simulation units (seeds, distances)."""
     pivot = runs.pivot_table(index="seed", columns="distance_m", values=f"{simulated}_sim")
     return pivot.to_numpy(dtype=np.float64)
 
@@ -179,10 +181,10 @@ def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> p
 
     Args:
         runs: The table of a study.
-        simulated: Which sum over the collisions `i_sim` is.
+        simulated: The sum over the collisions for `i_sim`.
 
     Returns:
-        One row a distance: `distance_m`, `seeds`, `i_sim`, its half-width `ci95` (Student's t),
+        One row per distance: `distance_m`, `seeds`, `i_sim`, its half-width `ci95` (Student's t),
         the standard deviation `sd` between seeds, `transferred_sim` and `arrival_s`.
     """
     groups = runs.groupby("distance_m")
@@ -195,7 +197,7 @@ def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> p
             "arrival_s": groups.first_hit_s.mean(),
         }
     )
-    # Student's t; scipy.stats has it too, but takes a third of a second to import.
+    # Student's t; scipy.stats also has it, but takes a third of a second to import.
     t = stdtrit(np.maximum(table.seeds - 1, 1), 0.975)
     table.insert(2, "ci95", t * table.sd / np.sqrt(table.seeds))
     return table.reset_index()
@@ -225,10 +227,10 @@ ImpulseQuantity = Literal["incident_impulse", "reflected_impulse"]
 
 @dataclass(frozen=True)
 class Reference:
-    """What a simulator is calibrated against.
+    """Reference of a calibration.
 
     Attributes:
-        section: What it is, for the record.
+        section: Description for the calibration file.
         impulse_psi_s: Its impulse at each distance (n,), psi*s.
     """
 
@@ -276,13 +278,13 @@ class CalibrationReport:
     """A study with its three fits.
 
     Attributes:
-        study: What was run.
-        runs: One row a blast.
-        summary: One row a distance; see `summarise`.
-        reference: What it was fitted to.
+        study: The study.
+        runs: One row per blast.
+        summary: One row per distance; see `summarise`.
+        reference: The reference of the fits.
         laws: The three laws by name.
-        metrics: How well each agrees.
-        simulated: Which sum over the collisions they convert.
+        metrics: Agreement of each law with the reference, by name.
+        simulated: The sum over the collisions that they convert.
     """
 
     study: FreeFieldStudy
@@ -294,7 +296,7 @@ class CalibrationReport:
     simulated: SimulatedQuantity = "impulse"
 
     def table(self) -> pd.DataFrame:
-        """Return the summary with the reference and the three laws beside it, psi*s."""
+        """Return the summary with the reference and the laws in psi*s, and their errors in %."""
         table = self.summary.assign(reference_psi_s=self.reference.impulse_psi_s)
         for name, law in self.laws.items():
             scaled = law(table.i_sim.to_numpy())
@@ -306,8 +308,8 @@ class CalibrationReport:
         """Return the calibration of one of the laws.
 
         Args:
-            name: Its name.
-            law: Which of the laws.
+            name: Name of the calibration.
+            law: Name of the law.
         """
         study, by_seed = self.study, impulse_by_seed(self.runs, self.simulated)
         reference = self.reference.impulse_psi_s
@@ -355,8 +357,8 @@ def calibrate(
     Args:
         study: The study.
         runs: Its runs.
-        reference: What to fit to.
-        simulated: Which sum over the collisions to convert.
+        reference: The reference of the fits.
+        simulated: The sum over the collisions to convert.
 
     Raises:
         BlastEnvError: If the runs cannot be fitted, e.g. because nothing arrived at a distance.

@@ -1,7 +1,4 @@
-"""The paper's Tables 1 to 4, worked out again from its own columns.
-
-Nothing is simulated: i_sim and i_ufc are the paper's own.
-"""
+"""The paper's Tables 1 to 4, recomputed from its columns i_sim and i_ufc without simulations."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -24,18 +21,18 @@ from blast_env.calibration import (
 from blast_env.calibration.laws import Fit
 
 CELLS: Final = ("scaled", "abs", "pct")
-"""The cells of a row of Tables 1 to 3 that are worked out, as `paper_table` names them."""
+"""The computed cells of a row of Tables 1 to 3, by their names in `paper_table`."""
 
 
 @dataclass(frozen=True)
 class PaperLaw:
-    """A law of the paper's section 3 with what is printed about it.
+    """A law of the paper's section 3 with its printed results.
 
     Attributes:
         name: The paper's name of the method, in Table 4.
         number: Number of its table.
-        fit: Our fit.
-        in_text: The law with the coefficients that the text prints.
+        fit: This project's fit.
+        in_text: The law with the coefficients printed in the text.
         table_4: MAPE (%), RMSE (psi s) and integral error (%) as printed.
         decimals: Decimals of i_scaled, E_abs and E% in its table.
         subtracts_rounded: Whether the E_abs of its table are differences of printed cells.
@@ -51,7 +48,7 @@ class PaperLaw:
 
     @property
     def fitted(self) -> ScalingLaw:
-        """The law that the paper's columns give."""
+        """The law fitted to the paper's columns."""
         paper = paper_table()
         return self.fit(paper["i_sim"], paper["i_ufc_psi_s"])
 
@@ -76,9 +73,9 @@ TABLE_4_DECIMALS: Final = (1, 4, 1)
 
 
 def comparison_table(paper_law: PaperLaw) -> pd.DataFrame:
-    """Return Table 1, 2 or 3, not rounded, and the three worked-out columns as printed.
+    """Return Table 1, 2 or 3, not rounded, and its three computed columns as printed.
 
-    Where the paper subtracts rounded cells, so do we, for E_abs alone.
+    E_abs is the difference of rounded cells if the paper computes it in that way.
     """
     paper = paper_table()
     reference = paper["i_ufc_psi_s"]
@@ -114,14 +111,14 @@ def metrics_row(law: ScalingLaw) -> tuple[float, float, float]:
 
 
 def deviations(table: pd.DataFrame, decimals: tuple[int, int, int]) -> NDArray[np.float64]:
-    """Return ours minus printed (rows, 3), in units of the last printed digit.
+    """Return recomputed minus printed cells (rows, 3), in units of the last printed digit.
 
-    Up to 0.5 it is the paper's own rounding.
+    Deviations up to 0.5 are due to the paper's rounding.
 
     Args:
-        table: Of `comparison_table` or `comparative_table`: ends with three columns and the same
-            three as printed.
-        decimals: Decimals of the three columns in print.
+        table: Table of `comparison_table` or `comparative_table`, which ends with three columns and
+            the same three as printed.
+        decimals: Printed decimals of the three columns.
     """
     cells = table.iloc[:, -6:].to_numpy(dtype=np.float64)
     return np.asarray((cells[:, :3] - cells[:, 3:]) * 10.0 ** np.array(decimals))
