@@ -1,4 +1,4 @@
-"""The access way: a vehicle must always be able to cross the build zone."""
+"""The access way: a path for vehicles across the build zone that must stay open."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -29,22 +29,22 @@ def _check_whole_modules(width_m: float) -> float:
 
 
 class Gate(Ground):
-    """Where a gate stands.
+    """The rectangle of a gate.
 
     Attributes:
-        crash_rating: What it stops; without it, every vehicle.
+        crash_rating: Its crash rating; without one, it stops every vehicle.
     """
 
     crash_rating: CrashRating | None = None
 
     @model_serializer(mode="wrap")
     def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out a rating that is not there."""
+        """Omit a missing rating."""
         return {key: value for key, value in handler(self).items() if value is not None}
 
 
 class AccessWay(Section):
-    """A way across the build zone that a vehicle must always be able to take.
+    """A way across the build zone that must stay open for a vehicle.
 
     The vehicle is a square of whole cells. It moves along rows and columns, stays inside the
     zone, and covers neither a module nor a structure; keep-outs are open to it.
@@ -52,8 +52,8 @@ class AccessWay(Section):
     Attributes:
         width_m: Side of the vehicle's square; whole modules.
         between: The two sides of the zone that the way connects.
-        gate: Where a gate stands that opens for the way's vehicle alone: no module may stand
-            there, and vehicles with a charge do not get through.
+        gate: A gate that opens for the way's vehicle alone: it is kept free of modules, and is
+            closed to vehicles with a charge.
     """
 
     width_m: Annotated[
@@ -69,7 +69,7 @@ class AccessWay(Section):
 
     @property
     def description(self) -> str:
-        """The way in words: `access way of 3 m from left to right`."""
+        """Description for messages: `access way of 3 m from left to right`."""
         return f"access way of {self.width_m:g} m from {self.between.replace('_', ' to ')}"
 
 
@@ -78,7 +78,7 @@ def is_open(way: AccessWay, passable: BoolArray) -> bool:
 
     Args:
         way: The way; no wider than the zone.
-        passable: Which cells the vehicle may cover, shape (rows, columns).
+        passable: Cells that the vehicle may cover (rows, columns).
     """
     return _Chains.of(way, passable).leave_a_way
 
@@ -86,14 +86,14 @@ def is_open(way: AccessWay, passable: BoolArray) -> bool:
 def closing_places(
     way: AccessWay, passable: BoolArray, variants: Iterable[Variant]
 ) -> Iterator[BoolArray]:
-    """Yield for each variant the lower left cells from which it leaves no way, (rows, columns).
+    """Yield for each variant the lower left cells at which it closes the way (rows, columns).
 
-    If there is no way already, those are all cells.
+    If the way is closed already, these are all cells; for measures, none.
 
     Args:
         way: The way; no wider than the zone.
-        passable: Which cells the vehicle may cover, shape (rows, columns).
-        variants: What is set down.
+        passable: Cells that the vehicle may cover (rows, columns).
+        variants: The variants to be placed.
     """
     chains = _Chains.of(way, passable)
     known: dict[tuple[int, int], BoolArray] = {}
@@ -109,16 +109,16 @@ def closing_places(
 
 @dataclass(frozen=True)
 class _Chains:
-    """The places of the vehicle that chains of obstacles close, from either border.
+    """The positions of the vehicle blocked by chains of obstacles from either border.
 
-    Place (i, j) is that of the vehicle with its lower left cell at row i - 1 and column j; the
-    first and the last row are the borders, where the vehicle would leave the zone.
+    At position (i, j) the vehicle's lower left cell has row i - 1 and column j; the first and the
+    last row are the borders, where the vehicle would leave the zone.
 
     Attributes:
         way: The way.
-        below: Places that hang together with the border below, shape (rows - width + 3,
+        below: Blocked positions connected to the lower border (rows - width + 3,
             columns - width + 1).
-        above: Places that hang together with the border above, of the same shape.
+        above: Blocked positions connected to the upper border, of the same shape.
     """
 
     way: AccessWay
@@ -138,11 +138,11 @@ class _Chains:
 
     @property
     def leave_a_way(self) -> bool:
-        """Whether no chain reaches from border to border."""
+        """Whether no chain connects both borders."""
         return not self.below[-1, 0]
 
     def closed_by(self, size: tuple[int, int]) -> BoolArray:
-        """Return the lower left cells from which a piece joins the chains, (rows, columns)."""
+        """Return the lower left cells at which a piece connects the chains (rows, columns)."""
         along = size if self.way.between == "left_right" else size[::-1]
         width = self.way.width_cells
         closing = _beside(self.below, width, *along) & _beside(self.above, width, *along)
@@ -150,13 +150,13 @@ class _Chains:
 
 
 def _beside(chain: BoolArray, width: int, rows: int, columns: int) -> BoolArray:
-    """Return the lower left cells from which a piece closes a place in or next to the chain.
+    """Return the lower left cells at which a piece blocks a position in or next to the chain.
 
-    A piece from cell (i, j) on closes the places from (i - width + 2, j - width + 1) to
-    (i + rows, j + columns - 1), as far as there are such.
+    A piece with lower left cell (i, j) blocks the positions (i - width + 2, j - width + 1) to
+    (i + rows, j + columns - 1), as far as they exist.
 
     Args:
-        chain: Places of the vehicle, as in `_Chains`.
+        chain: Positions of the vehicle, as in `_Chains`.
         width: Side of the vehicle in cells.
         rows: Rows of cells of the piece.
         columns: Columns of cells of the piece.
@@ -170,27 +170,27 @@ def _beside(chain: BoolArray, width: int, rows: int, columns: int) -> BoolArray:
 
 
 def counts_before(mask: BoolArray) -> NDArray[np.int32]:
-    """Return how much is true below and to the left of each corner (rows + 1, columns + 1)."""
+    """Return the number of true cells below and left of each corner (rows + 1, columns + 1)."""
     counts = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), dtype=np.int32)
     np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=counts[1:, 1:])
     return counts
 
 
 def any_in_windows(counts: NDArray[np.int32], rows: int, columns: int) -> BoolArray:
-    """Return for each window of so many cells whether anything in it is true.
+    """Return whether any cell of each window is true.
 
     Args:
-        counts: Of the cells, `counts_before`.
+        counts: `counts_before` of the cells.
         rows: Rows of a window.
         columns: Columns of a window.
 
     Returns:
-        By lower left cell; nothing for windows that are larger than the grid.
+        By lower left cell; empty for windows larger than the grid.
     """
     strips = counts[rows:] - counts[:-rows]
     return strips[:, columns:] > strips[:, :-columns]
 
 
 def _along_columns(way: AccessWay, cells: BoolArray) -> BoolArray:
-    """Return the cells turned such that the way runs along the columns, or turned back."""
+    """Return the cells transposed so that the way runs along the columns, or back."""
     return cells if way.between == "left_right" else cells.T

@@ -1,4 +1,4 @@
-"""Many rectangles at once: how far they are from one, and whether they overlap it."""
+"""Distances and overlaps between one rectangle and arrays of rectangles."""
 
 from typing import Final
 
@@ -8,14 +8,14 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle
 
 TOLERANCE_M: Final = 1e-9
-"""Rectangles that overlap by less than this only touch, as in `Rectangle.overlaps`."""
+"""Largest overlap of rectangles that counts as touching, as in `Rectangle.overlaps`."""
 
 Boxes = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Left, bottom, right and top of many rectangles; the four arrays broadcast."""
 
 
 def box_distances_m(box: Rectangle, boxes: Boxes) -> FloatArray:
-    """Return the distances between one rectangle and others."""
+    """Return the distances between one rectangle and others, m; 0 if they overlap."""
     left, bottom, right, top = boxes
     along_x = np.maximum(0.0, np.maximum(left - box.right, box.left - right))
     along_y = np.maximum(0.0, np.maximum(bottom - box.top, box.bottom - top))
@@ -24,7 +24,7 @@ def box_distances_m(box: Rectangle, boxes: Boxes) -> FloatArray:
 
 
 def overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
-    """Return which rectangles overlap one; to touch is not to overlap."""
+    """Return whether each rectangle overlaps one; touching is not overlapping."""
     left, bottom, right, top = boxes
     along_x = (left < rectangle.right - TOLERANCE_M) & (right > rectangle.left + TOLERANCE_M)
     along_y = (bottom < rectangle.top - TOLERANCE_M) & (top > rectangle.bottom + TOLERANCE_M)
@@ -32,7 +32,7 @@ def overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
 
 
 def covered_m2(rectangle: Rectangle, boxes: Boxes) -> FloatArray:
-    """Return the area that rectangles have in common with one."""
+    """Return the area of each rectangle's intersection with one, m2."""
     left, bottom, right, top = boxes
     along_x = np.minimum(right, rectangle.right) - np.maximum(left, rectangle.left)
     along_y = np.minimum(top, rectangle.top) - np.maximum(bottom, rectangle.bottom)

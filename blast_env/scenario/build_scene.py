@@ -1,4 +1,4 @@
-"""From a scenario to the site of one blast, and for particles to its scene."""
+"""Conversion of a scenario to the site of one blast, and to the scene of a particle engine."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -38,22 +38,22 @@ from blast_env.values import checked_seed
 def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
     """Return independent generators for the charge, the fan and the air.
 
-    Separate streams, so that a charge fixed by hand leaves fan and air as they were.
+    Separate streams keep fan and air unchanged if the charge is fixed.
 
     Raises:
-        BlastEnvError: If the seed is no integer, negative or too large.
+        BlastEnvError: If the seed is not an integer, is negative or too large.
     """
     children = np.random.SeedSequence(checked_seed(seed)).spawn(3)
     return tuple(np.random.default_rng(child) for child in children)
 
 
 def draw_charge(scenario: Scenario, seed: int, layout: Sequence[Element] = ()) -> Charge:
-    """Return the charge that a seed draws from a scenario.
+    """Return the charge of a scenario for a seed.
 
     Args:
         scenario: The scenario.
-        seed: Decides it.
-        layout: What a vehicle's charge comes as near as it can against; see `worst_places`.
+        seed: Seed of the random draw.
+        layout: The layout, on which the place of a vehicle's charge depends; see `worst_places`.
 
     Raises:
         ValueError: If the seed is negative.
@@ -62,7 +62,7 @@ def draw_charge(scenario: Scenario, seed: int, layout: Sequence[Element] = ()) -
 
 
 def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:
-    """Return what `draw_charge` does before a layout is known.
+    """Return the charge of `draw_charge` before its place against a layout is determined.
 
     Raises:
         ValueError: If the seed is negative.
@@ -73,12 +73,12 @@ def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:
 def worst_places(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
 ) -> WorstPlaces:
-    """Return where the charge of a vehicle goes off, as near as a layout lets it come.
+    """Return the worst places of a vehicle's charge against a layout.
 
     Args:
         scenario: The scenario.
         source: The vehicle.
-        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
     """
     return scenario.vehicle_ground(source, layout).worst_places(_obstacles(scenario, layout))
 
@@ -86,24 +86,24 @@ def worst_places(
 def vehicle_reach(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
 ) -> Reach:
-    """Return where a vehicle gets to; arguments as for `worst_places`."""
+    """Return the reach of a vehicle; arguments as for `worst_places`."""
     return scenario.vehicle_ground(source, layout).reach(_obstacles(scenario, layout))
 
 
 def vehicle_drive(
     scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
 ) -> Drive:
-    """Return what stops a vehicle and what not; arguments as for `worst_places`."""
+    """Return the drive of a vehicle against a layout; arguments as for `worst_places`."""
     return scenario.vehicle_ground(source, layout).drive(_obstacles(scenario, layout))
 
 
 def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> Charge:
-    """Return a charge at the place where it goes off: that of a vehicle depends on the layout.
+    """Return a charge at its place, which for a vehicle depends on the layout.
 
     Args:
         scenario: The scenario.
-        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
-        charge: The charge; one at a place is returned as it is.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+        charge: The charge; a `Charge` is returned unchanged.
     """
     if isinstance(charge, VehicleCharge):
         return worst_places(scenario, charge.source, layout).charge(charge.rank)
@@ -122,12 +122,12 @@ def build_site(
     seed: int = 0,
     charge: AnyCharge | None = None,
 ) -> BlastSite:
-    """Lay out a scenario for one blast, for an engine that needs no balls.
+    """Return the site of one blast, for an engine without particles.
 
     Args:
         scenario: The scenario.
-        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
-        seed: Decides the charge, where the scenario leaves it open: the same one as for particles.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+        seed: Seed of the charge if the scenario has several; the same charge as for particles.
         charge: The charge, instead of one drawn from the scenario.
 
     Raises:
@@ -136,7 +136,7 @@ def build_site(
         ValueError: If the seed is negative.
     """
     placement = Placement.of(scenario, layout)
-    if isinstance(charge, Charge):  # a vehicle keeps clear of everything
+    if isinstance(charge, Charge):  # a vehicle keeps clear of all obstacles
         _check_clear(scenario.with_charge(charge), placement)
     drawn = draw_threat(scenario, seed) if charge is None else charge
     charge = charge_against(scenario, placement.layout, drawn)
@@ -160,21 +160,21 @@ def build_scene(
     seed: int = 0,
     charge: AnyCharge | None = None,
 ) -> Scene:
-    """Lay out a scenario for one blast of particles, which know no heights.
+    """Return the scene of one blast of particles, which is two-dimensional.
 
     Args:
         scenario: The scenario.
-        layout: (row, column) of the build-zone cells that hold a barrier module, or pieces.
-        seed: Decides the charge (where the scenario leaves it open), the fan's phase and the
-            air's jitter. The barrier does not shift any of them.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+        seed: Seed of the charge (if the scenario has several), the fan's phase and the air's
+            jitter. None of them depends on the barrier.
         charge: The charge, instead of one drawn from the scenario.
 
     Raises:
         LayoutError: If the layout does not fit the build zone, or the charge.
-        ScenarioError: If the charge is not clear of a structure or the border, or over a roof:
+        ScenarioError: If the charge is not clear of a structure or the border, or is over a roof:
             without heights it would be inside the structure; or a structure begins above the
             ground, or is a terrace.
-        BlastEnvError: If the parameters do not reach to the mass of the charge.
+        BlastEnvError: If the mass of the charge is out of bounds of the parameters.
         ValueError: If the seed is negative.
     """
     base = build_site(scenario, layout, seed, charge)
@@ -206,7 +206,7 @@ def build_scene(
 
 
 def _check_clear(scenario: Scenario, placement: Placement) -> None:
-    """Refuse a layout with a module on the charge; nothing else depends on where that is.
+    """Refuse a layout with a module on the charge, the only condition that a charge can break.
 
     Raises:
         LayoutError: If there is one.
@@ -217,7 +217,7 @@ def _check_clear(scenario: Scenario, placement: Placement) -> None:
 
 
 def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParameters:
-    """Return the parameters of a charge; only particles have bounds on its mass."""
+    """Return the particles' parameters for a charge, whose mass has bounds."""
     try:
         return for_charge(scenario.parameters, charge.tnt_kg)
     except BlastEnvError as error:
@@ -227,7 +227,7 @@ def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParamete
 
 
 def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
-    """Refuse a charge that would be inside a structure if that were endlessly high.
+    """Refuse a raised charge that is inside a structure in plan.
 
     Raises:
         ScenarioError: If it is.
@@ -247,7 +247,7 @@ def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
 
 
 def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
-    """Return rectangles that cover the modules, units: grids, and single cells of a barrier."""
+    """Return rectangles that cover the modules, in simulation units."""
     rectangles: list[Rectangle] = []
     for outline in structures:
         if outline.cells is None:
@@ -258,7 +258,7 @@ def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]
 
 
 def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:
-    """Return the outlines of the structures that are still there with a layout."""
+    """Return the outlines of the structures that remain with a layout."""
     zone = scenario.build_zone
     may_go = frozenset() if zone is None else zone.may_be_taken_away
     return tuple(
@@ -287,13 +287,13 @@ def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
 
 
 def _whole(scenario: Scenario) -> StructureOutline:
-    """Return the barrier that would fill a whole zone, as high as one can be there."""
+    """Return a barrier that fills the whole zone, at the largest possible height."""
     empty = barrier_outline(scenario, ())
     return replace(empty, cells=None, heights_m=None, bases_m=None, pieces=None)
 
 
 def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
-    """Return the barrier that the modules or pieces of a layout make in the build zone.
+    """Return the barrier of a layout in the build zone.
 
     Raises:
         BlastEnvError: If there is no build zone.

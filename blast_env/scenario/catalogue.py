@@ -1,7 +1,7 @@
-"""The catalogue of barrier items, and every way in which one can be set down.
+"""The catalogue of barrier items, and the variants in which each can be placed.
 
-An item is a rectangle of modules that are placed together. Here, and nowhere else, is which cells
-a piece covers, how high it is, and which number the action of placing it has.
+An item is a rectangle of modules that are placed together. This module alone defines the cells, the
+height and the action number of a piece.
 """
 
 import tomllib
@@ -43,20 +43,20 @@ _FILE: Final = "barriers.toml"
 
 
 class StockBarrier(Section):
-    """A barrier of the stock list: an item of a catalogue without how many there are.
+    """A barrier of the stock list: an item of a catalogue without its number of pieces.
 
     Attributes:
-        description: What it is.
+        description: Short description.
         length_modules: Modules along its length.
         thickness_modules: Modules across its length.
         height_m: Height above the ground.
         cost: Relative cost of a piece: 1 is about a metre of concrete road barrier.
         rotatable: Whether it may be turned by a right angle.
-        stops_vehicles: Whether no vehicle gets past it.
-        mass_kg: Mass of a piece; that of a block of concrete where it is not known.
-        base_width_m: Width of its base; its thickness where it is not known.
-        anchorage_n: Horizontal force that the anchors of a piece hold.
-        source: Where the dimensions come from, in words.
+        stops_vehicles: Whether it stops vehicles.
+        mass_kg: Mass of a piece; that of a solid block of concrete if unknown.
+        base_width_m: Width of its base; its thickness if unknown.
+        anchorage_n: Horizontal capacity of the anchors of a piece, N.
+        source: Source of the dimensions.
     """
 
     description: Annotated[str, Field(max_length=200)]
@@ -82,37 +82,37 @@ def stock_barriers() -> Mapping[str, StockBarrier]:
 
 
 MOST_ITEMS: Final = 20
-"""Items of a catalogue; each has an action for every cell and orientation."""
+"""Most items of a catalogue; each has an action for every cell and orientation."""
 
 _SIZE_KEYS: Final = ("length_modules", "thickness_modules", "height_m")
 
 RIGID_KEYS: Final = ("mass_kg", "base_width_m", "friction", "anchorage_n")
-"""Keys of an item that say whether it stands; no load depends on them."""
+"""Keys of an item that decide its stability under a blast; no load depends on them."""
 
 
 class Item(Section):
-    """A barrier that comes in one piece: modules that are placed together.
+    """A barrier of several modules that are placed together.
 
-    In a file `from_catalogue` names a barrier of the stock list (`stock_barriers`) that the other
-    keys are taken from; its size cannot be changed. In the item everything is filled in.
+    In a file `from_catalogue` names a barrier of the stock list (`stock_barriers`) with the
+    defaults of all other keys but the stock; its size cannot be changed. The item has all values.
 
     Attributes:
         name: Name in layouts, tables and drawings.
-        description: What it is, for people.
+        description: Description for readers.
         length_modules: Modules along its length: to the right, or upwards if it is turned.
         thickness_modules: Modules across its length.
         height_m: Height above the ground.
-        cost: What a piece costs where no cost area says otherwise.
-        stock: How many pieces there are.
+        cost: Cost of a piece outside all cost areas.
+        stock: Number of pieces.
         rotatable: Whether it may be turned by a right angle.
-        stops_vehicles: Whether no vehicle gets past it, over it or through it.
-        mass_kg: Mass of a piece; without it, that of a solid block of concrete.
-        base_width_m: Width of its base; without it, its thickness.
-        friction: Coefficient of friction with the ground; 0.5 without it.
-        anchorage_n: Horizontal force that the anchors of a piece hold; none without it.
-        crash_rating: Which vehicles it stops; without it, every one. Where a vehicle has no speed,
-            it is not heeded.
-        from_catalogue: Always `None`: what it stood for is in the others.
+        stops_vehicles: Whether it stops vehicles.
+        mass_kg: Mass of a piece; that of a solid block of concrete unless given.
+        base_width_m: Width of its base; its thickness unless given.
+        friction: Coefficient of friction with the ground; 0.5 unless given.
+        anchorage_n: Horizontal capacity of the anchors of a piece, N; none unless given.
+        crash_rating: Its crash rating; without one, it stops every vehicle. Vehicles without a
+            motion ignore it.
+        from_catalogue: Always `None`; its values are in the other attributes.
     """
 
     name: Name
@@ -134,7 +134,7 @@ class Item(Section):
     @model_validator(mode="before")
     @classmethod
     def _from_stock_list(cls, given: Any) -> Any:
-        """Fill in what the barrier that `from_catalogue` names is."""
+        """Fill in the values of the barrier named by `from_catalogue`."""
         if not isinstance(given, Mapping) or given.get("from_catalogue") is None:
             return given
         name, known = given["from_catalogue"], stock_barriers()
@@ -157,14 +157,14 @@ class Item(Section):
 
     @model_serializer(mode="wrap")
     def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what is not said of mass, base, friction, anchors, and the crash test."""
+        """Omit missing values of mass, base, friction, anchors and crash rating."""
         dump: dict[str, Any] = handler(self)
         optional = {*RIGID_KEYS, "crash_rating"}
         return {key: dump[key] for key in dump if key not in optional or dump[key] is not None}
 
     @property
     def rigid_piece(self) -> RigidPiece:
-        """A piece as a rigid body, per metre of its length."""
+        """A piece as a rigid body."""
         return RigidPiece.of_block(
             MODULE_SIDE_M * self.length_modules,
             MODULE_SIDE_M * self.thickness_modules,
@@ -177,7 +177,7 @@ class Item(Section):
 
     @model_validator(mode="after")
     def _check_rating(self) -> Self:
-        """Refuse a crash rating of what stops no vehicle."""
+        """Refuse a crash rating of an item that stops no vehicle."""
         if self.crash_rating is not None and not self.stops_vehicles:
             message = "must be left out: stops_vehicles is false"
             raise ScenarioError("item", [Problem("crash_rating", message)])
@@ -185,30 +185,30 @@ class Item(Section):
 
     @property
     def orientations(self) -> tuple[bool, ...]:
-        """In which orientations it can be set down: not turned, and turned."""
+        """The possible values of `turned`: false, and true if that makes a difference."""
         square = self.length_modules == self.thickness_modules
         return (False, True) if self.rotatable and not square else (False,)
 
     def footprint(self, turned: bool) -> tuple[int, int]:
-        """Return how many rows and columns of cells it covers."""
+        """Return the number of rows and of columns of cells that it covers."""
         size = self.thickness_modules, self.length_modules
         return size[::-1] if turned else size
 
 
 class Hardening(Section):
-    """Better components for some bays of facades, at a price: a part of a layout as an item is.
+    """A measure of a layout that puts stronger components in some bays of facades.
 
-    Each can be taken once. It covers no cell, and no load depends on it.
+    It can be taken once, covers no cell, and changes no load.
 
     Attributes:
         name: Name in layouts and tables.
-        description: What it is, for people.
-        structures: On which structures; on all that have a facade unless given.
-        walls: On which walls; on all unless given.
-        storeys: In which storeys, from 1; in all unless given.
-        glazing: Component whose glass the windows there get; sizes and sills stay.
-        wall: Component that takes the place of the wall panels there.
-        cost: What it costs.
+        description: Description for readers.
+        structures: Names of its structures; all with a facade unless given.
+        walls: Its walls; all unless given.
+        storeys: Its storeys, from 1; all unless given.
+        glazing: Component with the new glass of the windows there; sizes and sills stay.
+        wall: Component of the new wall panels there.
+        cost: Cost of the measure.
     """
 
     name: Name
@@ -229,7 +229,7 @@ class Hardening(Section):
         return self
 
     def covers(self, bay: Bay) -> bool:
-        """Return whether a bay is one of those that it changes."""
+        """Return whether it applies to a bay."""
         return (
             (self.structures is None or bay.structure in self.structures)
             and bay.wall in self.walls
@@ -238,15 +238,15 @@ class Hardening(Section):
 
 
 class Removable(Section):
-    """Structures that may be taken away, at a price: a part of a layout as an item is.
+    """A measure of a layout that removes structures.
 
-    What stood there is gone for blasts and vehicles. Its ground stays closed to pieces.
+    The structures no longer affect blasts and vehicles. Their ground stays closed to pieces.
 
     Attributes:
         name: Name in layouts and tables.
-        description: What it is, for people.
+        description: Description for readers.
         structures: Names of the structures, none of them protected.
-        cost: What it costs.
+        cost: Cost of the measure.
     """
 
     name: Name
@@ -256,25 +256,25 @@ class Removable(Section):
 
 
 AnyMeasure = Hardening | Removable
-"""What is taken or not, and covers no cell."""
+"""A measure, which is taken or not and covers no cell."""
 
 _KINDS: Final[Mapping[type, type[Measure]]] = {Hardening: Measure, Removable: Removal}
 
 
 class Variant(NamedTuple):
-    """One way to set an item down.
+    """An item in one orientation, or a measure.
 
     Attributes:
         item: Index of the item in the catalogue.
         name: Its name; empty for the single module of a zone without a catalogue.
         turned: Whether its length runs upwards.
-        rows: Rows of cells that it covers; 0 of a measure.
-        columns: Columns of cells that it covers; 0 of a measure.
-        height_m: Its height; `None` is as high as the air.
-        cost: What a piece costs where no cost area says otherwise.
-        stops_vehicles: Whether no vehicle gets past it.
-        crash_rating: Which vehicles it stops; `None` is every one.
-        kind: What an element of it is.
+        rows: Rows of cells that it covers; 0 for a measure.
+        columns: Columns of cells that it covers; 0 for a measure.
+        height_m: Its height; `None` is the height of the air.
+        cost: Cost of a piece outside all cost areas.
+        stops_vehicles: Whether it stops vehicles.
+        crash_rating: Its crash rating; without one, it stops every vehicle.
+        kind: Class of its elements.
     """
 
     item: int
@@ -294,7 +294,7 @@ class Variant(NamedTuple):
         return self.rows == 0
 
     def cells_at(self, row: int, column: int) -> Iterator[Cell]:
-        """Yield the cells that it covers with its lower left one there, row by row."""
+        """Yield the cells that it covers from a lower left cell, row by row."""
         for up in range(self.rows):
             for right in range(self.columns):
                 yield row + up, column + right
@@ -304,10 +304,10 @@ class PlacedModule(NamedTuple):
     """One module of a layout.
 
     Attributes:
-        cell: Where it stands.
-        height_m: Its height; `None` is as high as the air.
-        piece: Name of the piece that it is part of; empty for a single module.
-        stops_vehicles: Whether no vehicle gets past it.
+        cell: Its cell.
+        height_m: Its height; `None` is the height of the air.
+        piece: Name of its piece; empty for a single module.
+        stops_vehicles: Whether it stops vehicles.
     """
 
     cell: Cell
@@ -318,17 +318,17 @@ class PlacedModule(NamedTuple):
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What can be placed on the cells of a zone, and the numbers of the actions that do it.
+    """The variants that can be placed on the cells of a zone, with their action numbers.
 
-    Without items the only thing to place is a single module, and the elements of a layout are
-    cells; with items they are pieces. Action `variant * rows * columns + row * columns + column`
-    sets a variant down with its lower left cell there; the action after the last one finishes. Of
-    a measure only the action of cell (0, 0) is ever legal.
+    Without items the only variant is a single module, and the elements of a layout are cells; with
+    items they are pieces. Action `variant * rows * columns + row * columns + column` places a
+    variant with its lower left cell at (row, column); the action after the last one finishes. A
+    measure is legal at cell (0, 0) alone.
 
     Attributes:
-        variants: Every way to set an item down: item by item, not turned before turned.
+        variants: The variants: item by item, not turned before turned, then the measures.
         names: Names of the items, then of the measures; empty without a catalogue.
-        stocks: How many pieces there are of each item (of single modules, if there are none).
+        stocks: Number of pieces of each item and measure; without items, of single modules.
         shape: Rows and columns of the zone.
     """
 
@@ -341,7 +341,7 @@ class Catalogue:
     def of_items(
         cls, items: Sequence[Item], measures: Sequence[AnyMeasure], shape: tuple[int, int]
     ) -> "Catalogue":
-        """Return the catalogue of a zone with items, and with measures after them."""
+        """Return the catalogue of a zone with items and measures."""
         variants = tuple(
             Variant(
                 number,
@@ -368,7 +368,7 @@ class Catalogue:
     def of_modules(
         cls, stock: int, height_m: float | None, cost: float, shape: tuple[int, int]
     ) -> "Catalogue":
-        """Return what stands for the catalogue of a zone without one: the single module."""
+        """Return the catalogue of a zone without items: the single module."""
         return cls((Variant(0, "", False, 1, 1, height_m, cost, True),), (), (stock,), shape)
 
     @property
@@ -378,16 +378,16 @@ class Catalogue:
 
     @property
     def finish(self) -> int:
-        """The number of the action that finishes; the others are below it."""
+        """Number of the action that finishes, which is the last one."""
         return len(self.variants) * self.shape[0] * self.shape[1]
 
     def element(self, action: int) -> Element:
-        """Return what an action below `finish` places."""
+        """Return the element that an action below `finish` places."""
         variant, row, column = np.unravel_index(action, (len(self.variants), *self.shape))
         return self.element_at(int(variant), int(row), int(column))
 
     def element_at(self, variant: int, row: int, column: int) -> Element:
-        """Return the element of a variant with its lower left cell there."""
+        """Return the element of a variant at a lower left cell."""
         if not self.has_items:
             return row, column
         chosen = self.variants[variant]
@@ -410,7 +410,7 @@ class Catalogue:
         return (self.variant_number(element) * rows + row) * columns + column
 
     def variant_number(self, element: Element) -> int:
-        """Return the number of the variant that an element is of.
+        """Return the number of an element's variant.
 
         Raises:
             LayoutError: If there is no such item, or it cannot be turned.
@@ -423,7 +423,7 @@ class Catalogue:
         return number
 
     def variant(self, element: Element) -> Variant:
-        """Return the variant that an element is of.
+        """Return the variant of an element.
 
         Raises:
             LayoutError: If there is no such item, or it cannot be turned.
@@ -431,7 +431,7 @@ class Catalogue:
         return self.variants[self.variant_number(element)]
 
     def reason_against(self, element: Element) -> str | None:
-        """Return why there is no such element, whatever the cell, or `None` if there is."""
+        """Return the reason why an element does not exist at any cell, or `None` if it does."""
         if not isinstance(element, Piece) or (element.item, element.turned) in self._numbers:
             return None
         if element.item not in self.names:
@@ -456,12 +456,12 @@ class Catalogue:
         """Return an element of a layout as plain values.
 
         Args:
-            given: (row, column), or with items (row, column, item, turned), of which `turned` may
-                be left out. NumPy's numbers and arrays are welcome.
-            place: Where it comes from, for the error.
+            given: (row, column), or with items (row, column, item, turned); `turned` is optional.
+                NumPy numbers are accepted, and arrays for cells.
+            place: Its place in the layout, for the error.
 
         Raises:
-            LayoutError: If it is anything else.
+            LayoutError: If it has another form.
         """
         if not self.has_items:
             return cell_from(given, place)
@@ -486,11 +486,11 @@ class Catalogue:
         return piece if kind is Piece else kind(*piece)
 
     def layout_from(self, layout: Any) -> tuple[Element, ...]:
-        """Return a layout as plain values, in its order; see `element_from`.
+        """Return a layout as plain values, in order; see `element_from`.
 
         Raises:
-            LayoutError: If it is no layout: a set has no order, and floats and truth values are
-                no integers.
+            LayoutError: If it is not a sequence of elements; sets, floats and truth values are
+                refused.
         """
         is_array = isinstance(layout, np.ndarray) and layout.ndim > 0
         if is_array or (isinstance(layout, Sequence) and not isinstance(layout, str | bytes)):
@@ -512,11 +512,11 @@ def cell_from(given: Any, place: str) -> Cell:
     """Return a pair of integers as a cell.
 
     Args:
-        given: (row, column). NumPy's numbers and arrays are welcome.
-        place: Where it comes from, for the error.
+        given: (row, column); NumPy numbers and arrays are accepted.
+        place: Its place in the layout, for the error.
 
     Raises:
-        LayoutError: If it is anything else.
+        LayoutError: If it has another form.
     """
     if type(given) is tuple and tuple(map(type, given)) == (int, int):
         return given  # the usual case
@@ -531,7 +531,7 @@ def cell_from(given: Any, place: str) -> Cell:
 
 
 def _is_integer(value: Any) -> bool:
-    """Whether the value is an integer; `True` and 1.0 are not."""
+    """Return whether a value is an integer; `True` and 1.0 are not."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 

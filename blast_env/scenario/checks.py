@@ -1,4 +1,4 @@
-"""Checks between the sections of a scenario: whether they fit each other."""
+"""Checks of the consistency between the sections of a scenario."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,10 +55,10 @@ from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 Checked = TypeVar("Checked")
 
 MOST_AIR_BALLS: Final = 1_000_000
-"""What fits into the memory of a common computer."""
+"""Most air balls, by the memory of a common computer."""
 
 MOST_MODULES: Final = 250_000
-"""Of a scene: 250 m x 250 m of buildings, with which a blast takes 2 s more."""
+"""Most modules of a scene: 250 m x 250 m of buildings, which add 2 s to a blast."""
 
 _SITE: Final = TypeAdapter(Site)
 _SOURCE: Final[TypeAdapter[AnySource]] = TypeAdapter(AnySource)
@@ -72,18 +72,18 @@ _OBJECTIVE: Final = TypeAdapter(ObjectiveSection)
 
 @dataclass(frozen=True)
 class Parts:
-    """The sections of a scenario that are sound by themselves.
+    """The sections of a scenario that are valid by themselves.
 
     Attributes:
-        site: The site, if it is sound.
-        sources: The sound sources, by their index.
-        structures: The sound structures, by their index.
-        all_structures: Whether there are no structures but the sound ones.
-        build_zone: The build zone, if there is one and it is sound.
-        parameters: The parameters of the blast model, if they are sound.
-        gauges: The sound gauges, by their index.
-        components: The components, by name; `None` if one of them is unsound.
-        objective: What counts, if it is sound.
+        site: The site, if it is valid.
+        sources: The valid sources, by index.
+        structures: The valid structures, by index.
+        all_structures: Whether all structures are valid.
+        build_zone: The build zone, if there is one and it is valid.
+        parameters: The parameters of the particle model, if they are valid.
+        gauges: The valid gauges, by index.
+        components: The components, by name; `None` if one of them is invalid.
+        objective: The objective, if it is valid.
     """
 
     site: Site | None
@@ -98,25 +98,25 @@ class Parts:
 
     @property
     def air_height_m(self) -> float:
-        """Height of the air; infinite where an unsound section may decide it."""
+        """Height of the air, m; infinite if it may depend on an invalid section."""
         if self.site is None or (self.site.air_height_m is None and not self.all_structures):
             return math.inf
         return air_height_m(self.site, self.structures.values(), self.build_zone)
 
     @property
     def charge_radius_m(self) -> float:
-        """Radius of the charge; where it is unknown, a length that any charge exceeds."""
+        """Radius of the charge, m; if unknown, a length below that of any charge."""
         return 1e-6 if self.parameters is None else charge_radius_m(self.parameters)
 
 
 def charge_radius_m(parameters: SimulationParameters) -> float:
-    """Return the radius of the disc that the charge fills at the start."""
+    """Return the radius of the charge's disc at the start, m."""
     explosive = parameters.explosive
     return (explosive.offset_units + explosive.radius_units) / UNITS_PER_M
 
 
 def sound_parts(document: Mapping[str, Any]) -> Parts:
-    """Return those sections of a scenario file that are sound by themselves."""
+    """Return the sections of a scenario file that are valid by themselves."""
     listed = document.get("structures")
     structures = _sound_items(_STRUCTURE, listed)
     simulation = _sound(_SIMULATION, document.get("simulation", {}))
@@ -134,7 +134,7 @@ def sound_parts(document: Mapping[str, Any]) -> Parts:
 
 
 def check_parts(parts: Parts) -> tuple[Problem, ...]:
-    """Return everything that is wrong between the sections."""
+    """Return all problems between the sections."""
     return (
         *_name_problems(parts),
         *_structure_problems(parts),
@@ -151,7 +151,7 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
 
 
 def _facade_problems(parts: Parts) -> Iterator[Problem]:
-    """Check facades, and the measures that harden them, as far as what they rest on is sound."""
+    """Check facades and the measures that harden them, if the sections that they use are valid."""
     if parts.components is None:
         return
     problems = list(facade_problems(parts.structures, parts.components))
@@ -162,7 +162,7 @@ def _facade_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _removable_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that what may be taken away is there, and is nothing that is to be protected."""
+    """Check that removable structures exist, and are neither protected nor otherwise needed."""
     if parts.build_zone is None or not parts.all_structures:
         return
     structures = {each.name: each for each in parts.structures.values()}
@@ -184,7 +184,7 @@ def _removable_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _objective_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that there is something whose response can count, and what a target needs."""
+    """Check that a response objective has facades, and a target has a budget."""
     objective, zone = parts.objective, parts.build_zone
     if objective is None or not objective.is_response:
         return
@@ -201,15 +201,15 @@ def _objective_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def check_sources(parts: Parts) -> tuple[Problem, ...]:
-    """Return what is wrong between the sources of the charge and the other sections.
+    """Return the problems between the sources of the charge and the other sections.
 
-    Those are what `check_parts` finds if the other sections fit each other.
+    They are the result of `check_parts` if the other sections are consistent.
     """
     return (*_charge_problems(parts), *_build_zone_problems(parts))
 
 
 def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
-    """Return the section, or `None` if it is missing or unsound."""
+    """Return the section, or `None` if it is missing or invalid."""
     try:
         return adapter.validate_python(value)
     except ValidationError:
@@ -217,7 +217,7 @@ def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
 
 
 def _sound_items(adapter: TypeAdapter[Checked], values: object) -> dict[int, Checked]:
-    """Return the sound items of an array by their index."""
+    """Return the valid items of an array by index."""
     if not isinstance(values, list | tuple):
         return {}
     items = ((index, _sound(adapter, value)) for index, value in enumerate(values[:MAX_ITEMS]))
@@ -225,7 +225,7 @@ def _sound_items(adapter: TypeAdapter[Checked], values: object) -> dict[int, Che
 
 
 def _name_problems(parts: Parts) -> Iterator[Problem]:
-    """Check the names of the structures, and that one of them is protected."""
+    """Check the names of the structures, and that at least one is protected."""
     for index, structure in parts.structures.items():
         if structure.name == BARRIER_NAME:
             message = f"is {BARRIER_NAME!r}, the name of the modules of a layout"
@@ -239,7 +239,7 @@ def _name_problems(parts: Parts) -> Iterator[Problem]:
 def _repeated_names(
     key: str, items: Mapping[int, AnyStructure] | Mapping[int, GaugeSection]
 ) -> Iterator[Problem]:
-    """Yield the names that another item of the array has already."""
+    """Yield the problems of names that an earlier item of the array has."""
     first_use: dict[str, int] = {}
     for index, item in items.items():
         used = first_use.setdefault(item.name, index)
@@ -249,7 +249,7 @@ def _repeated_names(
 
 
 def _structure_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that the structures lie inside the site and apart from each other, and their sum."""
+    """Check that structures lie inside the site without overlaps, and their number of modules."""
     stock = 0 if parts.build_zone is None else parts.build_zone.stock
     modules = sum(each.rows * each.columns for each in parts.structures.values()) + stock
     if modules > MOST_MODULES:
@@ -267,7 +267,7 @@ def _structure_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
-    """Whether one of two structures begins where the other ends, or higher."""
+    """Return whether one of two structures begins at or above the top of the other."""
     return any(
         low.height_m is not None and high.base_m >= low.height_m - TOLERANCE_M
         for low, high in ((one, other), (other, one))
@@ -275,7 +275,7 @@ def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
 
 
 def _charge_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that the charge, wherever it is, fits between the structures and the border."""
+    """Check that every place of the charge is clear of structures and border."""
     vehicles = sum(isinstance(source, VehicleSource) for source in parts.sources.values())
     places = 0 if parts.site is None else vehicles * places_on(parts.site)
     if places > MOST_PLACES:
@@ -294,7 +294,7 @@ def _charge_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Problem]:
-    """Check a charge whose places are known."""
+    """Check a charge whose places do not depend on the layout."""
     radius = parts.charge_radius_m
     words = "" if parts.parameters is None else f" by {radius:g} m, the charge's radius"
     bounds = source_bounds_m(source)
@@ -317,7 +317,7 @@ def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Pro
 
 
 def _vehicle_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
-    """Check that a vehicle fits onto the site and gets somewhere, and that it can be stopped."""
+    """Check that a vehicle fits on the site and can enter, and that barriers can stop it."""
     problems = [*_vehicle_size_problems(parts, key, source), *_entry_problems(parts, key, source)]
     listed: dict[str, Sequence[Ground]] = {
         "drivable": source.drivable,
@@ -333,7 +333,7 @@ def _vehicle_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator
 
 
 def _vehicle_size_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
-    """Check that the charge is inside its vehicle, and the vehicle not larger than the site."""
+    """Check that the vehicle is at least as wide as its charge and no larger than the site."""
     least_m = 2.0 * parts.charge_radius_m
     if source.width_m < least_m - TOLERANCE_M:
         message = f"is {source.width_m:g}, must be at least {least_m:g}, the charge's diameter"
@@ -346,7 +346,7 @@ def _vehicle_size_problems(parts: Parts, key: str, source: VehicleSource) -> Ite
 
 
 def _entry_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
-    """Check that entries lie on the border, and are wide enough."""
+    """Check that entries lie on the border and are wide enough."""
     if parts.site is None:
         return
     for index, entry in enumerate(source.entries):
@@ -365,7 +365,7 @@ def _entry_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[P
 
 
 def _way_problems(parts: Parts, key: str, ground: VehicleGround) -> Iterator[Problem]:
-    """Check that a vehicle gets onto the site and on, and no nearer than a barrier lets it."""
+    """Check that a vehicle can enter, approach a protected structure, and be stopped."""
     width = f"{ground.source.width_m:g} m, its width"
     reach = ground.reach()
     if not reach.enters:
@@ -390,7 +390,7 @@ def _way_problems(parts: Parts, key: str, ground: VehicleGround) -> Iterator[Pro
 def _stopping_problems(
     parts: Parts, key: str, ground: VehicleGround, zone: BuildZone
 ) -> Iterator[Problem]:
-    """Check that a barrier can keep a vehicle any further away than the empty site does."""
+    """Check that a barrier can increase the stand-off of a vehicle over the empty site's."""
     cells = _stopping_cells(empty_zone(_surroundings(parts, zone)), ground.source)
     if not cells.any():
         message = "nothing can stop the vehicle: no item in stock stops vehicles"
@@ -398,7 +398,7 @@ def _stopping_problems(
             message += f", or is rated for {ground.source.motion.mass_kg:g} kg"
         yield Problem(key, message)
         return
-    # Cells side by side leave no gap: a rectangle of them stops a vehicle as they do.
+    # Adjoining cells leave no gap: their rectangle stops a vehicle as they do.
     full = Obstacles(stops=tuple(zone.cells_rectangle_m(*each) for each in stacked_runs(cells)))
     stand_off_m = ground.worst_places().stand_off_m
     if ground.worst_places(full).stand_off_m <= stand_off_m + TOLERANCE_M:
@@ -411,7 +411,7 @@ def _stopping_problems(
 
 
 def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
-    """Return the cells on which something can stand that stops a vehicle (rows, columns)."""
+    """Return the cells that an item which stops the vehicle can cover (rows, columns)."""
     cells = np.zeros_like(empty.usable)
     rows, columns = cells.shape
     for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):
@@ -425,7 +425,7 @@ def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
 
 
 def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:
-    """Return what a vehicle meets on the empty site, which must be sound."""
+    """Return a vehicle's ground on the empty site, which must be valid."""
     assert parts.site is not None
     way = None if parts.build_zone is None else parts.build_zone.access_way
     closed: tuple[Rectangle, ...] = ()
@@ -441,7 +441,7 @@ def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:
 
 
 def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
-    """Check where the build zone lies, and that something can be built in it."""
+    """Check that the build zone lies inside the site, and that barriers can be built in it."""
     zone = parts.build_zone
     if zone is None:
         return
@@ -457,7 +457,7 @@ def _surroundings(parts: Parts, zone: BuildZone) -> Surroundings:
 
 
 def _height_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that nothing sticks out of the air."""
+    """Check that structures and barriers do not exceed the height of the air."""
     for index, structure in parts.structures.items():
         yield from _above_the_air(parts, f"structures[{index}].height_m", structure.height_m)
         top_m = parts.air_height_m if structure.height_m is None else structure.height_m
@@ -478,7 +478,7 @@ def _height_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _gauge_problems(parts: Parts) -> Iterator[Problem]:
-    """Check that each gauge has a name of its own, and air around it or near it."""
+    """Check that gauges have unique names, and lie in the air or at most a module inside."""
     yield from _repeated_names("gauges", parts.gauges)
     for index, gauge in parts.gauges.items():
         key, (x_m, y_m, z_m) = f"gauges[{index}].position_m", gauge.position_m
@@ -499,7 +499,7 @@ def _gauge_problems(parts: Parts) -> Iterator[Problem]:
 def _above_the_air(
     parts: Parts, key: str, height_m: float | None, ground_m: float = 0.0
 ) -> Iterator[Problem]:
-    """Yield a problem if a height, from the ground of a terrace on, is above the air."""
+    """Yield a problem if a height above its ground, such as a terrace, exceeds the air."""
     if height_m is not None and ground_m + height_m > parts.air_height_m + TOLERANCE_M:
         terrace = f" on a terrace of {ground_m:g}" if ground_m > 0.0 else ""
         message = (
@@ -539,10 +539,10 @@ def particle_problems(
     sources: Sequence[AnySource],
     structures: Sequence[AnyStructure],
 ) -> Iterator[Problem]:
-    """Yield why particles cannot run a scenario that gas dynamics can.
+    """Yield the features of a scenario that particles cannot simulate, unlike gas dynamics.
 
     Args:
-        parameters: Those of the particles; they must reach to the mass of every charge.
+        parameters: Parameters of the particle model, which bound the mass of every charge.
         sources: The sources of the charges.
         structures: The structures; all must stand on the ground, and none be a terrace.
     """
@@ -567,7 +567,7 @@ def particle_problems(
 
 
 def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
-    """Check that the air is not so fine that the computer's memory cannot hold it."""
+    """Check the number of air balls, which memory limits."""
     if site is None:
         return
     balls = lattice_capacity(air, site.rectangle_m.scaled(UNITS_PER_M))
@@ -582,14 +582,14 @@ def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
 def _outside_site(
     parts: Parts, key: str, description: str, rectangle: Rectangle
 ) -> Iterator[Problem]:
-    """Yield a problem if the rectangle sticks out of the site."""
+    """Yield a problem if a rectangle is not inside the site."""
     if parts.site and not parts.site.rectangle_m.contains(rectangle):
         site = extent(parts.site.rectangle_m)
         yield Problem(key, f"{description} must lie inside the site ({site})")
 
 
 def _place(point_m: PointM) -> str:
-    """Return a point in words."""
+    """Return the text of a point."""
     return f"({point_m[0]:g}, {point_m[1]:g}) m"
 
 

@@ -1,7 +1,7 @@
-"""Crash ratings: which vehicle a barrier has stopped in a test, at which speed, and how far it got.
+"""Crash ratings: mass and speed of the vehicle that a barrier stopped in a test, and penetration.
 
-A rating is what a test showed, and covers a vehicle that is no heavier and no faster than the one
-of the test. It says nothing of another vehicle with the same energy. Codes of three standards are
+A rating is the result of a test, and covers vehicles no heavier and no faster than the test
+vehicle. It does not cover another vehicle of the same energy. Codes of three standards are
 read: IWA 14-1, PAS 68, and ASTM F2656.
 """
 
@@ -24,7 +24,7 @@ _ASTM_KG: Final[Mapping[str, float]] = MappingProxyType(
 _ASTM_KM_H: Final[Mapping[str, float]] = MappingProxyType(
     {"30": 48.0, "40": 64.0, "50": 80.0, "60": 96.0}
 )
-"""Speeds in miles an hour, as whole km/h and rounded down."""
+"""Speeds in km/h, rounded down to whole numbers, by their codes in miles per hour."""
 
 _ASTM_PENETRATION_M: Final[Mapping[str, float]] = MappingProxyType(
     {"P1": 1.0, "P2": 7.0, "P3": 30.0}
@@ -39,15 +39,15 @@ _IWA: Final = re.compile(
 
 
 class CrashRating(Section):
-    """What a crash test showed.
+    """The result of a crash test.
 
     In a file it is a table with these keys, or the code of the test as text.
 
     Attributes:
-        mass_kg: VehicleMass of the vehicle of the test.
-        speed_km_h: Its speed.
-        penetration_m: How far beyond the barrier's rear its load got; 0 where it did not.
-        test: The test in words or as its code, with the class of the vehicle; for people.
+        mass_kg: Mass of the test vehicle.
+        speed_km_h: Speed of the test vehicle.
+        penetration_m: Penetration of its load beyond the rear of the barrier; 0 if none.
+        test: Description or code of the test, with the class of the vehicle, for readers.
     """
 
     mass_kg: VehicleMass
@@ -88,6 +88,6 @@ class CrashRating(Section):
 
     @property
     def words(self) -> str:
-        """The rating in a few words."""
+        """Description of the rating for messages."""
         name = f" ({self.test})" if self.test else ""
         return f"rated {self.mass_kg:g} kg at {self.speed_km_h:g} km/h{name}"

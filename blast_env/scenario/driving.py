@@ -1,18 +1,17 @@
-"""How fast a vehicle can be at every place that it gets to: a search over place, direction, speed.
+"""Largest speed of a vehicle at every place of its reach: a search over place, direction, speed.
 
-The vehicle is a point with a speed. Along a metre it gains what its acceleration gives,
-v^2 = v0^2 + 2 a s, up to its largest speed, and to turn with radius r it must be no faster than
-v^2 = f g r, where f is the grip of its tyres (UFC 4-022-02, after MIL-HDBK-1013/14, equations 5 and
-6). It brakes at once wherever that helps it.
+The vehicle is a point with a speed. Over a distance s it accelerates by v^2 = v0^2 + 2 a s, up to
+its largest speed, and in a turn with radius r its speed is at most v^2 = f g r, where f is the grip
+of its tyres (UFC 4-022-02, after MIL-HDBK-1013/14, equations 5 and 6). Braking is instantaneous.
 
-Places are points 0.5 m apart and directions sixteen. From a point the vehicle goes straight on, or
-turns on an arc, to a neighbouring direction or the one after it, with one of some radii. What is
-tighter than 3.5 m is a turn on the spot, no faster than on that radius. Everything is rounded so
-that speeds come out too high rather than too low: a place counts as open if any place within 0.25 m
-is, a radius as the next larger one of the table, and a run-up is longer by one step.
+Places are points 0.5 m apart, and there are sixteen directions. From a point the vehicle goes
+straight on, or turns on an arc to one of the next two directions on either side, with a radius
+from a table. A turn tighter than 3.5 m is one on the spot, with the speed limit of that radius. All
+rounding is towards higher speeds: a place is open if any place within 0.25 m is, a radius counts as
+the next larger one of the table, and a run-up is longer by one step.
 
-More obstacles leave fewer steps, so they never make any speed larger. Nor do fewer arcs: a search
-with few of them tells soon, and for certain, of most pieces that a vehicle hits too fast.
+More obstacles leave fewer steps, so they never raise a speed. Nor do fewer arcs: a search with few
+of them quickly and safely identifies most pieces that a vehicle hits too fast.
 """
 
 from collections import deque
@@ -43,7 +42,7 @@ GRAVITY_M_S2: Final = 9.81
 KM_H_PER_M_S: Final = 3.6
 
 STEP_M: Final = 0.5
-"""How far apart places are."""
+"""Spacing of places."""
 
 _EPSILON_M: Final = 1e-6
 
@@ -53,12 +52,12 @@ class SpeedField:
     """The largest speeds of a vehicle, by direction and place.
 
     Attributes:
-        motion: How it drives.
+        motion: Motion of the vehicle.
         half_m: Half of its width.
-        run_up_m: The run-up from standstill that each speed takes (directions, rows, columns),
-            below 0 where it never is; place (row, column) is at `STEP_M * (column, row)`.
-        is_open: Which places are open to its centre (rows, columns).
-        starts: Where it enters (rows, columns).
+        run_up_m: Run-up from standstill for each speed (directions, rows, columns), below 0 for
+            unreachable states; place (row, column) is at `STEP_M * (column, row)`.
+        is_open: Whether each place is open to its centre (rows, columns).
+        starts: Places of its entries (rows, columns).
     """
 
     motion: Motion
@@ -76,17 +75,17 @@ class SpeedField:
         starts: Sequence[tuple[BoolArray, PointM]],
         arc_step: int = 1,
     ) -> "SpeedField":
-        """Work the speeds out.
+        """Compute the speeds.
 
         Args:
-            motion: How the vehicle drives.
+            motion: Motion of the vehicle.
             half_m: Half of its width.
-            is_open: Which places are open to its centre (rows, columns).
-            starts: Where it enters (rows, columns), and the direction into the site there.
-            arc_step: One arc of so many is taken, see `Arcs.every`; speeds are exact with all of
-                them, and no larger with fewer.
+            is_open: Whether each place is open to its centre (rows, columns).
+            starts: Places of each entry (rows, columns), with the direction into the site.
+            arc_step: Use one arc in `arc_step`, see `Arcs.every`; speeds are exact with 1, and no
+                larger otherwise.
         """
-        # Here, because they import Numba, which takes half a second.
+        # Imported here because Numba takes half a second to import.
         from blast_env.scenario.driving_kernels import all_open, any_slow, spread
 
         def label(speed_km_h: float) -> float:
@@ -97,7 +96,7 @@ class SpeedField:
         for area in motion.slow:
             inside = places_in(area.rectangle_m.grown(-STEP_M / 2.0))
             most[inside] = np.minimum(most[inside], label(area.speed_km_h))
-        # What is beyond all open places takes time, and nothing else.
+        # Restrict the search to the bounding box of the open places, to save time.
         box = _around(is_open)
         ground, most = np.ascontiguousarray(is_open[box]), np.ascontiguousarray(most[box])
         labels = np.full((len(DIRECTIONS), *ground.shape), NEVER)
@@ -139,7 +138,7 @@ class SpeedField:
 
     @property
     def places_km_h(self) -> FloatArray:
-        """The largest speed at each place, in any direction (rows, columns); NaN where never."""
+        """The largest speed at each place in any direction (rows, columns); NaN if unreachable."""
         run_up_m = self.run_up_m.max(axis=0).astype(np.float64)
         return np.where(run_up_m < 0.0, np.nan, self._km_h(run_up_m))
 
@@ -148,13 +147,13 @@ class SpeedField:
 
         Args:
             rectangle: The rectangle, m.
-            among: From which places (rows, columns); all, unless given.
+            among: Places from which it may hit (rows, columns); the open ones unless given.
         """
         state = self._hit(rectangle, among)
         return None if state is None else self._hit_km_h(state)
 
     def way_to_impact(self, rectangle: Rectangle) -> tuple["WayPoint", ...]:
-        """Return the way to a rectangle on which the vehicle is fastest when it hits it."""
+        """Return the way to a rectangle with the largest impact speed; empty if there is none."""
         state = self._hit(rectangle)
         if state is None:
             return ()
@@ -162,7 +161,7 @@ class SpeedField:
         return (*way, way[-1]._replace(speed_km_h=self._hit_km_h(state)))
 
     def way_to(self, place_m: PointM) -> tuple["WayPoint", ...]:
-        """Return a way to a place, at the largest speed that is possible there."""
+        """Return a way to a place with the largest speed there; empty if there is none."""
         x, y = (round(each / STEP_M) for each in place_m)
         _, rows, columns = self.run_up_m.shape
         near = self.run_up_m[:, max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
@@ -173,7 +172,7 @@ class SpeedField:
         return self._way(int(np.ravel_multi_index((int(number), row, column), (16, rows, columns))))
 
     def _hit(self, rectangle: Rectangle, among: BoolArray | None = None) -> int | None:
-        """Return the state from which the vehicle hits a rectangle fastest."""
+        """Return the state from which the vehicle hits a rectangle fastest, if there is one."""
         from blast_env.scenario.driving_kernels import fastest_into
 
         left, bottom, right, top = rectangle.grown(self.half_m)
@@ -210,9 +209,9 @@ class SpeedField:
         return tuple(reversed([*self._backwards(state)]))
 
     def _backwards(self, state: int) -> Iterator["WayPoint"]:
-        """Yield the places of a way from its end to where it enters.
+        """Yield the places of a way from its end back to an entry.
 
-        Where it goes round in circles to become faster, it goes straight to the entry from there.
+        If the way loops to gain speed, the rest is a short way from there to the entry.
         """
         _, rows, columns = self.run_up_m.shape
         seen: set[int] = set()
@@ -231,11 +230,11 @@ class SpeedField:
             yield WayPoint((STEP_M * x, STEP_M * y), float(self._km_h(run_up_m)))
 
     def _entry_m(self, number: int) -> float:
-        """Return the run-up of the speed with which it enters in a direction."""
+        """Return the run-up, m, of the entry speed in a direction."""
         return _run_up_m(self.motion, self.motion.entry_km_h) + STEP_M * float(LENGTHS[number])
 
     def _before(self, number: int, row: int, column: int) -> int | None:
-        """Return a state from which one step makes the vehicle as fast as it is here."""
+        """Return a state from which one step gives the speed of this state, if there is one."""
         _, rows, columns = self.run_up_m.shape
         own_m = float(self.run_up_m[number, row, column]) - 1e-3
         arcs = all_arcs()
@@ -266,7 +265,7 @@ class SpeedField:
         return None if fastest == number else (fastest * rows + row) * columns + column
 
     def _back_to_entry(self, row: int, column: int) -> Iterator[tuple[int, int]]:
-        """Yield the open places on a short way from a place to where the vehicle enters."""
+        """Yield the open places on a shortest way from a place to an entry."""
         came: dict[tuple[int, int], tuple[int, int] | None] = {(row, column): None}
         queue = deque(came)
         rows, columns = self.is_open.shape
@@ -290,8 +289,8 @@ class WayPoint(NamedTuple):
     """A place on the way of a vehicle.
 
     Attributes:
-        place_m: Where its centre is.
-        speed_km_h: The largest speed that is possible there in that direction.
+        place_m: Place of its centre.
+        speed_km_h: Largest possible speed there in that direction.
     """
 
     place_m: PointM
@@ -299,12 +298,12 @@ class WayPoint(NamedTuple):
 
 
 def places_shape(width_m: float, height_m: float) -> tuple[int, int]:
-    """Return how many rows and columns of places a site has."""
+    """Return the number of rows and of columns of places on a site."""
     return round(height_m / STEP_M) + 1, round(width_m / STEP_M) + 1
 
 
 def _around(places: BoolArray) -> tuple[slice, slice]:
-    """Return the smallest rectangle of places that holds some of them; all, if there are none."""
+    """Return the bounding box of some places, rows and columns; all if there are none."""
     if not places.any():
         return slice(None), slice(None)
     found = (np.flatnonzero(places.any(axis=axis)) for axis in (1, 0))
@@ -313,17 +312,17 @@ def _around(places: BoolArray) -> tuple[slice, slice]:
 
 
 def _run_up_m(motion: Motion, speed_km_h: float) -> float:
-    """Return the run-up from standstill to a speed."""
+    """Return the run-up from standstill to a speed, m."""
     return float((speed_km_h / KM_H_PER_M_S) ** 2 / (2.0 * motion.acceleration_m_s2))
 
 
 def _per_radius(motion: Motion) -> float:
-    """Return the run-up that the largest speed in a turn takes, over the turn's radius."""
+    """Return the run-up to the largest speed in a turn, divided by the turn's radius."""
     return motion.grip * GRAVITY_M_S2 / (2.0 * motion.acceleration_m_s2)
 
 
 def places_in(rectangle: Rectangle) -> tuple[slice, slice]:
-    """Return the places in a closed rectangle."""
+    """Return the rows and columns of the places in a closed rectangle."""
     left, bottom, right, top = rectangle
     rows = slice(max(ceil(bottom / STEP_M - _EPSILON_M), 0), floor(top / STEP_M + _EPSILON_M) + 1)
     columns = slice(

@@ -1,4 +1,4 @@
-"""The search over the steps of a driving vehicle; compiled, and imported when a vehicle drives.
+"""Compiled search over the steps of a driving vehicle, imported on first use.
 
 Lengths and labels are those of `blast_env.scenario.driving_steps`. Sets of places are bits, 64 of a
 row in a word: the first place of a row is the lowest bit of its first word.
@@ -19,7 +19,7 @@ _WORD: Final = 64
 _ONE: Final = np.uint64(1)
 
 _DE_BRUIJN: Final = 0x03F79D71B4CB0A89
-"""Any six bits of it in a row are different ones, which tells where a single bit stands."""
+"""De Bruijn sequence: its windows of six bits are distinct, and so identify a single bit."""
 
 _PLACE: Final = np.argsort(
     [((_DE_BRUIJN << bit) & (2**_WORD - 1)) >> (_WORD - 6) for bit in range(_WORD)]
@@ -27,7 +27,7 @@ _PLACE: Final = np.argsort(
 
 
 def packed(places: BoolArray, padding: int = 0) -> Bits:
-    """Return places as bits, with so many empty words before and after each row (rows, words)."""
+    """Return places as bits (rows, words), with `padding` empty words at both ends of each row."""
     rows, columns = places.shape
     words = -(-columns // _WORD)
     whole = np.zeros((rows, _WORD * (words + 2 * padding)), dtype=bool)
@@ -37,7 +37,7 @@ def packed(places: BoolArray, padding: int = 0) -> Bits:
 
 
 def all_open(places: BoolArray, first: IntArray32, points: IntArray32) -> Bits:
-    """Return from where all points of each arc are among some places (arcs, rows, words).
+    """Return the starts from which all points of each arc are in `places` (arcs, rows, words).
 
     Args:
         places: The places (rows, columns).
@@ -52,13 +52,13 @@ def all_open(places: BoolArray, first: IntArray32, points: IntArray32) -> Bits:
 
 
 def any_slow(places: BoolArray, first: IntArray32, points: IntArray32, passable: Bits) -> Bits:
-    """Return from where any point of each arc is among some places; arguments as for `all_open`.
+    """Return the starts from which any point of each arc is in `places` (arcs, rows, words).
 
     Args:
         places: As for `all_open`.
         first: As for `all_open`.
         points: As for `all_open`.
-        passable: From where arcs are asked about (arcs, rows, words); their points are all inside.
+        passable: Starts to examine (arcs, rows, words); the points of their arcs are all inside.
     """
     padding = _padding(points)
     found = np.zeros_like(passable)
@@ -67,13 +67,13 @@ def any_slow(places: BoolArray, first: IntArray32, points: IntArray32, passable:
 
 
 def _padding(points: IntArray32) -> int:
-    """Return how many words beyond a row's ends points may reach."""
+    """Return the number of words that points may reach beyond the ends of a row."""
     return int(np.abs(points[:, 0]).max()) // _WORD + 2
 
 
 @njit(cache=True, inline="always")
 def _from(row: Bits, word: int, by: int) -> np.uint64:
-    """Return a word of a row, seen from `by` places before."""
+    """Return a word of a row shifted by `by` places."""
     at, part = word + (by >> 6), by & 63
     seen: np.uint64 = row[at] >> uint64(part)
     if part:
@@ -83,7 +83,7 @@ def _from(row: Bits, word: int, by: int) -> np.uint64:
 
 @njit(cache=True)
 def _all_open(bits: Bits, padding: int, first: IntArray32, points: IntArray32, found: Bits) -> None:
-    """Do what `all_open` says."""
+    """Fill `found` with the result of `all_open`."""
     arcs, rows, words = found.shape
     for arc in range(arcs):
         begin, end = first[arc], first[arc + 1]
@@ -109,7 +109,7 @@ def _any_slow(
     passable: Bits,
     found: Bits,
 ) -> None:
-    """Do what `any_slow` says."""
+    """Fill `found` with the result of `any_slow`."""
     arcs, rows, words = found.shape
     for arc in range(arcs):
         for row in range(rows):
@@ -123,14 +123,14 @@ def _any_slow(
 
 @njit(cache=True, inline="always")
 def _lowest(bits: np.uint64) -> int:
-    """Return the place of the lowest bit that is set."""
+    """Return the position of the lowest set bit."""
     place: int = _PLACE[((bits & (~bits + _ONE)) * uint64(_DE_BRUIJN)) >> uint64(_WORD - 6)]
     return place
 
 
 @njit(cache=True)
 def _highest(bits: np.uint64) -> int:
-    """Return the place of the highest bit that is set."""
+    """Return the position of the highest set bit."""
     for by in (1, 2, 4, 8, 16, 32):
         bits |= bits >> uint64(by)
     return _lowest(bits ^ (bits >> _ONE))
@@ -146,7 +146,7 @@ def _raise(
     column: int,
     value: float,
 ) -> None:
-    """Set a label, and note that steps from there are to be tried."""
+    """Set a label, and mark its state for further steps."""
     labels[number, row, column] = value
     changed[number, row, column >> 6] |= _ONE << uint64(column & 63)
     waiting[number, row] = True
@@ -166,10 +166,9 @@ def _straight_and_spot(
     length: float,
     spot_limit: np.float32,
 ) -> None:
-    """Lead changed labels of one direction straight on, and turn them on the spot.
+    """Propagate changed labels of one direction straight on, and by turns on the spot.
 
-    Places come in the order in which the direction meets them, so that one pass leads a label on to
-    the end.
+    Places are visited in the direction of travel, so that one pass propagates a label to the end.
 
     Args:
         number: The direction.
@@ -177,8 +176,8 @@ def _straight_and_spot(
         is_wide: As in `spread`.
         most: As in `spread`.
         labels: As in `spread`.
-        changed: From where steps are to be tried (directions, rows, words).
-        waiting: In which rows there are some (directions, rows).
+        changed: States whose steps are to be tried (directions, rows, words).
+        waiting: Whether each row has any of them (directions, rows).
         spots: The largest label of a turn on the spot so far (rows, columns).
         step: The step of the direction.
         length: Its length.
@@ -244,24 +243,23 @@ def spread(
 ) -> None:
     """Raise labels until no step raises one any further.
 
-    A label is the run-up that a speed takes from standstill, v^2 / 2 a, in steps; below 0 where the
-    vehicle never is. Labels only rise, and no higher than any order of steps makes them: so the
-    order is one of speed alone. Only from labels that have changed are steps tried.
+    A label is the run-up from standstill to a speed, v^2 / 2 a, in steps; below 0 for unreachable
+    states. Labels only rise, and their final values do not depend on the order of steps, which
+    matters for run time alone. Steps are tried only from changed labels.
 
     Args:
-        is_open: Which places are open (rows, columns).
-        is_wide: At which there is room to turn on the spot.
+        is_open: Whether each place is open (rows, columns).
+        is_wide: Whether each place has room for a turn on the spot (rows, columns).
         most: The largest label at each place (rows, columns).
-        labels: By direction and place, at first where the vehicle enters (directions, rows,
-            columns).
-        directions: The steps.
-        lengths: Their lengths.
+        labels: Labels, at first those of the entries (directions, rows, columns); changed in place.
+        directions: The steps (directions, 2).
+        lengths: Their lengths (directions,).
         of: As in `Arcs`.
         ends: As in `Arcs`.
         arc_lengths: Lengths of the arcs.
         arc_most: The largest label on each arc.
-        passable: From where each arc is open (arcs, rows, words).
-        slowed: From where it touches ground that slows the vehicle; without words if none is.
+        passable: Starts from which each arc is open (arcs, rows, words).
+        slowed: Starts from which it touches slow ground (arcs, rows, words); empty if none do.
         slow_most: The largest label on such ground.
         spot_most: The largest label of a turn on the spot.
     """
@@ -270,7 +268,7 @@ def spread(
     changed = np.zeros((count, rows, words), dtype=np.uint64)
     waiting = np.zeros((count, rows), dtype=np.bool_)
     spots = np.full((rows, columns), NEVER)
-    spot_limit = np.float32(spot_most)  # as labels are: else it would be above them for ever
+    spot_limit = np.float32(spot_most)  # in the precision of labels, else the loop would not end
     for number in range(count):
         for row in range(rows):
             for column in range(columns):
@@ -329,18 +327,18 @@ def fastest_into(
     slack_m: float,
     epsilon_m: float,
 ) -> int:
-    """Return the state whose next step is the fastest into a rectangle; -1 if there is none.
+    """Return the state with the fastest next step into a rectangle; -1 if there is none.
 
     Args:
         run_up_m: As in `SpeedField`.
-        among: From which places (rows, columns).
-        box: The first row and the one after the last, then columns, between which there may be one.
-        steps_m: The steps of directions (directions, 2).
+        among: Places to examine (rows, columns).
+        box: First row and the one after the last, then the same for columns, of the search.
+        steps_m: Steps of the directions (directions, 2).
         lengths_m: Their lengths.
         sides_m: Left, bottom, right and top of the rectangle, grown by half of the vehicle's width.
-        place_m: How far apart places are.
-        slack_m: How far inside of it a place may be that counts as outside.
-        epsilon_m: How far inside of it a step must end.
+        place_m: Spacing of places.
+        slack_m: Largest depth inside the rectangle at which a place counts as outside.
+        epsilon_m: Least depth inside the rectangle at which a step must end.
     """
     left, bottom, right, top = sides_m
     _, rows, columns = run_up_m.shape

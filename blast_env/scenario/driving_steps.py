@@ -1,7 +1,7 @@
 """The steps of a driving vehicle on a grid of places.
 
-Lengths are in steps along an axis, and speeds are labels: the run-up that a speed takes from
-standstill, v^2 / 2 a. `blast_env.scenario.driving` says what it is for.
+Lengths are in steps along an axis, and speeds are labels: the run-up from standstill to the speed,
+v^2 / 2 a. See `blast_env.scenario.driving`.
 """
 
 from collections.abc import Iterator
@@ -30,16 +30,16 @@ LENGTHS: Final = np.hypot(*DIRECTIONS.T).astype(np.float32)
 """Lengths of these steps, in steps along an axis."""
 
 _TURNS: Final = ((1, 7.0, 250.0), (2, 6.0, 20.0))
-"""By how many directions arcs turn, and from which radius to which one, in steps."""
+"""Turns of arcs in directions, with their least and largest radius in steps."""
 
 SPOT: Final = 7.0
 """Radius, in steps, below which a turn is one on the spot."""
 
 _RATIO: Final = 1.2
-"""Radii of arcs grow by about this factor."""
+"""Least ratio of successive radii of arcs."""
 
 NEVER: Final = np.float32(-1e9)
-"""The label of a state in which the vehicle never is."""
+"""The label of an unreachable state."""
 
 IntArray32 = NDArray[np.int32]
 Labels = NDArray[np.float32]
@@ -49,12 +49,12 @@ class Arcs(NamedTuple):
     """The arcs from each direction to others; lengths in steps.
 
     Attributes:
-        of: The direction from which each leads, and the one to which (arcs, 2); sorted.
-        first: Where the points of each begin in `points`, and where the last ones end (arcs + 1,).
-        points: Points near the arcs, from their starts (points, 2).
-        ends: Their ends (arcs, 2).
-        lengths: Their lengths (arcs,).
-        radii: Up to which radius each stands for (arcs,).
+        of: First and last direction of each arc (arcs, 2), sorted by the first.
+        first: Index of each arc's first point in `points`, and the number of points (arcs + 1,).
+        points: Points near the arcs, relative to their starts (points, 2).
+        ends: Ends relative to their starts (arcs, 2).
+        lengths: Lengths (arcs,).
+        radii: Largest radius that each represents (arcs,).
     """
 
     of: IntArray32
@@ -65,17 +65,14 @@ class Arcs(NamedTuple):
     radii: Labels
 
     def up_to(self, radius: float) -> "Arcs":
-        """Return them without those that are wider than need be for any speed up to a radius."""
+        """Return the arcs without those wider than any speed up to that of a radius needs."""
         kept = np.ones(len(self.of), dtype=bool)
         same = (self.of[1:] == self.of[:-1]).all(axis=1)
         kept[1:] = ~same | (self.radii[:-1] < radius)
         return self._only(kept)
 
     def every(self, step: int) -> "Arcs":
-        """Return one of so many arcs that follow each other by radius, from the widest on.
-
-        That is done for each pair of directions.
-        """
+        """Return one arc in `step` for each pair of directions, by falling radius."""
         number = np.arange(len(self.of))
         ends = np.append((self.of[1:] != self.of[:-1]).any(axis=1), True)
         last = np.minimum.accumulate(np.where(ends, number, len(number))[::-1])[::-1]
@@ -95,7 +92,7 @@ class Arcs(NamedTuple):
 
 
 def wide_places(is_open: BoolArray) -> BoolArray:
-    """Return at which places a turn on the spot leads anywhere: with a metre along x and y."""
+    """Return the places with room for a turn on the spot: 1 m of open ground along x and y."""
     found = []
     for axis in range(2):
         padded = np.pad(is_open, 2)
@@ -108,13 +105,13 @@ def wide_places(is_open: BoolArray) -> BoolArray:
 
 @lru_cache(maxsize=16)
 def arcs_up_to(radius: float, step: int = 1) -> Arcs:
-    """Return `all_arcs().up_to(radius).every(step)`; for equal arguments, the same object."""
+    """Return `all_arcs().up_to(radius).every(step)`, cached."""
     return all_arcs().up_to(radius).every(step)
 
 
 @cache
 def all_arcs() -> Arcs:
-    """Return the arcs from every direction, those of one pair of directions by rising radius."""
+    """Return all arcs, by rising radius for each pair of directions."""
     of, first, points, ends = [], [0], [], []
     lengths, radii = [], []
     for number, (by, least, most) in product(range(len(DIRECTIONS)), _TURNS):
@@ -127,7 +124,7 @@ def all_arcs() -> Arcs:
                 first.append(first[-1] + len(on_arc))
                 ends.append(before + after)
                 lengths.append(length)
-                # What is wider than this arc, but less so than the next, needs more room than it.
+                # Radii up to that of the next arc need at least the room of this arc.
                 wider = found[index + 1][2] if index + 1 < len(found) else _RATIO * radius
                 radii.append(wider)
     return Arcs(
@@ -143,7 +140,7 @@ def all_arcs() -> Arcs:
 def _between(
     one: IntArray32, other: IntArray32, least: float, most: float
 ) -> Iterator[tuple[IntArray32, IntArray32, float]]:
-    """Yield the tangents of arcs from one direction to another one, and their radii, rising."""
+    """Yield the tangents and radii of arcs between two directions, by rising radius."""
     lengths = hypot(*one), hypot(*other)
     cosine = float(one @ other) / (lengths[0] * lengths[1])
     per_tangent = 1.0 / tan(acos(cosine) / 2.0)
@@ -158,7 +155,7 @@ def _between(
 
 
 def _arc(before: IntArray32, after: IntArray32, radius: float) -> tuple[IntArray32, float]:
-    """Return the points near an arc between two tangents, and its length."""
+    """Return the points near an arc with its two tangents, and its length."""
     one, other = before / hypot(*before), after / hypot(*after)
     cross = float(one[0] * other[1] - one[1] * other[0])
     side, angle = np.sign(cross), acos(float(one @ other))
@@ -172,7 +169,7 @@ def _arc(before: IntArray32, after: IntArray32, radius: float) -> tuple[IntArray
     for begin, end in ((np.zeros(2), arc[0]), (arc[-1], before + after)):
         parts.append(np.linspace(begin, end, 4 * ceil(np.hypot(*(end - begin))) + 2))
     points = np.unique(np.rint(np.concatenate(parts)).astype(np.int32), axis=0)
-    # What is farthest from the middle is the first that is not open.
+    # Points farthest from the middle come first: they are the most likely not to be open.
     off = np.hypot(*(points - points.mean(axis=0)).T)
     points = points[np.argsort(-off, kind="stable")]
     length = hypot(*before) + hypot(*after) - 2.0 * tangent + radius * angle

@@ -1,4 +1,4 @@
-"""Facades: which components stand in which bays of a structure's walls.
+"""Facades: the components in the bays of a structure's walls.
 
     [structures.facade]
     storey_m = 3.5
@@ -10,12 +10,12 @@
     storeys = [1]
     glazing = "window_laminated_12"
 
-    [components.our_window]             # own components, beside those of the catalogue
+    [components.our_window]             # further components, beside those of the catalogue
     kind = "glazing"
     ...
 
-Measures of the build zone may put better components in some bays, at a price (`Hardening`).
-No load depends on a facade, but what the load does to the building.
+Measures of the build zone may put stronger components in some bays at a cost (`Hardening`).
+Loads do not depend on a facade; the response of the building does.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,19 +31,19 @@ from blast_env.scenario.problems import Problem, unknown_name
 from blast_env.scenario.sections import AnyStructure, FacadeSection
 
 MOST_BAYS: Final = 5_000
-"""Of a scenario: a block of 20 storeys and 750 m of walls."""
+"""Most bays of a scenario: a block of 20 storeys and 750 m of walls."""
 
 Components = Mapping[str, Glazing | Wall]
 
 
 @dataclass(frozen=True)
 class NamedBay:
-    """A bay with the names of what stands in it.
+    """A bay with the names of its components.
 
     Attributes:
         bay: The bay.
-        window: Component of its windows as the facade has it: their sizes and sills.
-        glazing: Component that their glass is of.
+        window: Component of its windows in the facade, which has their sizes and sills.
+        glazing: Component of their glass.
         wall: Component of its wall panel.
     """
 
@@ -53,7 +53,7 @@ class NamedBay:
     wall: str | None
 
     def hardened(self, measures: Sequence[Hardening]) -> "NamedBay":
-        """Return it with measures taken; the last one that changes a component counts."""
+        """Return it with measures taken; the last one for a component counts."""
         glazing, wall = self.glazing, self.wall
         for measure in measures:
             if measure.covers(self.bay):
@@ -65,7 +65,7 @@ class NamedBay:
         """Return it with its components.
 
         Raises:
-            BlastEnvError: If it is empty, or a pane larger than it.
+            BlastEnvError: If the bay is empty, or smaller than a pane.
         """
         window, glass, wall = (
             None if name is None else known[name] for name in (self.window, self.glazing, self.wall)
@@ -78,7 +78,7 @@ class NamedBay:
         return FilledBay(self.bay, window, wall)
 
     def alternatives(self, measures: Sequence[Hardening], known: Components) -> Alternatives:
-        """Return what stands in it, and what measures would put there."""
+        """Return its components, and those that measures would put there."""
         reached = [self.hardened([each]) for each in measures]
         glasses = dict.fromkeys(each.glazing for each in (self, *reached) if each.glazing)
         walls = dict.fromkeys(each.wall for each in (self, *reached) if each.wall)
@@ -100,7 +100,7 @@ def with_glass(window: Glazing, glass: Glazing) -> Glazing:
 
 
 def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
-    """Return the bays of a structure with the names of what stands there; none without a facade."""
+    """Return the bays of a structure with the names of their components; none without a facade."""
     facade = structure.facade
     if facade is None or structure.height_m is None:
         return ()
@@ -124,11 +124,11 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
 
 
 def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> Iterator[Problem]:
-    """Yield what is wrong with the facades of a scenario.
+    """Yield the problems of the facades of a scenario.
 
     Args:
-        structures: The sound structures, by their index.
-        own: The scenario's own components.
+        structures: The valid structures, by index.
+        own: The components that the scenario defines.
     """
     known = {**catalogue(), **own}
     bays = 0
@@ -155,11 +155,11 @@ def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> 
 def hardening_problems(
     structures: Mapping[int, AnyStructure], own: Components, measures: Sequence[Hardening]
 ) -> Iterator[Problem]:
-    """Yield what is wrong with the measures that harden facades.
+    """Yield the problems of the measures that harden facades.
 
     Args:
-        structures: The sound structures, by their index.
-        own: The scenario's own components.
+        structures: The valid structures, by index.
+        own: The components that the scenario defines.
         measures: The measures.
     """
     known = {**catalogue(), **own}
@@ -185,7 +185,7 @@ def hardening_problems(
 
 
 def _kind_problem(where: str, name: str, known: Components) -> Iterator[Problem]:
-    """Yield that a name is that of no component of the kind that its key asks for."""
+    """Yield a problem if a name is not that of a component of the key's kind."""
     kind = Glazing if where.endswith("glazing") else Wall
     fitting = [each for each, component in known.items() if isinstance(component, kind)]
     if name not in fitting:

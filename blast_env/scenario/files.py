@@ -22,12 +22,11 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     """Return a scenario.
 
     Args:
-        name_or_path: The name of a bundled scenario, or the path of a `.toml` file. What has
+        name_or_path: The name of a bundled scenario, or the path of a `.toml` file. A text with
             neither a suffix nor a folder is a name.
 
     Raises:
-        ScenarioError: If there is no such scenario, or if anything is wrong with it; all its
-            problems are in the error.
+        ScenarioError: If there is no such scenario, or it is invalid; the error has all problems.
     """
     path = _located(name_or_path)
     try:
@@ -38,20 +37,19 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
 
 AnyScenario = Scenario | str | Path | Mapping[str, Any]
-"""What a user may call a scenario: itself, its bundled name, the path of its file, or what such a
-file says as plain data."""
+"""A scenario, its bundled name, the path of its file, or the file's content as plain data."""
 
 
 def find_scenario(scenario: AnyScenario) -> Scenario:
-    """Return the scenario that a user means.
+    """Return a scenario from any of its forms.
 
     Args:
-        scenario: A scenario, which is returned as it is, what `load_scenario` takes, or plain data
-            as `Scenario.model_dump(mode="json", exclude_none=True)` gives it.
+        scenario: A scenario, which is returned unchanged, an argument of `load_scenario`, or plain
+            data of the form of `Scenario.model_dump(mode="json", exclude_none=True)`.
 
     Raises:
-        ScenarioError: If there is no such scenario, or anything is wrong with it.
-        BlastEnvError: If it is anything else.
+        ScenarioError: If there is no such scenario, or it is invalid.
+        BlastEnvError: If the argument has another type.
     """
     if isinstance(scenario, Scenario):
         return scenario
@@ -63,13 +61,13 @@ def find_scenario(scenario: AnyScenario) -> Scenario:
 
 
 class ScenarioField:
-    """A field of a dataclass that is set to whatever a user calls a scenario, and is a scenario.
+    """A field of a dataclass that accepts `AnyScenario` and holds a `Scenario`.
 
-    It raises what `find_scenario` raises when the dataclass is made.
+    Setting it raises the errors of `find_scenario`.
     """
 
     def __set_name__(self, owner: type, name: str) -> None:
-        """Take the name of the field."""
+        """Store the name of the field."""
         self._name = name
 
     @overload
@@ -79,26 +77,26 @@ class ScenarioField:
     def __get__(self, instance: object, owner: type) -> Scenario: ...
 
     def __get__(self, instance: object | None, owner: type) -> "Scenario | Self":
-        """Return the scenario; to the class itself there is none, so that the field is required."""
+        """Return the scenario; the class has none, so that the field is required."""
         if instance is None:
             raise AttributeError(self._name)
         found: Scenario = instance.__dict__[self._name]
         return found
 
     def __set__(self, instance: object, scenario: AnyScenario) -> None:
-        """Load the scenario, if it is a name or a path."""
+        """Set the scenario, loaded if it is a name or a path."""
         instance.__dict__[self._name] = find_scenario(scenario)
 
 
 def parse_scenario(text: str, source: str) -> Scenario:
-    """Return the scenario that the text of a file describes.
+    """Return the scenario of the text of a file.
 
     Args:
         text: TOML.
         source: Name of the file, for the error.
 
     Raises:
-        ScenarioError: If anything is wrong; all problems are in the error.
+        ScenarioError: If it is invalid; the error has all problems.
     """
     try:
         document = parse_toml(text)
@@ -108,7 +106,7 @@ def parse_scenario(text: str, source: str) -> Scenario:
 
 
 def find_problems(name_or_path: str | Path) -> tuple[Problem, ...]:
-    """Return everything that is wrong with a scenario; nothing if it can be used.
+    """Return the problems of a scenario; none if it is valid.
 
     Args:
         name_or_path: As for `load_scenario`.
@@ -123,15 +121,15 @@ def find_problems(name_or_path: str | Path) -> tuple[Problem, ...]:
 def save_scenario(scenario: AnyScenario, path: str | Path) -> None:
     """Write a scenario to a file that `load_scenario` reads back as an equal scenario.
 
-    The file is replaced as a whole: after an error the old one is untouched.
+    An existing file is replaced as a whole, and stays unchanged if there is an error.
 
     Args:
-        scenario: The scenario, or its bundled name or path: a copy to begin one's own with.
-        path: The file; a `.toml` file.
+        scenario: The scenario, or its bundled name or path, for a copy as a starting point.
+        path: The `.toml` file.
 
     Raises:
-        ScenarioError: If there is no such scenario, or it could not be read back: one that
-            `model_copy` made unsound, or a name that is not a `.toml` file's.
+        ScenarioError: If there is no such scenario, or it could not be read back: it is invalid
+            after `model_copy`, or the path has another suffix.
         BlastEnvError: If the file cannot be written.
     """
     if path_of(path).suffix != SUFFIX:
@@ -144,7 +142,7 @@ def save_scenario(scenario: AnyScenario, path: str | Path) -> None:
 
 
 def scenario_hash(scenario: AnyScenario) -> str:
-    """Return the SHA-256 of everything in a scenario that affects a result.
+    """Return the SHA-256 of all parts of a scenario that affect results.
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -153,7 +151,7 @@ def scenario_hash(scenario: AnyScenario) -> str:
 
 
 def _located(name_or_path: str | Path) -> Path:
-    """Return the path of the file that a name or path stands for."""
+    """Return the path of the file of a name or path."""
     try:
         path = path_of(name_or_path)
     except BlastEnvError as error:

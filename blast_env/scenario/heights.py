@@ -1,4 +1,4 @@
-"""Heights of the air and of what stands in it, and who heeds them."""
+"""Heights of the air, of barriers and of structures."""
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
@@ -13,16 +13,16 @@ from blast_env.scenario.terraces import ground_m
 from blast_env.scenario.zone import BuildZone, Surroundings, usable_cells
 
 LEAST_AIR_HEIGHT_M: Final = 12.0
-"""Height of the air over a site on which nothing is higher than half of it."""
+"""Least default height of the air."""
 
 AIR_ABOVE_M: Final = 6.0
-"""Air above the highest thing on the site: what the blast needs to go over it."""
+"""Air above the highest structure or barrier, so that the blast can pass over it."""
 
 
 def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
-    """Return how high the air is where a scenario does not say it.
+    """Return the default height of the air, m.
 
-    12 m, or 6 m more than the highest structure or barrier if that is more.
+    It is 12 m, or 6 m more than the highest structure or barrier if that is more.
     """
     structures = tuple(structures)
     heights = [each.height_m for each in structures]
@@ -32,9 +32,9 @@ def default_air_height_m(structures: Iterable[AnyStructure], zone: BuildZone | N
 
 
 def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float | None:
-    """Return how high above the ground the top of a barrier can be; `None` is as high as the air.
+    """Return the largest height of a barrier's top, m; `None` is the height of the air.
 
-    It is the largest sum of an item's height and of the highest ground that it can stand on.
+    It is the largest sum of an item's height and the highest ground on which it can stand.
     """
     grounds_m = highest_grounds_m(zone, structures)
     if not zone.items:
@@ -43,9 +43,9 @@ def highest_top_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> float 
 
 
 def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tuple[float, ...]:
-    """Return the highest ground that each item can stand on, m; without items, single modules.
+    """Return the highest ground on which each item, or a single module, can stand, m.
 
-    Where charges and vehicles may be is left aside. What fits nowhere has 0.
+    Charges and vehicles are ignored. An item that fits nowhere has 0.
     """
     structures = tuple(structures)
     here = (each.rectangle_m.overlaps(zone.rectangle_m) for each in structures if each.carries)
@@ -67,22 +67,22 @@ def _grounds_m(zone: BuildZone, structures: tuple[AnyStructure, ...]) -> tuple[f
 
 
 def air_height_m(site: Site, structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
-    """Return how high the air is."""
+    """Return the height of the air, m."""
     if site.air_height_m is not None:
         return site.air_height_m
     return default_air_height_m(structures, zone)
 
 
 def is_over_or_below(height_m: float, structure: AnyStructure) -> bool:
-    """Whether a height is above the roof of a structure, if it has one, or below its underside."""
+    """Return whether a height is above a structure's roof, if it has one, or below its base."""
     is_over = structure.height_m is not None and height_m > structure.height_m
     return is_over or height_m < structure.base_m
 
 
 def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructure) -> float:
-    """Return how far it is from a place to the nearest air beside, above or below a structure.
+    """Return the depth of a point inside a structure, m: its distance to the nearest surface.
 
-    Negative or 0 outside.
+    It is negative or 0 outside. The ground is no surface.
     """
     x_m, y_m, z_m = position_m
     left, bottom, right, top = structure.rectangle_m
@@ -98,7 +98,7 @@ def height_notes(
     zone: BuildZone | None,
     gauges: Sequence[GaugeSection],
 ) -> tuple[str, ...]:
-    """Return what an engine without heights leaves aside, in sentences."""
+    """Return the features of a scenario that an engine without heights ignores, in sentences."""
     structures = tuple(structures)
     walls = any(each.height_m is not None for each in structures)
     walls |= zone is not None and bool(zone.items or zone.height_m)
