@@ -1,4 +1,4 @@
-"""The league: what searches, rules and trained agents do on the same cases and held-out seeds."""
+"""The league: searches, rules and trained agents on the same cases and held-out seeds."""
 
 from blast_agents.league.contest import Contest, Outlook
 from blast_agents.league.entries import (

@@ -1,4 +1,4 @@
-"""What a league has to simulate, in pieces that any process can do."""
+"""The simulations of a league, as independent jobs for worker processes."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from blast_env.scenario import check_layout
 
 @dataclass(frozen=True, eq=False)
 class SearchJob:
-    """Lets an entry propose for a case.
+    """The proposal of an entry for a case.
 
     Attributes:
         case: The case.
@@ -36,19 +36,18 @@ class SearchJob:
     engine: str | Engine
 
     def __call__(self) -> Proposal:
-        """Return what a search proposes; it shares no blast with any other.
+        """Return the proposal of a search, which shares no blasts with others.
 
-        Its blasts are those that the problem has counted, whatever the method says of them.
+        Its blasts are counted by the problem, not by the method.
 
         Raises:
-            BlastEnvError: If the method runs more blasts than its budget, or its layout may not be
-                built.
-            KeyboardInterrupt: If the search was interrupted: what it has by then is not its
-                answer.
+            BlastEnvError: If the method runs more blasts than its budget, or its layout is
+                illegal.
+            KeyboardInterrupt: If the search was interrupted: its layout so far is not a result.
         """
         practice = practice_of(self.case)
         engine = self.entry.first_engine or self.engine
-        # What the first blast of a process has to load is no part of the search's time.
+        # The first blast of a process loads code, which must not count in the search's time.
         for each in {engine, self.engine}:
             BlastEvaluator(practice.scenario, each).loads((), practice.threats[0])
         began_s, began_cpu_s = perf_counter(), process_time()
@@ -62,10 +61,10 @@ class SearchJob:
         return self._checked(found)
 
     def at_once(self) -> Proposal:
-        """Return what is proposed without a blast, and how long that took.
+        """Return the proposal of an entry without blasts, with its time.
 
         Raises:
-            BlastEnvError: If a blast is run, or the layout may not be built.
+            BlastEnvError: If a blast is run, or the layout is illegal.
         """
         problem = self._problem(self.engine, BlastMeter(0))
         found = timed_proposal(lambda: self._result(problem).layout)
@@ -80,13 +79,18 @@ class SearchJob:
 
     def _problem(self, engine: str | Engine, meter: BlastMeter) -> LayoutProblem:
         practice = practice_of(self.case)
-        # All that may be asked for is remembered: what is simulated is simulated once.
+        # The cache holds all blasts of the budget, so that each is simulated once.
         most = meter.budget + len(practice.threats)
         evaluator = BlastEvaluator(practice.scenario, engine, cache_size=most)
         return LayoutProblem(evaluator, practice, meter=meter)
 
     def _result(self, problem: LayoutProblem) -> SearchResult:
-        """Return what the method finds, unless it went round the meter."""
+        """Return the result of the method.
+
+        Raises:
+            BlastEnvError: If it exceeds the budget, also past the meter, or its layout is illegal.
+            KeyboardInterrupt: If it was interrupted.
+        """
         entry, case = self.entry, self.case
         try:
             result = entry.proposer.propose(problem, entry.budget, case.seed)
@@ -102,7 +106,7 @@ class SearchJob:
         return result
 
     def _judged(self, result: SearchResult) -> tuple[Layout, int]:
-        """Return the best of a search's last best layouts by the judge, and its blasts for that."""
+        """Return the judge's best of the last layouts of a search's history, and its blasts."""
         latest = [each.layout for each in reversed(result.history)] or [result.layout]
         finalists = list(dict.fromkeys(latest))[: self.entry.finalists]
         meter = BlastMeter(len(finalists) * len(practice_of(self.case).threats))
@@ -112,7 +116,7 @@ class SearchJob:
 
 @dataclass(frozen=True, eq=False)
 class EvaluationJob:
-    """Lets a layout meet the held-out threats of a case.
+    """The simulation of a layout under the held-out threats of a case.
 
     Attributes:
         case: The case.
@@ -125,20 +129,20 @@ class EvaluationJob:
     engine: str | Engine
 
     def __call__(self) -> tuple[float, ...]:
-        """Return the loads that count, in the unit of the objective, one a held-out threat."""
+        """Return the loads, one per held-out threat, in the unit of the objective."""
         evaluator = BlastEvaluator(self.case.scenario, self.engine)
         return Objective(evaluator, self.case).counted_loads(self.layout)
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """What a contest has still to simulate.
+    """The remaining simulations of a contest.
 
     Attributes:
-        search_blasts: Most blasts that the searches will spend.
-        held_out_blasts: Most blasts on held-out threats.
-        searches: How many searches there are.
-        kept_searches: How many of them are through already.
+        search_blasts: Upper bound on the blasts of the searches.
+        held_out_blasts: Upper bound on the blasts under held-out threats.
+        searches: Number of searches.
+        kept_searches: Number of searches with a stored result.
     """
 
     search_blasts: int
@@ -148,7 +152,7 @@ class Outlook:
 
     @property
     def blasts(self) -> int:
-        """All blasts."""
+        """Upper bound on all blasts."""
         return self.search_blasts + self.held_out_blasts
 
 
@@ -156,18 +160,18 @@ class Outlook:
 class Contest:
     """Entries on a track.
 
-    Proposals that take no blast are made first, in this process, where nothing disturbs their
-    time; then the searches; then all layouts meet the held-out threats. Searches and loads are
-    kept as soon as they are there, and not done again.
+    Proposals without blasts run first, in this process, where nothing disturbs their times; then
+    the searches; then the simulations of all layouts under the held-out threats. Results of
+    searches and loads are stored immediately and not repeated.
 
     Attributes:
         track: The cases.
-        entries: `NO_BARRIER` among them; their names differ.
-        store: Keeps the results.
+        entries: Entries with distinct names, including `NO_BARRIER`.
+        store: Stores the results.
         engine: Name of the engine, or the engine.
 
     Raises:
-        BlastEnvError: If two entries have one name, or no barrier is not among them.
+        BlastEnvError: If two entries have the same name, or `NO_BARRIER` is missing.
     """
 
     track: Track
@@ -185,9 +189,9 @@ class Contest:
 
     @cached_property
     def _instant(self) -> Mapping[str, tuple[Proposal, ...]]:
-        """The proposals, one a case, of the entries that spend no blast, by name.
+        """The proposals of the entries without blasts, by name, one per case.
 
-        The time of one more proposal before these is not counted: it loads what has to be loaded.
+        A preceding proposal is not timed, because it loads code.
         """
         proposals = {}
         for entry in self.entries:
@@ -198,11 +202,11 @@ class Contest:
         return proposals
 
     def outlook(self) -> Outlook:
-        """Return what is still to be simulated.
+        """Return the remaining simulations.
 
         Raises:
             CalibrationError: If a scenario has no calibration for the engine.
-            UnknownNameError: If there is no such engine.
+            UnknownNameError: If the engine is unknown.
         """
         searches = [entry for entry in self.entries if entry.budget]
         missing = self._missing_searches()
@@ -218,10 +222,10 @@ class Contest:
     def play(
         self, processes: int = 1, progress: Callable[[float], None] = lambda _: None
     ) -> Standings:
-        """Return how the entries did.
+        """Run all missing simulations and return the results.
 
         Args:
-            processes: Worker processes; they change nothing but the times.
+            processes: Worker processes; only the times depend on their number.
             progress: Called with the share of the blasts that is done.
 
         Raises:
@@ -248,7 +252,7 @@ class Contest:
         return Standings(self.track, results, bare.loads, find_engine(self.engine).words)
 
     def _missing_searches(self) -> list[SearchJob]:
-        """Return the searches that are not through, the longest first."""
+        """Return the searches without a stored result, those with the largest budget first."""
         jobs = [
             SearchJob(case, entry, self.engine)
             for entry in self.entries
@@ -259,7 +263,7 @@ class Contest:
         return sorted(jobs, key=lambda job: -job.entry.budget)
 
     def _missing_evaluations(self) -> list[EvaluationJob]:
-        """Return the layouts proposed so far whose loads are not known, each once."""
+        """Return the distinct layouts proposed so far without stored loads."""
         asked = dict.fromkeys(
             (index, proposal.layout)
             for entry in self.entries
@@ -274,7 +278,7 @@ class Contest:
         ]
 
     def _proposals(self, entry: LeagueEntry) -> Sequence[Proposal | None]:
-        """Return what an entry proposes, one a case; `None` where it has not searched yet."""
+        """Return the proposals of an entry, one per case; `None` for a missing search."""
         if not entry.budget:
             return self._instant[entry.name]
         return [self._found(case, entry) for case in self.track.cases]

@@ -1,4 +1,4 @@
-"""What takes part in a league: proposers, each with a budget."""
+"""Entries of a league: proposers, each with a budget."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ from blast_env.values import generator
 
 @dataclass(frozen=True)
 class Training:
-    """What has learnt cost so much before its first case.
+    """Cost of the training of an entry before its first case.
 
     Attributes:
-        blasts: Blasts simulated, with those that the best weights were chosen by.
-        seconds: Time that it took.
+        blasts: Blasts simulated, including those for the selection of the best weights.
+        seconds: Duration, in s.
     """
 
     blasts: int
@@ -38,7 +38,7 @@ NO_TRAINING = Training(0, 0.0)
 
 @dataclass(frozen=True)
 class NoBarrier:
-    """Builds nothing: what all others are compared with."""
+    """Builds nothing: the baseline of all other entries."""
 
     name: str = "no barrier"
 
@@ -55,7 +55,7 @@ class NoBarrier:
 
 @dataclass(frozen=True)
 class RandomLayout:
-    """Puts every module on a random cell, a layout a case."""
+    """Puts every module on a random cell, with one layout per case."""
 
     name: str = "random layout"
 
@@ -66,7 +66,7 @@ class RandomLayout:
         seed: int = 0,
         report: Report | None = None,  # noqa: ARG002
     ) -> SearchResult:
-        """Return a layout that the seed decides."""
+        """Return a random layout drawn by the seed."""
         return SearchResult(random_layout(problem.scenario, generator(seed)))
 
 
@@ -76,13 +76,13 @@ class LeagueEntry:
 
     Attributes:
         proposer: The proposer.
-        budget: Most blasts a case; 0 for what proposes without a blast.
-        title: Name in tables, that of the proposer unless given.
-        kind: What it is.
-        training: What it cost before its first case.
-        first_engine: Engine for these blasts, a cheaper one; the engine that judges then decides
-            among the best few layouts, by one more blast for each threat. `None` for the judge's.
-        finalists: How many these are.
+        budget: Largest number of blasts per case; 0 for a proposer without blasts.
+        title: Name in tables; by default that of the proposer.
+        kind: Kind of the proposer.
+        training: Cost of its training.
+        first_engine: Cheaper engine for the budget's blasts; the judging engine then selects among
+            the finalists by one further blast per threat. `None` for the judging engine.
+        finalists: Number of finalists.
 
     Raises:
         BlastEnvError: If the budget is below 0.
@@ -117,7 +117,7 @@ class LeagueEntry:
 
 
 NO_BARRIER = LeagueEntry(NoBarrier())
-"""What all others are compared with."""
+"""The baseline of all other entries."""
 
 
 def search_name(method: str, budget: int) -> str:
@@ -131,12 +131,12 @@ def standard_entries(
     """Return no barrier, a random layout, all rules that suit every scenario, and searches.
 
     Args:
-        scenarios: Of the cases.
-        methods: Names of proposers, or "module:object" for one's own (`own_proposer`).
-        budgets: Blasts a case; each method enters with each.
+        scenarios: Scenarios of the cases.
+        methods: Names of proposers, or "module:object" for a custom one (`own_proposer`).
+        budgets: Blasts per case; each method enters with each budget.
 
     Raises:
-        UnknownNameError: If there is no such method; the message names the nearest one.
+        UnknownNameError: If a method is unknown; the message names the nearest one.
         BlastEnvError: If a budget is below 1.
     """
     rules = proposers(ProposerKind.RULE, suiting=scenarios)
@@ -166,13 +166,13 @@ def searches(methods: Collection[str], budgets: Sequence[int]) -> tuple[LeagueEn
 
 
 def own_proposer(place: str) -> Proposer:
-    """Return a proposer of one's own.
+    """Return a custom proposer.
 
     Args:
-        place: "module:object": a `Proposer`, or a class or function that makes one.
+        place: "module:object": a `Proposer`, or a class or function that returns one.
 
     Raises:
-        BlastEnvError: If there is no such module or object, or it is no proposer.
+        BlastEnvError: If the module or object does not exist or is not a proposer.
     """
     try:
         found: Any = load_plugin(place)

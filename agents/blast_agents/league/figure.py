@@ -1,4 +1,4 @@
-"""A track as a figure: reduction over the blasts spent on a case."""
+"""Figure of a track: the reduction over the blasts per case."""
 
 from typing import Final
 
@@ -15,24 +15,24 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullLocator, PercentFormatter
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart; the yellow darker,
-# so that it is seen on white.
+# Okabe and Ito's colours, which are distinguishable with any colour vision; the yellow is darker,
+# so that it is visible on white.
 _SEARCHES: Final = ("#0072B2", "#E69F00", "#009E73", "#56B4E9", "#C9A800")
 _AGENTS: Final = ("#D55E00", "#CC79A7", "#000000")
 _SEARCH_MARKERS: Final = "osD^v<>"  # 7 beside 5 colours: 35 searches differ in one or both
 _AGENT_LINES: Final = ("-", "--", "-.", ":")
 _NOTHING_MARKERS: Final = "xP*Xdpv^<>+1"
 _APART: Final = 1.05
-"""What stands at the same number of blasts is this factor apart, so that all of it is seen."""
+"""Square root of the factor between points with equal blasts, so that all are visible."""
 
 _AROUND_ZERO: Final = 1.4
-"""What spends none stands within this factor of the tick of 0."""
+"""Largest factor between points without blasts and the tick of 0."""
 
 
 def league_figure(standings: Standings) -> Figure:
-    """Return the reductions with their 95 % intervals over the blasts spent on a case.
+    """Return the figure of the reductions with their 95 % intervals over the blasts per case.
 
-    Agents are lines: they spend none, whatever the others do.
+    Agents are horizontal lines, because they spend no blasts.
     """
     figure = Figure(figsize=(13.6, 6.4), layout="constrained")
     axes = figure.add_subplot()
@@ -65,7 +65,7 @@ def league_figure(standings: Standings) -> Figure:
 
 
 def _kinds(standings: Standings) -> tuple[dict[str, list[Result]], list[Result], list[Result]]:
-    """Return the searches by method, the agents, and what is left but no barrier."""
+    """Return the searches by method, the agents, and the other entries that build something."""
     searches: dict[str, list[Result]] = {}
     agents, others = [], []
     for result in standings.results:
@@ -81,7 +81,7 @@ def _kinds(standings: Standings) -> tuple[dict[str, list[Result]], list[Result],
 def _draw_agent(
     axes: Axes, standings: Standings, result: Result, index: int, blasts: float
 ) -> None:
-    """Draw a line, with its interval where what spends nothing stands."""
+    """Draw the line of an agent, with its interval at `blasts`, near the tick of 0."""
     value = standings.reduction(result).value
     colour = _AGENTS[index % len(_AGENTS)]
     style = _AGENT_LINES[index // len(_AGENTS) % len(_AGENT_LINES)]
@@ -133,7 +133,7 @@ def _draw_search(
 
 
 def _error_bars(standings: Standings, results: list[Result]) -> "np.ndarray[tuple[int, int]]":
-    """Return how far the intervals reach down and up (2, results); 0 where there is none."""
+    """Return the lengths of the intervals down and up (2, results); 0 without an interval."""
     estimates = np.array([standings.reduction(result) for result in results])
     value, low, high = estimates.T
     return np.nan_to_num(np.maximum([value - low, high - value], 0.0))

@@ -1,4 +1,4 @@
-"""The tables of a track: one row an entry, and one row an entry and case."""
+"""The tables of a track: one row per entry, and one row per entry and case."""
 
 from collections.abc import Sequence
 from math import isnan
@@ -24,16 +24,16 @@ from blast_env.tables import markdown_table, write_csv
 
 
 def summary_table(standings: Standings) -> pd.DataFrame:
-    """Return one row an entry, in the order of entering.
+    """Return one row per entry, in the order of the entries.
 
-    `minus_reference` is the difference to genetic search with the track's reference budget; the
-    columns are missing if that did not enter.
+    `minus_reference` is the difference to genetic search with the track's reference budget; its
+    columns are missing if that search did not enter.
     """
     return pd.DataFrame([_summary(standings, result) for result in standings.results])
 
 
 def case_table(standings: Standings) -> pd.DataFrame:
-    """Return one row an entry and case; loads are what each case makes of its held-out threats."""
+    """Return one row per entry and case; loads are the case's combination over its threats."""
     return pd.DataFrame(
         [
             {"entry": result.name, "method": result.entry.method, "budget": result.entry.budget}
@@ -126,12 +126,12 @@ PAGE: Final = "league.md"
 
 
 def table_rows(standings: Standings) -> list[tuple[str, ...]]:
-    """Return the printed table, a row an entry; see `HEADERS`."""
+    """Return the printed table, one row per entry; see `HEADERS`."""
     return [_row(standings, result) for result in standings.results]
 
 
 def verdict_lines(standings: Standings) -> list[str]:
-    """Return what may be said of the agents, or why nothing can be."""
+    """Return the verdicts on trained entries, or the reason why there is none."""
     if not any(result.has_learnt for result in standings.results):
         return ["No verdict: no trained agent has entered this track."]
     if not standings.references:
@@ -140,7 +140,7 @@ def verdict_lines(standings: Standings) -> list[str]:
 
 
 def sample_text(standings: Standings) -> str:
-    """Return what the numbers are, and means over what."""
+    """Describe the quantity in the table and its sample."""
     count, threats = standings.unprotected.shape
     held_out = count_of("held-out threat", threats)
     if standings.has_one_case:
@@ -154,9 +154,9 @@ def write_league(all_standings: Sequence[Standings], folder: Path, command: str)
     """Write tables and figure of each track, and the page.
 
     Args:
-        all_standings: One a track.
-        folder: It exists.
-        command: What started the league.
+        all_standings: The results, one per track.
+        folder: Target folder, which exists.
+        command: Command that started the league.
 
     Returns:
         The paths.
@@ -179,7 +179,7 @@ def write_league(all_standings: Sequence[Standings], folder: Path, command: str)
 
 
 def markdown(all_standings: Sequence[Standings], command: str) -> str:
-    """Return the page: a table, verdicts and the figure of each track."""
+    """Return the page with a table, verdicts and a figure per track."""
     lines = ["# League", ""]
     for standings in all_standings:
         lines += [f"## {standings.track.title}", "", f"{sample_text(standings)}.", ""]
@@ -199,7 +199,7 @@ def markdown(all_standings: Sequence[Standings], command: str) -> str:
 
 
 def _wins(standings: Standings) -> list[str]:
-    """Return a table of how often each entry is better than each rule."""
+    """Return the table of the shares of cases in which each entry is better than each rule."""
     rules = standings.rules
     if not rules:
         return []

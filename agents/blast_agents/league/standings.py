@@ -1,4 +1,4 @@
-"""How the entries of a track did: means with their uncertainty, and cost."""
+"""Results of the entries of a track: means with their uncertainty, and costs."""
 
 from dataclasses import dataclass
 from math import isnan
@@ -15,17 +15,17 @@ from blast_env.evaluation.comparison import Comparison, check_something_arrives
 from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
 
 REFERENCE_METHOD: Final = "genetic"
-"""What has learnt is held against this search, with the track's budget, and the best of a kind."""
+"""The reference of trained entries, with the track's budget, beside the best rule and search."""
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What an entry did on all cases.
+    """Results of an entry on all cases.
 
     Attributes:
         entry: The entry.
-        proposals: One a case; the cells are sorted.
-        loads: With the layouts, in the unit of the objective (cases, held-out threats).
+        proposals: One proposal per case; the cells are sorted.
+        loads: Loads of the layouts, in the unit of the objective (cases, held-out threats).
     """
 
     entry: LeagueEntry
@@ -39,56 +39,56 @@ class Result:
 
     @property
     def is_rule(self) -> bool:
-        """Whether it is a rule, which takes neither training nor a blast."""
+        """Whether the entry is a rule, which needs neither training nor blasts."""
         return self.entry.kind is ProposerKind.RULE
 
     @property
     def has_learnt(self) -> bool:
-        """Whether it is an agent, or a search that begins with one or with a surrogate."""
+        """Whether the entry is an agent, or a search with an agent or a surrogate."""
         return self.entry.kind is ProposerKind.LEARNT
 
     @property
     def other_blasts_per_case(self) -> float:
-        """Blasts of another engine than the judge's spent on a case, mean."""
+        """Mean number of blasts per case of an engine other than the judge's."""
         return sum(each.other_blasts for each in self.proposals) / len(self.proposals)
 
     @property
     def cpu_s_per_case(self) -> float:
-        """Processor time spent on a case, mean."""
+        """Mean processor time per case, in s."""
         return sum(each.cpu_s for each in self.proposals) / len(self.proposals)
 
     @property
     def blasts_per_case(self) -> float:
-        """Blasts spent on a case, mean."""
+        """Mean number of blasts per case."""
         return sum(each.blasts for each in self.proposals) / len(self.proposals)
 
     @property
     def blasts(self) -> int:
-        """All blasts spent, those of a training among them; held-out ones are for the reader."""
+        """All blasts spent, including those of training, without the held-out ones."""
         return self.entry.training.blasts + sum(each.blasts for each in self.proposals)
 
     @property
     def seconds(self) -> float:
-        """Time that training and proposals took together, each in one process."""
+        """Total time of training and proposals, each in one process, in s."""
         return self.entry.training.seconds + sum(each.seconds for each in self.proposals)
 
     @property
     def proposal_ms(self) -> float:
-        """Time from a case to its layout, median, ms."""
+        """Median time of a proposal, in ms."""
         return 1000.0 * median(each.seconds for each in self.proposals)
 
 
 @dataclass(frozen=True, eq=False)
 class Standings:
-    """The results of a track; barrier and no barrier met the same threats.
+    """The results of a track, under the same threats with and without a barrier.
 
-    How means, intervals and differences are formed: see `Comparison`.
+    `Comparison` defines the means, intervals and differences.
 
     Attributes:
         track: The track.
-        results: One an entry.
-        unprotected: Load without a barrier (cases, held-out threats).
-        engine: Name of the engine, with the cells that it has.
+        results: One result per entry.
+        unprotected: Loads without a barrier (cases, held-out threats).
+        engine: Name of the engine, with its cells.
 
     Raises:
         BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
@@ -104,12 +104,12 @@ class Standings:
 
     @property
     def noun(self) -> str:
-        """What the layouts are to lower, in words: that of the first case's objective."""
+        """Name of the load to reduce, from the objective of the first case."""
         return self.track.cases[0].scenario.objective.noun
 
     @property
     def has_one_case(self) -> bool:
-        """Whether there is but one case, so that intervals and worst are over its threats."""
+        """Whether there is a single case, so that intervals and worst are over its threats."""
         return len(self.track.cases) == 1
 
     @property
@@ -120,9 +120,9 @@ class Standings:
 
     @property
     def references(self) -> tuple[Result, ...]:
-        """What agents are held against, as far as it entered.
+        """The references of agents among the entries.
 
-        The best rule, the reference, and the best search that has learnt nothing, by their mean
+        They are the best rule, the reference, and the best search without training, by their mean
         reductions.
         """
         searches = [each for each in self.results if each.entry.budget and not each.has_learnt]
@@ -135,7 +135,7 @@ class Standings:
         return tuple(dict.fromkeys(each for each in found if each is not None))
 
     def comparison(self, result: Result) -> Comparison:
-        """Return an entry's layouts against no barrier."""
+        """Return the comparison of an entry's layouts with no barrier."""
         return Comparison(
             cases=self.track.cases,
             layouts=tuple(proposal.layout for proposal in result.proposals),
@@ -154,7 +154,7 @@ class Standings:
         return tuple(result for result in self.results if result.is_rule)
 
     def samples(self, result: Result) -> FloatArray:
-        """Return the reduction of each case, or under each threat of a single one (samples,)."""
+        """Return the reduction per case, or per threat of a single case (samples,)."""
         if not self.has_one_case:
             return self.comparison(result).case_reductions
         return reductions(result.loads[0], self.unprotected[0])
@@ -164,24 +164,24 @@ class Standings:
         return -conditional_value_at_risk(-self.samples(result), CVAR_LEVEL)
 
     def win_share(self, result: Result, other: Result) -> float:
-        """Return in which share of the cases an entry is better than another; a tie is half one."""
+        """Return the share of samples in which an entry is better; a tie counts as half."""
         ahead = self.samples(result) - self.samples(other)
         return float(((ahead > 0.0) + 0.5 * (ahead == 0.0)).mean())
 
     def difference(self, result: Result, other: Result) -> Estimate:
-        """Return by how much the mean reduction is above another's, with its paired interval."""
+        """Return the difference of the mean reductions, with its paired interval."""
         return self.comparison(result).difference(self.comparison(other))
 
 
 @dataclass(frozen=True)
 class LeagueVerdict:
-    """An agent, or a search that begins with one, against a rule or a search, case by case.
+    """Paired comparison of a trained entry with a reference.
 
     Attributes:
-        result: What the agent or the search did.
-        reference: What the rule or the other search did.
-        difference: Its mean reduction minus that of the other.
-        sample: What the interval is over, e.g. `"16 cases"`.
+        result: Result of the trained agent or search.
+        reference: Result of the rule or search.
+        difference: Mean reduction of the former minus that of the latter.
+        sample: Sample of the interval, e.g. `"16 cases"`.
     """
 
     result: Result
@@ -191,7 +191,7 @@ class LeagueVerdict:
 
     @property
     def conclusion(self) -> str:
-        """What may be said: the interval decides."""
+        """The conclusion from the interval."""
         if isnan(self.difference.low):
             return "one threat says nothing about the others"
         subject = "search" if self.result.blasts_per_case else "agent"
@@ -217,7 +217,7 @@ class LeagueVerdict:
 
 
 def verdicts(standings: Standings) -> tuple[LeagueVerdict, ...]:
-    """Return a verdict for all that has learnt, and each of the references."""
+    """Return one verdict per trained entry and reference."""
     sample = f"{len(standings.track.cases)} cases"
     if standings.has_one_case:
         sample = f"{standings.unprotected.shape[1]} held-out threats of one case"

@@ -1,6 +1,6 @@
-"""What a league has found out, kept in a folder so that an interrupted one goes on.
+"""Stored results of a league, in a folder, so that an interrupted league continues.
 
-A change of the code, the versions, the scenario or the case makes it another result.
+A change of the code, the versions, the scenario or the case invalidates a stored result.
 """
 
 import json
@@ -27,22 +27,22 @@ from blast_env.provenance import code_version, versions
 from blast_env.scenario import AnyCharge, AnyScenario, VehicleCharge, check_layout
 
 _PACKAGES: Final = ("numpy", "pymoo")
-"""What a search draws its numbers with."""
+"""Packages of the random numbers of searches."""
 _NO_INFLUENCE: Final = ("figure.py",)
 _ADDRESS: Final = re.compile(r" at 0x[0-9a-f]+")
 
 
 def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> str:
-    """Return all that a search's proposal for a case depends on, as a text.
+    """Return the key of a search's proposal for a case: its dependencies as a text.
 
     Raises:
         CalibrationError: If the scenario has no calibration for the engine.
-        UnknownNameError: If there is no such engine.
+        UnknownNameError: If the engine is unknown.
     """
     method = repr(entry.proposer)
     if entry.first_engine is not None:
         method += f" by {engine_text(find_engine(entry.first_engine))}, {entry.finalists} judged"
-    # Functions among the settings: their names, and not where this process has them.
+    # Functions among the settings: their names, without their addresses in this process.
     method = _ADDRESS.sub("", method)
     code = _search_code(Path(getfile(type(entry.proposer))).parent)
     threats = practice_of(case).threats
@@ -50,11 +50,11 @@ def search_key(case: Case, entry: LeagueEntry, engine: str | Engine) -> str:
 
 
 def evaluation_key(case: Case, layout: Layout, engine: str | Engine) -> str:
-    """Return all that the loads with a layout on a case's held-out threats depend on.
+    """Return the key of the loads of a layout on a case's held-out threats.
 
     Raises:
         CalibrationError: If the scenario has no calibration for the engine.
-        UnknownNameError: If there is no such engine.
+        UnknownNameError: If the engine is unknown.
     """
     return _key("loads", case, engine, case.threats, tuple(sorted(layout)))
 
@@ -65,13 +65,13 @@ _LOADS: Final = TypeAdapter(tuple[Load, ...])
 
 
 class ResultStore:
-    """Keeps results in the files of a folder; see `FolderStore`.
+    """Stores results in the files of a folder; see `FolderStore`.
 
     Args:
-        folder: The folder; it is made if need be.
+        folder: The folder; it is created if necessary.
 
     Raises:
-        BlastEnvError: If the folder cannot be made.
+        BlastEnvError: If the folder cannot be created.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -83,11 +83,11 @@ class ResultStore:
         return self._store.folder
 
     def proposal(self, key: str, scenario: AnyScenario) -> Proposal | None:
-        """Return what a search proposed for a scenario, or `None` if that is not known.
+        """Return the stored proposal of a search for a scenario, or `None` if there is none.
 
         Args:
-            key: Of `search_key`.
-            scenario: The scenario; a layout that does not fit it counts as not known.
+            key: Key from `search_key`.
+            scenario: The scenario; a layout that does not fit it is ignored.
         """
 
         def decode(content: bytes) -> Proposal:
@@ -98,7 +98,7 @@ class ResultStore:
         return self._store.read(key, decode)
 
     def keep_proposal(self, key: str, proposal: Proposal) -> None:
-        """Keep what a search proposed.
+        """Store the proposal of a search.
 
         Raises:
             BlastEnvError: If it cannot be written.
@@ -106,11 +106,11 @@ class ResultStore:
         self._store.put(key, _PROPOSAL.dump_json(proposal))
 
     def loads(self, key: str, threats: int) -> tuple[float, ...] | None:
-        """Return the loads under the threats, in the objective's unit; `None`: not known.
+        """Return the stored loads, one per threat in the objective's unit, or `None`.
 
         Args:
-            key: Of `evaluation_key`.
-            threats: How many there are.
+            key: Key from `evaluation_key`.
+            threats: Number of threats.
         """
 
         def decode(content: bytes) -> tuple[float, ...]:
@@ -122,7 +122,7 @@ class ResultStore:
         return self._store.read(key, decode)
 
     def keep_loads(self, key: str, loads: tuple[float, ...]) -> None:
-        """Keep the loads under the threats, in the unit of the objective.
+        """Store the loads, one per threat, in the unit of the objective.
 
         Raises:
             BlastEnvError: If they cannot be written.
@@ -142,7 +142,7 @@ def _key(
 
 
 def _plain(charge: AnyCharge) -> object:
-    """Return a charge as what JSON knows."""
+    """Return a charge as JSON-compatible data."""
     if isinstance(charge, VehicleCharge):
         return charge.source.model_dump(mode="json"), charge.rank
     return charge
@@ -150,10 +150,10 @@ def _plain(charge: AnyCharge) -> object:
 
 @cache
 def _search_code(own: Path) -> str:
-    """Return a digest of the code that a search depends on, with versions.
+    """Return a digest of the code of a search, with versions.
 
     Args:
-        own: The folder of its method, for those that are not with all the others.
+        own: The folder of its method, for methods outside `blast_agents.search`.
     """
     folder = Path(blast_agents.__file__).parent
     paths = sorted((folder / "search").glob("*.py"))

@@ -1,4 +1,4 @@
-"""What the entries of a league are asked: cases, and the blasts that their layouts meet."""
+"""Tracks of a league: cases with their held-out threats."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -45,23 +45,23 @@ MOST_CASES: Final = 1000
 MOST_SEEDS: Final = 1000
 MOST_LEAGUE_SEED: Final = 1000
 HIDDEN_SEEDS: Final = 4
-"""On a known site a hidden threat is one case, which meets so many times more held-out threats."""
+"""Factor on the held-out threats of the single case of a hidden threat on a known site."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Cases of one kind; each of them meets as many held-out threats.
+    """Cases of one kind, all with the same number of held-out threats.
 
-    Layouts are judged on the threats of a case (`SeedRange.JUDGEMENT`), a search may spend its
-    blasts on those of its `practice` (`SeedRange.SEARCH`).
+    Layouts are judged on the threats of a case (`SeedRange.JUDGEMENT`); a search spends its blasts
+    on those of its `practice` (`SeedRange.SEARCH`).
 
     Attributes:
-        name: Of the track's files.
-        title: What is asked, for people.
+        name: Name of the track and its files.
+        title: Title for readers.
         threat: `"visible"` or `"hidden"`, as in training.
         site: Content hash of the scenario, or the family of generated sites.
-        cases: At least one.
-        reference_budget: An agent is held against genetic search with so many blasts a case.
+        cases: At least one case.
+        reference_budget: Blasts per case of genetic search as the reference of agents.
     """
 
     name: str
@@ -77,16 +77,16 @@ def known_track(
 ) -> Track:
     """Return the track of a known threat at unseen positions.
 
-    A search meets `VISIBLE_REALISATIONS` fans and airs of the case's own charge; without noise it
-    meets the very blast that layouts are judged on.
+    A search uses `VISIBLE_REALISATIONS` fans and airs of the case's charge; without noise it uses
+    the same blast as the judgement.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
-        cases: How many charges are drawn, at most 1,000.
-        seeds: Held-out fans and airs of each, at most 1,000.
-        seed: Decides everything, at most 1,000.
-        noisy: Whether the engine has fans and airs to draw; if not, there is one held-out blast a
-            case, whatever `seeds` says, and a charge that is drawn again is no other case.
+        cases: Number of charges to draw, at most 1,000.
+        seeds: Held-out fans and airs per charge, at most 1,000.
+        seed: Seed of all draws, at most 1,000.
+        noisy: Whether the engine draws fans and airs; if not, there is one held-out blast per case,
+            regardless of `seeds`, and repeated charges are dropped.
 
     Raises:
         BlastEnvError: If a number is out of bounds, or there is no build zone.
@@ -121,14 +121,14 @@ def known_track(
 def hidden_track(scenario: AnyScenario, seeds: int, seed: int = 0, *, noisy: bool = True) -> Track:
     """Return the track of a hidden threat on a known site: one case.
 
-    A search meets `HIDDEN_THREATS` charges, one fan and air each.
+    A search uses `HIDDEN_THREATS` charges, with one fan and air each.
 
     Args:
         scenario: As for `known_track`.
-        seeds: The case meets `HIDDEN_SEEDS` times as many held-out threats.
+        seeds: The case has `HIDDEN_SEEDS` times as many held-out threats.
         seed: As for `known_track`.
-        noisy: As for `known_track`; if not, a charge that is drawn again is the same blast again,
-            and is there once. So it is with a few places, as of a vehicle.
+        noisy: As for `known_track`; if not, repeated charges, which are common for vehicles, are
+            dropped as identical blasts.
 
     Raises:
         BlastEnvError: As for `known_track`.
@@ -180,10 +180,10 @@ def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0, family: st
     """Return the track of a hidden threat on generated sites, each of them a case.
 
     Args:
-        sites: Sites that no training has seen, at most 1,000.
-        seeds: Held-out threats of each, at most 1,000.
+        sites: Sites used by no training, at most 1,000.
+        seeds: Held-out threats per site, at most 1,000.
         seed: As for `known_track`.
-        family: What the sites are of, one of `FAMILIES`.
+        family: Family of the sites, one of `FAMILIES`.
 
     Raises:
         BlastEnvError: As for `known_track`.
@@ -203,7 +203,7 @@ def sites_track(sites: Sequence[Scenario], seeds: int, seed: int = 0, family: st
 
 
 def practice_of(case: Case) -> Case:
-    """Return what a search for a case may spend its blasts on.
+    """Return the practice case on which a search spends its blasts.
 
     Raises:
         BlastEnvError: If the case has none.
@@ -226,20 +226,20 @@ def find_tracks(
 
     Args:
         name: One of `TRACKS`, or `"all"`.
-        cases: Cases of each track; the hidden threat on a known site is one.
-        seeds: Held-out seeds of each case.
-        seed: Decides everything.
-        scenarios: Bundled names or files for the tracks with a known site; `KNOWN_SCENARIOS`,
-            `HIDDEN_SCENARIOS` and the bundled ones with a vehicle unless given. Of those that are
-            given, the track `"vehicle"` has the ones with a vehicle if others are asked for too.
-        noisy: As for `known_track` and `hidden_track`. Engines with noise, those of particles,
-            leave out bundled scenarios with a vehicle that name no calibration; of `"all"` also
+        cases: Cases per track; a hidden threat on a known site has one.
+        seeds: Held-out seeds per case.
+        seed: Seed of all draws.
+        scenarios: Bundled names or files for the tracks with a known site; by default
+            `KNOWN_SCENARIOS`, `HIDDEN_SCENARIOS` and the bundled ones with a vehicle. With
+            `"all"`, the track `"vehicle"` uses only those with a vehicle.
+        noisy: As for `known_track` and `hidden_track`. For engines with noise, those of particles,
+            the default omits scenarios with a vehicle and no calibration; `"all"` also omits
             sites with heights.
 
     Raises:
-        UnknownNameError: If there is no such track; the message names the nearest one.
-        BlastEnvError: If a number is out of bounds, a scenario is given twice, or there is one of
-            no use, or one for the generated sites.
+        UnknownNameError: If the track is unknown; the message names the nearest one.
+        BlastEnvError: If a number is out of bounds, a scenario is repeated or unsuitable, or a
+            scenario is given for a track of generated sites.
     """
     check_names("track", [name], [*TRACKS, "all"])
     if name in FAMILIES and scenarios:
@@ -289,7 +289,7 @@ def _hidden_case(name: str, scenario: Scenario, first: int, seeds: int, search_s
 
 
 def _first_seeds(cases: int, seeds: int, seed: int) -> list[int]:
-    """Return the first held-out seed of each case; the others follow it."""
+    """Return the first held-out seed of each case; the others are consecutive."""
     whole_number("cases", cases, 1, MOST_CASES)
     whole_number("seeds", seeds, 1, MOST_SEEDS)
     whole_number("seed", seed, 0, MOST_LEAGUE_SEED)

@@ -1,4 +1,4 @@
-"""Agents of run folders, and surrogates, as entries of a league."""
+"""Agents of run folders and surrogates as entries of a league."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,13 +18,13 @@ from blast_env.sites import FAMILIES
 
 @dataclass(frozen=True, eq=False)
 class TrainedRun:
-    """The agent of a run folder, and what it was trained for.
+    """The agent of a run folder, with the configuration and cost of its training.
 
     Attributes:
         run: The folder.
         agent: The agent, with the weights of its best evaluation.
-        configuration: Of the run: scenario and threat, among others.
-        training: What it cost.
+        configuration: Configuration of the run, including scenario and threat.
+        training: Cost of the training.
     """
 
     run: Path
@@ -37,7 +37,7 @@ class TrainedRun:
         """Load the agent of a run folder.
 
         Raises:
-            BlastEnvError: If it is no run folder, or damaged.
+            BlastEnvError: If it is not a run folder or is damaged.
         """
         folder = RunFolder(run)
         configuration = folder.configuration()
@@ -58,18 +58,18 @@ class TrainedRun:
 
     @property
     def entry(self) -> LeagueEntry:
-        """The agent by itself."""
+        """The agent alone."""
         alone = LearntSearch(agent=self.agent, digest=self.agent.digest, name=self.name)
         return LeagueEntry(alone, kind=ProposerKind.LEARNT, training=self.training)
 
     def entries(
         self, budgets: Sequence[int], surrogate: Surrogate | None
     ) -> tuple[LeagueEntry, ...]:
-        """Return the agent by itself, with searches, and the same once more with a surrogate.
+        """Return the agent alone and with searches, and the same with a surrogate.
 
         Args:
-            budgets: Blasts that a search from the agent may spend on a case.
-            surrogate: Picks one of the layouts that the agent draws, and what gets a blast.
+            budgets: Blasts per case of the searches.
+            surrogate: Ranks the agent's samples, and selects the layouts to simulate.
         """
         digest = self.agent.digest
         own = LearntSearch(agent=self.agent, digest=digest, name=f"{self.name} with search")
@@ -91,16 +91,16 @@ class TrainedRun:
         return (*found, *(LeagueEntry(guided, each, kind=ProposerKind.LEARNT) for each in budgets))
 
     def is_for(self, track: Track) -> bool:
-        """Return whether a track asks what the agent was trained for."""
+        """Return whether a track has the threat and site that the agent was trained for."""
         return (self.configuration.settings.threat, self.site) == (track.threat, track.site)
 
 
 def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[LeagueEntry, ...]:
-    """Return a surrogate's own proposals, and its searches.
+    """Return the entries of a surrogate alone and of its searches.
 
     Args:
         surrogate: The surrogate.
-        budgets: Blasts that its searches may spend on a case.
+        budgets: Blasts per case of its searches.
     """
     search = search_by(surrogate)
     training = Training(surrogate.fit.blasts, surrogate.fit.seconds)
@@ -109,10 +109,10 @@ def surrogate_entries(surrogate: Surrogate, budgets: Sequence[int]) -> tuple[Lea
 
 
 def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
-    """Refuse an agent that was trained for none of the tracks.
+    """Refuse agents trained for none of the tracks.
 
     Raises:
-        BlastEnvError: If there is one; the message says what it was trained for.
+        BlastEnvError: If there is one; the message names its threat and scenario.
     """
     for run in runs:
         if not any(run.is_for(track) for track in tracks):
@@ -124,10 +124,10 @@ def check_runs(runs: Sequence[TrainedRun], tracks: Sequence[Track]) -> None:
 
 
 def _training(folder: RunFolder, settings: TrainingSettings) -> Training:
-    """Return what a run cost, without the one that it started from; guesses are no blasts.
+    """Return the cost of a run, without that of an initial run; predictions count as no blasts.
 
-    Each evaluation counts with a blast a case, and the cases without a barrier once: the most that
-    it can have been, because a layout that comes again needs no blast.
+    Each evaluation counts one blast per case, and the unprotected cases count once. This is an
+    upper bound, because repeated layouts need no blast.
     """
     checkpoint = Checkpoint.load(folder.checkpoint)
     selection = (len(checkpoint.evaluations) + 1) * settings.evaluation_cases
