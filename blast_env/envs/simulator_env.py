@@ -241,7 +241,7 @@ class UnfoldingGas(Unfolding):
 
     @property
     def impulse(self) -> float:
-        """Weighted impulse on the protected structures so far, Pa s."""
+        """Impulse on the protected structures so far, by weight, Pa s."""
         table = self._so_far().structures
         counts = table["protected"] * table["weight"]
         return float((counts * table["positive_impulse_pa_s"]).sum())

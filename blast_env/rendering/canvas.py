@@ -1,4 +1,4 @@
-"""The page of a frame, laid out in pixels: what stays is drawn once, what moves in every frame."""
+"""The page of a frame, laid out in pixels: a static ground and moving parts for each frame."""
 
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
@@ -26,23 +26,23 @@ with render_extra():
     from matplotlib.ticker import Formatter, FuncFormatter
 
 Frame = NDArray[np.uint8]
-"""A picture: rows from above, pixels, red, green and blue."""
+"""A picture: rows from the top, pixels, and red, green and blue."""
 
 _DPI: Final = 100.0
 _LINES: Final = ((10, 12.0, INK, True), (36, 8.5, QUIET_INK, False), (54, 8.5, QUIET_INK, False))
-"""Of the lines over a page: pixels from the top, points, colour, and whether they are bold."""
+"""For each line of a heading: pixels from the top, points, colour, and whether it is bold."""
 
 _MARGIN_PX: Final = 12
 _BAR_PX, BAR_LABELS_PX = 14, 52
 
-# Of a page with one site; in pixels where it is 960 wide.
+# Lengths of a page with one site, in pixels at a width of 960.
 _USUAL_WIDTH_PX: Final = 960
 _NARROWEST_PX, _WIDEST_PX = 320, 4096
-_SMALLEST_SCALE: Final = 0.72  # letters can be read
+_SMALLEST_SCALE: Final = 0.72  # keeps letters legible
 _HEADER_PX, _LEFT_PX, _RIGHT_PX, _AXIS_PX = 78, 58, 20, 52
 _LETTER_PX, _LINE_PX, _SIGN_LETTERS = 6.6, 20, 7  # of a legend
 _LEAST_LINES: Final = 3
-_MOST_HIGH: Final = 0.8  # of the width: what a site takes at most
+_MOST_HIGH: Final = 0.8  # largest height of a site, as a share of the width
 _HEADING_SHARE, _CLOCK_SHARE = 0.53, 0.44  # of the width
 _SMALLEST_GRID_PX: Final = 6.0
 
@@ -53,7 +53,7 @@ class Sheet:
     Args:
         width_px: Width of the page.
         height_px: Its height.
-        scale: How much larger than usual letters and gaps are.
+        scale: Size of letters and gaps, relative to the usual one.
 
     Attributes:
         figure: The page.
@@ -73,19 +73,19 @@ class Sheet:
         self._clock_share = 1.0
 
     def panel(self, left_px: float, bottom_px: float, wide_px: float, high_px: float) -> Axes:
-        """Return axes at a place; its bottom is counted from the page's top."""
+        """Return axes at a position in pixels; `bottom_px` is counted from the top of the page."""
         width, height = self.size_px
         place = (left_px / width, 1.0 - bottom_px / height, wide_px / width, high_px / height)
         return self.figure.add_axes(place)
 
     def write_heading(self, lines: Sequence[str], share: float) -> None:
-        """Write the lines at the upper left; they get smaller where they take more of the width."""
+        """Write the lines at the upper left, shrunk to at most a share of the width."""
         for text, line in zip(self._texts("left"), lines, strict=False):
             text.set_text(line)
             self._fit(text, share)
 
     def add_clock(self, share: float) -> None:
-        """Have lines at the upper right that change with every frame; see `frame`."""
+        """Add lines at the upper right that change with every frame; see `frame`."""
         self._clock, self._clock_share = self._texts("right"), share
         for text in self._clock:
             text.set_animated(True)
@@ -105,7 +105,7 @@ class Sheet:
         return bar
 
     def add_legend(self, handles: Sequence[Artist], columns: int) -> None:
-        """Add a legend at the lower end of the page."""
+        """Add a legend at the bottom of the page."""
         self.figure.legend(
             handles=handles,
             loc="lower center",
@@ -117,13 +117,13 @@ class Sheet:
         )
 
     def let_move(self, artists: Iterable[Artist]) -> None:
-        """Leave artists out of the ground, and draw them in every frame, in this order."""
+        """Leave artists out of the static ground; draw them in every frame, in this order."""
         for artist in artists:
             artist.set_animated(True)
             self._moving.append(artist)
 
     def frame_axes(self, axes: Axes, labels: tuple[str, str], colour: Colour) -> None:
-        """Write what the axes are, and draw their border over everything."""
+        """Label the axes, and draw their border over everything."""
         axes.tick_params(labelsize=8)
         axes.set_xlabel(labels[0], fontsize=9, labelpad=2.0)
         axes.set_ylabel(labels[1], fontsize=9)
@@ -135,11 +135,11 @@ class Sheet:
         self.let_move(axes.spines.values())
 
     def frame(self, lines: Sequence[str], moving: Iterable[Artist] = ()) -> Frame:
-        """Return the page as it is now, uint8 (height, width, 3).
+        """Return the page in its present state, uint8 (height, width, 3).
 
         Args:
-            lines: What the clock says.
-            moving: What is there in this frame alone; it is drawn below all else that moves.
+            lines: Lines of the clock.
+            moving: Artists of this frame alone, drawn below all other moving ones.
         """
         if self._ground is None:
             self._canvas.draw()
@@ -157,7 +157,7 @@ class Sheet:
             np.asarray(self._canvas.buffer_rgba()),
             np.empty((*self.size_px[::-1], 3), np.uint8),
         )
-        for channel in range(3):  # several times as quick as all at once
+        for channel in range(3):  # several times faster than all at once
             frame[..., channel] = pixels[..., channel]
         return frame
 
@@ -179,7 +179,7 @@ class Sheet:
         ]
 
     def _fit(self, text: Text, share: float) -> None:
-        """Make a line as large as usual, or smaller so that it takes that share of the width."""
+        """Set a line to its usual size, or shrink it to a share of the width."""
         usual_pt = next(
             size for _, size, _, bold in _LINES if bold == (text.get_fontweight() == "bold")
         )
@@ -189,18 +189,18 @@ class Sheet:
 
 
 class SiteSheet(Sheet):
-    """A page with a site to scale, and below it what its signs and its colours mean.
+    """A page with a site to scale, and below it a legend and a colour bar.
 
     Args:
         site_m: The simulated area.
         width_px: Width of the page, 320 to 4096.
         handles: Entries of the legend.
         has_bar: Whether there is a colour bar; see `add_scale`.
-        least_px: Least height of the page; that is even.
+        least_px: Least height of the page; the height is even.
 
     Attributes:
-        axes: The site, in metres.
-        pixels_per_m: Scale.
+        axes: Axes of the site, in metres.
+        pixels_per_m: Scale of the site.
 
     Raises:
         BlastEnvError: If the width is out of bounds.
@@ -219,12 +219,12 @@ class SiteSheet(Sheet):
         scale = max(width_px / _USUAL_WIDTH_PX, _SMALLEST_SCALE)
         width_m, height_m = site_m.right - site_m.left, site_m.top - site_m.bottom
         room_px = width_px - (_LEFT_PX + _RIGHT_PX) * scale
-        # Neither width nor height gets out of hand.
+        # Both width and height are bounded.
         self.pixels_per_m = min(room_px / width_m, _MOST_HIGH * width_px / height_m)
         longest = max(len(str(each.get_label())) for each in handles)
         entry_px = _LETTER_PX * scale * (longest + _SIGN_LETTERS)
         columns = max(min(int(width_px / entry_px), len(handles)), 1)
-        # The same for most sites: frames of an environment that draws them have one size.
+        # The same for most sites, so that all frames of an environment have one size.
         lines = max(-(-len(handles) // columns), _LEAST_LINES)
         lines_px = (lines * _LINE_PX + _MARGIN_PX) * scale
         self._bar_px = _HEADER_PX * scale + self.pixels_per_m * height_m + _AXIS_PX * scale
@@ -240,7 +240,7 @@ class SiteSheet(Sheet):
         self.add_clock(_CLOCK_SHARE)
 
     def write(self, lines: Sequence[str]) -> None:
-        """Write the heading, and draw the border; to be called after all that moves is known."""
+        """Write the heading and draw the border; call it after adding the other moving parts."""
         self.write_heading(lines, _HEADING_SHARE)
         self.frame_axes(self.axes, ("x (m)", "y (m)"), BORDER)
 
@@ -250,7 +250,7 @@ class SiteSheet(Sheet):
         self.add_bar(colours, bottom_px, label, FuncFormatter(number_on_axis), "max")
 
     def draw_grid(self, zone_m: Rectangle) -> Artist | None:
-        """Draw the cells of a build zone where they are large enough to be told apart."""
+        """Draw the grid of a build zone; None if cells are smaller than 6 pixels."""
         if self.pixels_per_m * MODULE_SIDE_M < _SMALLEST_GRID_PX:
             return None
         left, bottom, right, top = zone_m
@@ -260,12 +260,12 @@ class SiteSheet(Sheet):
         return self.axes.add_collection(grid, autolim=False)
 
     def pixel(self, x_m: float, y_m: float) -> tuple[int, int]:
-        """Return the pixel, x and y from above, that shows a place."""
+        """Return the pixel of a place: x, and y from the top."""
         across, up = self.axes.transData.transform((x_m, y_m))
         return int(across), int(self.size_px[1] - up)
 
     def place_m(self, across_px: float, down_px: float) -> tuple[float, float]:
-        """Return the place that the middle of a pixel shows."""
+        """Return the place at the middle of a pixel, in metres."""
         middle = (across_px + 0.5, self.size_px[1] - down_px - 0.5)
         x_m, y_m = self.axes.transData.inverted().transform(middle).tolist()
         return x_m, y_m

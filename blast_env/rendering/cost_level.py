@@ -1,4 +1,4 @@
-"""Cost against level of protection: what each step up costs, and by which kind of measures."""
+"""Cost against level of protection: the price of each level, by kind of measures."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
@@ -12,7 +12,7 @@ with render_extra():
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart; markers do as well.
+# Okabe and Ito's colours, distinct for any colour vision; markers differ as well.
 _KINDS: Final = (
     *(("#000000", "o"), ("#56B4E9", "s"), ("#0072B2", "^")),
     *(("#009E73", "D"), ("#CC79A7", "v"), ("#E69F00", "P")),
@@ -22,11 +22,11 @@ _MARGIN: Final = 0.05
 
 
 class PricedDamage(NamedTuple):
-    """A layout as a point: what it costs, and the worst damage of all components behind it.
+    """A layout as a point: its cost, and the worst damage of all components behind it.
 
     Attributes:
-        cost: In the unit of the zone's budget.
-        damage: From 0 to 5; see `blast_env.response.damage`.
+        cost: Cost in the unit of the zone's budget.
+        damage: Damage from 0 to 5; see `blast_env.response.damage`.
     """
 
     cost: float
@@ -34,7 +34,7 @@ class PricedDamage(NamedTuple):
 
 
 def cheapest(points: Iterable[PricedDamage]) -> list[PricedDamage]:
-    """Return the points that no other one beats in both cost and damage, the cheapest first."""
+    """Return the Pareto front of cost and damage, the cheapest point first."""
     front: list[PricedDamage] = []
     for point in sorted(points):
         if not front or point.damage < front[-1].damage:
@@ -52,11 +52,11 @@ def cost_level_figure(
     """Return a picture of cost against level of protection.
 
     Args:
-        tried: What was looked at, by the kind of measures.
-        judged: The best of each kind, by the search and by finer cells.
-        target: The level that is wanted.
-        title: Above the picture.
-        words: What searched and what judged: `gas, cells of 0.5 m`.
+        tried: The layouts tried, by kind of measures.
+        judged: The best layout of each kind, by the search and by the judge.
+        target: The required level.
+        title: Title of the picture.
+        words: Engines of the search and of the judge, as `gas, cells of 0.5 m`.
     """
     figure = Figure(figsize=(8.6, 5.6), layout="constrained")
     axes = figure.subplots()
@@ -91,7 +91,7 @@ def cost_level_figure(
 
 
 def _draw_levels(axes: Axes, target: LevelOfProtection, most: float) -> None:
-    """Draw a band a level with its name, the best at the top; the target's limit is dashed."""
+    """Draw one band per level with its name, the best at the top; the target's limit is dashed."""
     left, right = -_MARGIN * most, (1.0 + 5.0 * _MARGIN) * most
     for level in LevelOfProtection:
         begin = _MOST_DAMAGE - 1.0 - level

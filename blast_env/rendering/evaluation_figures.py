@@ -60,14 +60,14 @@ _PERCENT = 100.0
 
 
 def _shown(scenario: Scenario, layout: Layout, charge: Charge | None = None) -> list[Feature]:
-    """Return what is on the site with a layout: charges are drawn as they went off."""
+    """Return the features of the site with a layout, without charges but with vehicle entries."""
     features = (*site_features(scenario, layout, charge), *vehicle_features(scenario, layout))
     entries = [each for each in features if each.kind is Kinds.CHARGE_PLACE and scenario.vehicles]
     return [*without(features, Kinds.CHARGE_PLACE, Kinds.CHARGE), *entries]
 
 
 def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
-    # The least protected last, on top.
+    # The smallest reduction last, on top.
     outcomes = sorted(evaluation.outcomes, key=lambda outcome: -np.nan_to_num(outcome.reduction))
     reduction = _PERCENT * np.array([outcome.reduction for outcome in outcomes])
     scale = Normalize(0.0, _PERCENT)
@@ -129,7 +129,7 @@ def _worst_ring(*position_m: float) -> Line2D:
     )
 
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
+# Okabe and Ito's colours, distinct for any colour vision.
 _WITHOUT, _WITH = "#D55E00", "#0072B2"
 _HEIGHT_IN, _RIGHT_IN = 8.4, 7.2
 _PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 5.6, (4.8, 8.4)
@@ -141,10 +141,9 @@ _MOST_UPRIGHT_LETTERS = 64
 def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
     """Return a figure of an evaluation.
 
-    On the left the site with the layout and all charges, in the colour of how much of their
-    impulse the layout takes off. On the right the impulse of each threat without and with the
-    barrier, and below it the mean load on every module of the protected structure that is loaded
-    most without a barrier.
+    On the left the site with the layout and all charges, coloured by the reduction of their
+    impulse. On the right the load of each threat without and with the barrier, and below it the
+    mean load on every module of the protected building with the largest load without a barrier.
 
     Args:
         evaluation: The evaluation.
@@ -236,19 +235,19 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
     axes.grid(axis="y", alpha=0.3)
     if evaluation.engine.has_noise:
         _name_threats(axes, "seed of the threat", [str(each.threat.seed) for each in outcomes])
-    else:  # the seed only draws the charge
+    else:  # the seed determines only the charge
         places = (each.charge.position_m for each in outcomes)
         names = [f"({x_m:.1f}, {y_m:.1f})" for x_m, y_m in places]
         _name_threats(axes, "charge of the threat (m)", names)
 
 
 def _load_text(evaluation: LayoutEvaluation, load: float) -> str:
-    """Return a load with its unit as figures write it."""
+    """Return a load with its unit, in the notation of figures."""
     return evaluation.scenario.objective.text(load).replace("Pa s", "Pa·s")
 
 
 def _load_name(evaluation: LayoutEvaluation) -> str:
-    """Return what the loads are: of one structure as it is, or a weighted sum."""
+    """Return the name of the loads: that of one structure, or a weighted sum."""
     noun = evaluation.scenario.objective.noun
     protected = evaluation.loads[0].protected
     weighted = len(protected) > 1 or protected[0].weight != 1.0
@@ -310,11 +309,11 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
 
 
 MOST_SHOWN: Final = 12
-"""How many cases a figure has at most: the first ones."""
+"""Most cases in a figure: the first ones."""
 
 _COLUMNS: Final = 4
 _PANEL_IN: Final = 3.2
-_LEAST_WIDTH_IN: Final = 9.6  # the heading has to fit
+_LEAST_WIDTH_IN: Final = 9.6  # for the heading
 _PANEL_HEIGHTS_IN: Final = (2.0, 4.8)
 _THREAT_PT: Final = 29.0  # of the lines between title and panel
 _TITLE_IN: Final = 0.95  # of a panel, with the numbers along x
@@ -330,8 +329,8 @@ class _Panel:
     Attributes:
         case: The case.
         layout: Its layout.
-        reduction: What that takes off; NaN where nothing arrives without it.
-        in_range: Whether the calibration was made for it.
+        reduction: Its reduction, as a share; NaN if there is no load without it.
+        in_range: Whether all threats are within the checked range.
     """
 
     case: Case
@@ -341,7 +340,7 @@ class _Panel:
 
     @property
     def charge(self) -> Charge:
-        """The first charge, where it goes off."""
+        """The first charge, at the place of its detonation."""
         return charge_against(self.case.scenario, self.layout, self.case.threats[0].charge)
 
     def features(self) -> list[Feature]:
@@ -351,12 +350,12 @@ class _Panel:
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
-    """Return a picture of layouts and of how much each takes off, four in a row.
+    """Return a picture of layouts with their reductions, four in a row.
 
-    The first `MOST_SHOWN` cases are drawn, numbered from 1; if there are more, the picture says so.
+    The first `MOST_SHOWN` cases are drawn, numbered from 1; a note mentions further ones.
 
     Args:
-        comparison: Layouts, one a case.
+        comparison: The comparison, with one layout per case.
     """
     panels = [
         _Panel(case, layout, float(reduction), bool(in_range.all()))
@@ -391,7 +390,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
 
 def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a panel a case, high enough for the highest site."""
+    """Return a figure with one panel per case, high enough for the highest site."""
     rows = ceil(len(shown) / columns)
     width_in = max(columns * _PANEL_IN, _LEAST_WIDTH_IN)
     sites = [panel.case.scenario.site for panel in shown]
@@ -443,7 +442,7 @@ def _headline(count: int, reduction: Estimate) -> str:
 
 
 def _cases_subtitle(panels: Sequence[_Panel]) -> str:
-    """Return what the numbers are, how many cases are shown, and which are to be distrusted."""
+    """Return the meaning of the numbers, the count of cases, and the mark of unchecked ones."""
     noun = panels[0].case.scenario.objective.noun
     parts = [f"reduction of the {noun} on the protected structures"]
     if len(panels) > MOST_SHOWN:

@@ -1,4 +1,4 @@
-"""Facades in the colours of what becomes of them: unfolded, and in the oblique view of the site."""
+"""Facades coloured by level of protection: unfolded, and in the oblique view of the site."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -20,7 +20,7 @@ with render_extra():
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch, Rectangle
 
-# Darker is worse, so that the order is seen without colours as well.
+# Darker is worse, so that the order shows without colours too.
 LEVEL_COLOURS: Final = {
     LevelOfProtection.HIGH: "#f4f4ec",
     LevelOfProtection.MEDIUM: "#fbd977",
@@ -41,12 +41,12 @@ _VIEW_IN: Final = (5.2, 4.4)
 
 
 def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> Figure:
-    """Return the facades of a building, unfolded, a row of walls each.
+    """Return the unfolded facades of a building, one row of walls per response.
 
     Args:
-        rows: What a row shows, in words, and the building under one charge; the same building in
-            all rows.
-        title: Above the picture.
+        rows: Title of each row, and the response of the building to one charge; the same building
+            in all rows.
+        title: Title of the picture.
     """
     height = 1.6 + 2.5 * len(rows)
     figure = Figure(figsize=(10.0, height), layout="constrained")
@@ -65,12 +65,12 @@ def damage_view(
     views: Sequence[tuple[str, Layout, Sequence[BuildingResponse]]],
     title: str,
 ) -> Figure:
-    """Return the site in the oblique view, each bay in the colour of what becomes of it.
+    """Return the site in the oblique view, each bay in the colour of its level of protection.
 
     Args:
         scenario: The scenario.
-        views: What a view shows, in words; the layout; and the buildings under one charge.
-        title: Above the picture.
+        views: Title of each view, its layout, and the responses of the buildings to one charge.
+        title: Title of the picture.
     """
     width_in, height_in = _VIEW_IN
     figure = Figure(figsize=(width_in * len(views), height_in + 1.2), layout="constrained")
@@ -114,7 +114,7 @@ def _bay_colour(facade: FacadeResponse, index: int) -> str:
 
 
 def _tile(scenario: Scenario, bay: Bay, colour: Colour) -> Tile:
-    """Return a bay as a part of its structure's walls."""
+    """Return a bay as a tile on a wall of its structure."""
     structure = next(each for each in scenario.structures if each.name == bay.structure)
     left, bottom, right, top = structure.rectangle_m
     at_m = {"west": left, "east": right, "south": bottom, "north": top}[bay.wall]

@@ -64,7 +64,7 @@ _DETAIL_RADII = 4.5  # half the width of the detail, in radii of the charge
 
 
 def model_scheme(scene: Scene) -> Figure:
-    """Return the initial state with its three parts numbered, the paper's Figure 1."""
+    """Draw the initial state with its three parts numbered (Figure 1 of the paper)."""
     site_m = scene.site_m
     aspect = (site_m.right - site_m.left) / (site_m.top - site_m.bottom)
     plan_in = min(max(_PLAN_HEIGHT_IN * aspect, 4.0), 8.5) + 0.8
@@ -145,7 +145,7 @@ def _draw_detail(axes: Axes, scene: Scene) -> None:
     _draw_balls(axes, scene)
     fan = np.flatnonzero(scene.balls.kind == CollisionType.ExplosionBall)
     some = fan[np.unique(np.linspace(0, len(fan), _ARROWS, endpoint=False).astype(int))]
-    # A white edge on some of them shows that the disc is made of balls.
+    # White edges on some of them show that the disc consists of balls.
     _add_discs(axes, scene.balls.position[some], scene.balls.radius[some], EXPLOSIVE, "white")
     direction = scene.balls.velocity[some] / explosive.speed_units_per_s
     axes.quiver(
@@ -172,7 +172,7 @@ def _draw_detail(axes: Axes, scene: Scene) -> None:
 
 
 def _targets(scene: Scene, site_m: Rectangle) -> list[tuple[int, NDArray[np.float64]]]:
-    """Return what is numbered: the number and the place in metres that its line points to."""
+    """Return the numbers and the places in metres to which their lines point, by x."""
     targets = [(2, np.array(scene.charge.position_m))]
     for outline in _numbered_structures(scene):
         last = outline.build().parts[-1]
@@ -188,7 +188,7 @@ def _targets(scene: Scene, site_m: Rectangle) -> list[tuple[int, NDArray[np.floa
 
 
 def _numbered_structures(scene: Scene) -> list[StructureOutline]:
-    """Return the barrier and one structure that a line from above reaches past all others."""
+    """Return the barrier, and one structure that a line from above reaches without an obstacle."""
     barrier = [outline for outline in scene.structures if outline.cells is not None]
     structures = [outline for outline in scene.structures if outline.cells is None]
     structures.sort(key=lambda outline: (not outline.protected, -outline.rectangle_m.top))
@@ -204,7 +204,7 @@ def _numbered_structures(scene: Scene) -> list[StructureOutline]:
 def _number(
     axes: Axes, site_m: Rectangle, targets: Sequence[tuple[int, NDArray[np.float64]]]
 ) -> None:
-    """Write the numbers above the site, with a line from each to what it names."""
+    """Write the numbers above the site, with a line from each to its target."""
     width = site_m.right - site_m.left
     least = 0.06 * width
     x = site_m.left
@@ -226,7 +226,7 @@ def _number(
 
 
 def _key(scene: Scene) -> str:
-    """Return what the numbers mean, with the figures of this scene."""
+    """Return the key of the numbers, with the values of this scene."""
     air, explosive = scene.parameters.air, scene.parameters.explosive
     air_count = int((scene.balls.kind == CollisionType.AirBall).sum())
     names = ", ".join(outline.name for outline in scene.structures)
@@ -242,7 +242,7 @@ def _key(scene: Scene) -> str:
     )
 
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
+# Okabe and Ito's colours, distinct for any colour vision.
 _FACADES = (
     ("left", "#0072B2", "-"),
     ("right", "#D55E00", "--"),
@@ -256,7 +256,7 @@ _MOST_PANELS = 6
 def impulse_over_time(result: BlastResult) -> Figure:
     """Return the cumulative impulse on each facade of each structure over time.
 
-    The facade is told by the normal of the collision. At most six structures are shown: the
+    The normal of a collision determines its facade. At most six structures are shown: the
     protected ones first, then those with the largest impulses.
     """
     structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
@@ -294,7 +294,7 @@ def _draw_structure(
     end_ms: float,
     factor: float | None,
 ) -> None:
-    """Draw the impulse on each facade; `factor` takes it to Pa s, where there is a calibration."""
+    """Draw the impulse on each facade; `factor` converts it to Pa s, None without a calibration."""
     for facade, colour, style in _FACADES:
         own = hits[hits["facade"] == facade]
         if not len(own):
@@ -342,7 +342,7 @@ __all__ = [
 ]
 
 FIGURE_SUFFIXES = (".png", ".svg", ".pdf")
-"""The kinds of files that a figure can be saved as."""
+"""Suffixes of the file formats of figures."""
 
 _DOTS_PER_IN = 150
 _MOST_ARROWS = 36
@@ -350,14 +350,14 @@ _MOST_NAMED_ANGLES = 16
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Save a figure, as the kind of file that the suffix names.
+    """Save a figure, in the format of the suffix.
 
     Returns:
         The path.
 
     Raises:
         BlastEnvError: If the suffix is none of `FIGURE_SUFFIXES` or the file cannot be written;
-            nothing is left behind then.
+            no file remains then.
     """
     path = path_of(path)
     suffix = path.suffix.lower()
@@ -369,7 +369,7 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
     if suffix == ".png":
         content = png_of(figure, _DOTS_PER_IN)
     else:
-        buffer = BytesIO()  # a file that cannot be written would be left open
+        buffer = BytesIO()  # `savefig` would leave a file open after an error
         figure.savefig(buffer, format=suffix[1:], dpi=_DOTS_PER_IN)
         content = buffer.getvalue()
     with write_atomically(path) as temporary:
@@ -378,7 +378,7 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
 
 
 def png_of(figure: Figure, dots_per_in: float) -> bytes:
-    """Return a figure as PNG; its own `savefig` draws everything twice to find the layout."""
+    """Return a figure as PNG, faster than `savefig`, which draws all twice to find the layout."""
     before = figure.dpi
     figure.set_dpi(dots_per_in)
     buffer = BytesIO()
@@ -388,11 +388,11 @@ def png_of(figure: Figure, dots_per_in: float) -> bytes:
 
 
 def initial_velocities(parameters: SimulationParameters, count: int = 12) -> Figure:
-    """Return the velocities with which a fan of balls starts, the paper's Figure 2.
+    """Return a picture of the initial velocities of a fan of balls (Figure 2 of the paper).
 
     Args:
         parameters: The parameters of the blast model.
-        count: How many balls the fan has, 1 to 36; the charge itself has more.
+        count: Number of balls of the fan, 1 to 36; the charge itself has more.
 
     Raises:
         BlastEnvError: If the count is out of bounds.

@@ -39,7 +39,7 @@ with render_extra():
     from PIL import Image
 
 SUFFIXES = (".mp4", ".gif")
-"""The kinds of film files that can be written."""
+"""Suffixes of the file formats of films."""
 
 _SHORTEST_S, _USUAL_S, _LONGEST_S = 8.0, 10.0, 12.0
 _TENTHS_OF_FIRST_RUNS: Final = 2  # of the progress
@@ -52,12 +52,12 @@ _GIF_COLOURS = 128
 
 @dataclass(frozen=True)
 class FilmPlan:
-    """Which moments of a blast a film shows.
+    """The moments of a blast in a film.
 
     Attributes:
-        end_s: Simulated time of the last frame, about.
-        slow_motion: Seconds of the film for a second of the blast.
-        frames_per_s: Frames in a second of the film.
+        end_s: Approximate simulated time of the last frame.
+        slow_motion: Seconds of the film per second of the blast.
+        frames_per_s: Frames per second of the film.
     """
 
     end_s: float
@@ -71,7 +71,7 @@ class FilmPlan:
 
     @property
     def real_time_factor(self) -> str:
-        """The real-time factor in words, as it stands in every frame."""
+        """The real-time factor in words, as written in every frame."""
         if self.slow_motion == 1.0:
             return "real time"
         if self.slow_motion > 1.0:
@@ -86,17 +86,17 @@ class FilmPlan:
 def plan_film(
     result: BlastResult, frames_per_s: float = 25.0, slow_motion: float | None = None
 ) -> FilmPlan:
-    """Decide what a film of a blast shows.
+    """Plan the moments of a film of a blast.
 
     It lasts 8 to 12 s and ends a little after 99.9 % of the impulse on the protected structures
-    has arrived (on all structures, if none is protected or hit), but not later than twice the
-    time that 95 % took.
+    has arrived (on all structures, if none is protected or hit), but at the latest at twice the
+    arrival time of 95 %.
 
     Args:
         result: The blast.
-        frames_per_s: Frames in a second of the film.
-        slow_motion: Seconds of the film for a second of the blast, instead of the factor that
-            gives the usual duration.
+        frames_per_s: Frames per second of the film.
+        slow_motion: Seconds of the film per second of the blast, instead of the factor for the
+            usual duration.
 
     Raises:
         BlastEnvError: If an argument is not positive or the film would have too many frames.
@@ -134,29 +134,27 @@ def write_film(
 ) -> tuple[BlastResult, ...]:
     """Write a film of a blast, or of two side by side.
 
-    Each blast is run twice: first to learn the loads and when they arrive, then to draw it.
-    Between the engine's steps balls are drawn where they fly without a collision. Two blasts are
-    shown at the same moments, and a colour means the same load in both; the film ends when that of
-    the blast which takes longer would end.
+    Each blast is run twice: first to determine the loads and their arrival times, then to draw it.
+    Between the engine's steps, balls are drawn in free flight. Two blasts are shown at the same
+    moments and with one colour scale; the film has the length of the longer one.
 
     Args:
         blast: The blast.
         path: The film, `.mp4` or `.gif`. A GIF is at most 640 pixels wide and has at most 12.5
-            frames a second, or it would get too large to send.
+            frames per second, to limit its size.
         beside: Another blast, shown to the left: without the barrier, or with another layout.
-        frames_per_s: Frames in a second of the film.
-        slow_motion: Seconds of the film for a second of the blast; see `plan_film`, which also
-            gives the real-time factor from the result.
-        width_px: Width of the film; 960, or 1600 with two blasts. Each gets the same part, made
-            even.
-        progress: Called from time to time with the share of the work that is done.
+        frames_per_s: Frames per second of the film.
+        slow_motion: Seconds of the film per second of the blast; by default as in `plan_film`.
+        width_px: Width of the film; by default 960, or 1600 with two blasts. Each blast gets an
+            equal part, rounded down to an even width.
+        progress: Called from time to time with the finished share of the work.
 
     Returns:
         The results of the blasts, from left to right.
 
     Raises:
         BlastEnvError: If the suffix is another one, an argument is out of bounds or the file
-            cannot be written; nothing is left behind then, nor after Ctrl-C.
+            cannot be written; no file remains then, nor after Ctrl-C.
     """
     suffix = known_suffix(path)
     blasts = [blast] if beside is None else [beside, blast]
@@ -179,10 +177,10 @@ def write_film(
 
 
 def known_suffix(path: str | Path) -> str:
-    """Return the suffix of a film in small letters.
+    """Return the suffix of a film in lower case.
 
     Raises:
-        BlastEnvError: If no film with that suffix can be written.
+        BlastEnvError: If it is none of `SUFFIXES`.
     """
     suffix = path_of(path).suffix
     if suffix.lower() not in SUFFIXES:
@@ -194,17 +192,17 @@ def known_suffix(path: str | Path) -> str:
 
 
 def paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) -> Frame:
-    """Bring a blast to a moment and paint it.
+    """Advance a blast to a moment and paint it.
 
     Args:
-        run: The blast on its way.
-        painter: What paints it.
-        time_s: The moment; not before where the blast is.
-        note: What is written beside the time.
+        run: The blast in progress.
+        painter: Its painter.
+        time_s: The moment; not before the present time of the run.
+        note: Remark beside the time.
     """
     run.advance(time_s)
     balls = run.balls()
-    # Engines with steps may be a part of one ahead or behind: free flight in between.
+    # Engines with steps may be up to one step off: free flight in between.
     balls = replace(balls, position=balls.position + (time_s - run.time_s) * balls.velocity)
     return painter.paint(balls, run.obstacles, time_s, note)
 
@@ -212,11 +210,11 @@ def paint_at(run: BlastRun, painter: FramePainter, time_s: float, note: str) -> 
 def save_frames(
     frames: Iterable[Frame], path: Path, suffix: str, plan: FilmPlan, title: str, comment: str
 ) -> None:
-    """Write a film of the kind that a suffix names.
+    """Write a film in the format of a suffix.
 
     Args:
         frames: Its frames, uint8 (height, width, 3) with even width and height.
-        path: The file; its own suffix does not matter.
+        path: The file, with any suffix.
         suffix: One of `SUFFIXES`.
         plan: The plan, for a GIF one from `for_gif`.
         title: Title in the metadata; a GIF has none.
@@ -236,10 +234,10 @@ def save_frames(
 def _save_mp4(
     frames: Iterator[Frame], path: Path, frames_per_s: float, metadata: list[str], said: IO[bytes]
 ) -> None:
-    """Write H.264 in yuv420p, which every player knows.
+    """Write H.264 in yuv420p, which every player supports.
 
-    ffmpeg's exit status and the frames in the finished file are looked at, so that a film is whole
-    when this ends well. (imageio's writer looks at neither.)
+    Checks of ffmpeg's exit status and of the frames in the finished file ensure a complete film.
+    (The writer of imageio checks neither.)
     """
     first = next(frames)
     rate = str(Fraction(frames_per_s).limit_denominator())
@@ -258,7 +256,7 @@ def _save_mp4(
         stdin=PIPE,
         stdout=DEVNULL,
         stderr=said,
-        start_new_session=True,  # Ctrl-C is for us
+        start_new_session=True,  # Ctrl-C must reach this process alone
     )
     assert encoder.stdin is not None
     count = 0
@@ -266,7 +264,7 @@ def _save_mp4(
         for frame in chain([first], frames):
             try:
                 encoder.stdin.write(np.ascontiguousarray(frame).data)
-            except OSError:  # ffmpeg has gone, and has said why
+            except OSError:  # ffmpeg has ended; `said` has its message
                 break
             count += 1
         with suppress(BrokenPipeError):
@@ -292,10 +290,10 @@ def _save_mp4(
 
 
 def _save_gif(frames: Iterable[Frame], path: Path, frames_per_s: float, comment: str) -> None:
-    """Write an animated GIF that plays for ever.
+    """Write an animated GIF that repeats endlessly.
 
-    All frames share the colours of the first one, so that still parts cost nothing and nothing
-    flickers: it must have every colour of the film.
+    All frames share the colours of the first one, so that static parts take no space and nothing
+    flickers; the first one must have every colour of the film.
     """
     pictures = (Image.fromarray(frame) for frame in frames)
     first = next(pictures).quantize(_GIF_COLOURS, method=Image.Quantize.MAXCOVERAGE)
@@ -316,7 +314,7 @@ def _save_gif(frames: Iterable[Frame], path: Path, frames_per_s: float, comment:
 
 
 def told_of(frames: Iterable[Frame], plan: FilmPlan, progress: Tell) -> Iterator[Frame]:
-    """Yield frames, and tell which share of a film they are."""
+    """Yield frames, and report the share of the film so far."""
     for number, frame in enumerate(frames, start=1):
         yield frame
         progress(number / plan.frame_count)
@@ -331,9 +329,13 @@ def _comment(plan: FilmPlan, blasts: Sequence[Blast]) -> str:
 
 
 def for_gif(plan: FilmPlan, width_px: int) -> tuple[FilmPlan, int]:
-    """Return a plan and a width with which a GIF stays small."""
+    """Return a plan and a width that keep a GIF small.
+
+    Raises:
+        BlastEnvError: If it would have more than 300 frames.
+    """
     frames_per_s = min(plan.frames_per_s, _GIF_FRAMES_PER_S)
-    # A GIF tells how long a frame lasts in whole hundredths of a second.
+    # The duration of a frame in a GIF is a multiple of 0.01 s.
     frames_per_s = 100.0 / round(100.0 / frames_per_s)
     plan = replace(plan, frames_per_s=frames_per_s)
     if plan.frame_count > _GIF_MOST_FRAMES:
@@ -345,22 +347,22 @@ def for_gif(plan: FilmPlan, width_px: int) -> tuple[FilmPlan, int]:
 
 
 def _usual_slow_motion(end_s: float) -> float:
-    """Return the factor of few digits whose duration is nearest to the usual one."""
+    """Return the factor of few digits that gives the duration nearest to the usual one."""
     factors = nice_numbers(_SHORTEST_S / end_s, _LONGEST_S / end_s)
     return min(factors, key=lambda factor: abs(factor * end_s - _USUAL_S))
 
 
 def scale_end(results: Sequence[BlastResult], unit: LoadUnit) -> float | None:
-    """Return the impulse of a module at the end of the colours of some blasts, if there is any.
+    """Return the module impulse at the end of a common colour scale; None without any load.
 
-    It is the largest load of theirs, rounded up to few digits in the unit.
+    It is the largest load of all results, rounded up to few digits in the unit.
     """
     largest = max(map(_largest_load, results))
     return nice_load(unit, largest) if largest > 0.0 else None
 
 
 def _largest_load(result: BlastResult) -> float:
-    """Return the largest load of a protected module, of any one if these have none."""
+    """Return the largest load of a protected module, or of any module if these have none."""
     for obstacles in (
         [obstacle for obstacle in result.obstacles if obstacle.protected],
         list(result.obstacles),
@@ -372,12 +374,12 @@ def _largest_load(result: BlastResult) -> float:
 
 
 def _painters(results: Sequence[BlastResult], width_px: int) -> list[FramePainter]:
-    """Return a painter a blast, all with the colours of the largest load on what is protected."""
-    unit = max(results, key=_largest_load).load_unit  # one scale for all, so that they compare
+    """Return one painter per blast with a shared colour scale."""
+    unit = max(results, key=_largest_load).load_unit  # one scale, so that blasts are comparable
     painters = []
     for result in results:
         title, subtitle = blast_title(result.blast)
-        if len(results) > 1:  # short, because a part of a frame is narrow
+        if len(results) > 1:  # short, because parts of a frame are narrow
             title = barrier_text(result.blast.layout)
             subtitle = f"{charge_text(result.blast.scene.charge)}, seed {result.blast.seed}"
         painter = FramePainter(
@@ -407,6 +409,6 @@ def _frames(
 
 
 def made_higher(frame: Frame, height_px: int) -> Frame:
-    """Return a frame with empty page below; legends need not have as many lines."""
+    """Return a frame extended below to a height; legends of parts differ in their lines."""
     below = np.full((height_px - frame.shape[0], frame.shape[1], 3), PAGE, dtype=np.uint8)
     return np.concatenate([frame, below])

@@ -58,7 +58,7 @@ SIMULATION_UNITS: Final = LoadUnit()
 """Loads without a calibration."""
 
 ONE_SEED: Final = "one draw of fan and air of many: judge by the mean over seeds"
-"""What a film of one seed does not say."""
+"""Caveat in the film of one seed."""
 
 
 class FramePainter:
@@ -66,19 +66,19 @@ class FramePainter:
 
     Args:
         blast: The blast; its site, structures and charge are drawn.
-        title: Heading of every frame; the scenario's name unless given.
-        subtitle: Line under the heading; charge, layout and seed unless given.
+        title: Heading of every frame; by default the scenario's name.
+        subtitle: Line under the heading; by default charge, layout and seed.
         width_px: Width of the frames, 320 to 4096; the height follows from the site and is even.
-        height_px: Height of the frames where the site needs less; even.
-        full_impulse: Impulse of a module, simulation units, that has the last colour of the
-            scale. Without it a bound from the scene alone is used, so that all layouts of one
-            scenario and charge have the same scale.
-        unit: In what loads are shown.
-        remark: A third line, quiet as the second.
+        height_px: Least height of the frames; even.
+        full_impulse: Impulse of a module, simulation units, at the end of the colour scale. By
+            default a bound from the scene alone, so that all layouts of one scenario and charge
+            have the same scale.
+        unit: Unit of the loads shown.
+        remark: A third line, in the style of the second.
 
     Attributes:
         sheet: The page of the frames.
-        full_impulse: Impulse of a module that has the last colour.
+        full_impulse: Impulse of a module at the end of the colour scale, simulation units.
 
     Raises:
         BlastEnvError: If the width is out of bounds.
@@ -139,7 +139,7 @@ class FramePainter:
         """Return a frame, uint8 (height, width, 3).
 
         Args:
-            balls: The balls that are still there.
+            balls: The remaining balls.
             obstacles: The structures with the hits so far.
             time_s: Simulated time.
             note: A remark under the time, e.g. the real-time factor of a film.
@@ -151,13 +151,13 @@ class FramePainter:
         return self.sheet.frame(lines, (*self._flying(balls), *loads, *self._outlines))
 
     def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:
-        """Return the loads on what is protected at this moment."""
+        """Return the present loads on the protected structures, in words."""
         protected = [each for each in obstacles if each.protected]
         loads = [f"{each.name} {self._unit.of_structure(each)}" for each in protected]
         return f"so far: {', '.join(loads)}" if loads else ""
 
     def _loads_on(self, obstacle: ModularObstacle) -> tuple[Artist, Artist]:
-        """Return the modules in the colours of their loads, and the crosses on destroyed ones."""
+        """Return the modules coloured by load, and the crosses on destroyed ones."""
         known = self._loads.get(obstacle.name)
         if known is None:
             scale = Normalize(0.0, self.full_impulse)
@@ -166,7 +166,7 @@ class FramePainter:
         return known
 
     def _flying(self, balls: BallStates) -> Iterator[Artist]:
-        """Yield the air, and the explosive balls over it."""
+        """Yield the air balls, then the explosive balls above them."""
         centres_m = balls.position / UNITS_PER_M
         radius_px = balls.radius / UNITS_PER_M * self.sheet.pixels_per_m
         quarters = np.rint(4.0 * np.maximum(radius_px, _SMALLEST_RADIUS_PX)).astype(np.int64)
@@ -178,7 +178,7 @@ class FramePainter:
                 yield markers
 
     def _markers(self, kind: CollisionType, quarters: int) -> Line2D:
-        """Return what draws the balls of a kind and a radius, which is in quarters of a pixel."""
+        """Return the markers of the balls of a kind and a radius, given in quarters of a pixel."""
         key = (int(kind), quarters)
         if key not in self._balls:
             markers = _ball(kind)

@@ -1,7 +1,6 @@
-"""Figures of a blast of the gas engine: the ground, facades unfolded, histories of gauges.
+"""Figures of a blast of the gas engine: unfolded facades, and histories of gauges.
 
-Two results can be drawn beside each other, say without and with a barrier; both then have the same
-scale.
+Two results can be drawn beside each other on one scale, for example without and with a barrier.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -45,15 +44,15 @@ _PERCENT: Final = 100.0
 
 @dataclass(frozen=True)
 class Kind:
-    """How a quantity is drawn.
+    """The presentation of a quantity.
 
     Attributes:
         name: Its name.
         unit: Its unit.
         column: Its column in the tables of a result.
-        factor: From the column to the unit.
-        summary: What stands for a whole wall.
-        of_all: From the values of a wall to that.
+        factor: Conversion from the column to the unit.
+        summary: Name of the value for a whole wall: `mean` or `largest`.
+        of_all: Reduces the values of a wall to that one.
     """
 
     name: str
@@ -90,7 +89,7 @@ KINDS: Final = {
 
 
 def kind_of(quantity: str | Kind) -> Kind:
-    """Return how a quantity is drawn; a kind, say one in other units, is drawn as it says.
+    """Return the presentation of a quantity, or a given `Kind` unchanged.
 
     Raises:
         UnknownNameError: If there is no such quantity.
@@ -103,10 +102,10 @@ def kind_of(quantity: str | Kind) -> Kind:
 
 
 def gas_subtitle(blasts: Sequence[GasBlast]) -> str:
-    """Return charge and cells of blasts in words; the seed has nothing to say beside them.
+    """Return charge and cells of blasts in words; with them, a seed has no further effect.
 
-    The charge of a vehicle goes off elsewhere with each layout; then its places are named from left
-    to right.
+    The place of a vehicle's charge depends on the layout; then all places are named, from left to
+    right.
     """
     charge = blasts[-1].site.charge
     places_m = dict.fromkeys(blast.site.charge.position_m for blast in blasts)
@@ -117,10 +116,10 @@ def gas_subtitle(blasts: Sequence[GasBlast]) -> str:
 
 
 def check_comparable(blasts: Sequence[GasBlast]) -> None:
-    """Check that blasts can be drawn beside each other: one site, one charge or vehicle.
+    """Check that blasts have the same site and the same charge or vehicle.
 
     Raises:
-        BlastEnvError: If they differ in one of them.
+        BlastEnvError: If one of them differs.
     """
     first = blasts[0]
     for blast in blasts[1:]:
@@ -141,7 +140,7 @@ def both_results(result: GasResult, beside: GasResult | None) -> list[GasResult]
 
 
 def gas_heading(results: Sequence[GasResult], what: str) -> tuple[str, str]:
-    """Return the heading of a figure of some results, and the line under it."""
+    """Return the heading of a figure of results, and the line under it."""
     blast = results[-1].blast
     subtitle = gas_subtitle([each.blast for each in results])
     if len(results) == 1:
@@ -150,15 +149,15 @@ def gas_heading(results: Sequence[GasResult], what: str) -> tuple[str, str]:
 
 
 def loads_and_solids() -> Colormap:
-    """Return the colours of loads, grey for what is solid."""
+    """Return the colours of loads, with grey for solids."""
     return load_colours().with_extremes(bad=unit_interval(FAINT))
 
 
 # Facades.
 
 _FACADES_IN: Final = 11.0
-_ROW_LETTERS: Final = 26  # beside a row of walls
-_LEAST_WALL_SHARE: Final = 0.13  # of all walls, for its title
+_ROW_LETTERS: Final = 26  # most letters in a line beside a row of walls
+_LEAST_WALL_SHARE: Final = 0.13  # of the width of all walls, for the title
 _WALL_HEIGHTS_IN: Final = (1.0, 4.0)
 
 _LEFT_TO_RIGHT: Final[dict[WallName, tuple[str, bool]]] = {
@@ -167,7 +166,8 @@ _LEFT_TO_RIGHT: Final[dict[WallName, tuple[str, bool]]] = {
     "east": ("y", False),
     "north": ("x", True),
 }
-"""The walls as one walks round a structure, with the axis along each and whether it falls."""
+"""The walls in the order of a walk around a structure, with the axis along each and whether its
+values decrease to the right."""
 
 
 def facades(
@@ -177,9 +177,9 @@ def facades(
     beside: GasResult | None = None,
     full: float | None = None,
 ) -> Figure:
-    """Return the walls of a structure unfolded, with the load on every cell's face.
+    """Return the unfolded walls of a structure, with the load on every cell's face.
 
-    The walls are seen from outside, in the order in which one walks round: west, south, east,
+    The walls are seen from outside, in the order of a walk around the structure: west, south, east,
     north, so that neighbours share a corner.
 
     Args:
@@ -191,8 +191,8 @@ def facades(
             or how else one is drawn.
         beside: Another result with the same site and charge, drawn above on the same scale:
             without the barrier, or with another layout.
-        full: End of the scale, for walls that are to be compared; see `full_load`. Without it the
-            largest load that is drawn, rounded up.
+        full: End of the scale, for comparisons of figures; see `full_load`. By default the
+            largest load drawn, rounded up.
 
     Raises:
         BlastEnvError: If site or charge of the results differ, or there is no structure.
@@ -230,13 +230,13 @@ def facades(
 
 
 def _row_words(blast: GasBlast) -> str:
-    """Return what barrier a blast has, in words as long as a wall is high."""
+    """Return the barrier of a blast in words, wrapped for the side of a row."""
     kept_together = sub(r"([(,] ?\d+) ", "\\1\N{NO-BREAK SPACE}", barrier_text(blast.layout))
     return "\n".join(wrap(kept_together, _ROW_LETTERS))
 
 
 def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
-    """Return the end of the scale on which `facades` draws a structure, in Pa s or kPa.
+    """Return the end of the scale of `facades` for a structure, in Pa s or kPa.
 
     Raises:
         UnknownNameError: If there is no such structure or quantity.
@@ -252,14 +252,14 @@ def _full(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
 
 @dataclass(frozen=True)
 class _Walled:
-    """A structure, or the parts of a building, as one sees its walls.
+    """A structure, or the parts of a building, as a single box with walls.
 
     Attributes:
         name: Its name.
         parts: Names of the structures.
-        rectangle_m: Around them.
+        rectangle_m: The rectangle around them.
         height_m: The height of the highest.
-        faces: The walls that count of any of them.
+        faces: The walls that count for at least one of them.
     """
 
     name: str
@@ -270,7 +270,7 @@ class _Walled:
 
     @classmethod
     def of(cls, name: str, parts: Sequence[StructureOutline], air_height_m: float) -> "_Walled":
-        """Return some structures as one."""
+        """Combine structures into one."""
         return cls(
             name,
             tuple(each.name for each in parts),
@@ -281,7 +281,7 @@ class _Walled:
 
 
 def _walled(result: GasResult, name: str | None) -> _Walled:
-    """Return the structure or building of a name, or the worst building."""
+    """Return the structure or building with a name, or by default the worst building."""
     site, scenario = result.run.site, result.blast.scenario
     known = {each.name: (each,) for each in site.structures if each.cells is None}
     buildings = {
@@ -304,7 +304,7 @@ def _walled(result: GasResult, name: str | None) -> _Walled:
 def _wall(result: GasResult, walled: _Walled, wall: WallName, kind: Kind) -> FloatArray:
     """Return the load on each cell's face of a wall, by height and along x or y.
 
-    nan where something stands before the wall.
+    It is NaN where an obstacle touches the wall.
     """
     cell_m = result.run.grid.cell_m
     axis = _LEFT_TO_RIGHT[wall][0]
@@ -373,7 +373,7 @@ def _wall_title(
 
 # Gauges.
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
+# Okabe and Ito's colours, distinct for any colour vision.
 _MAIN, _BESIDE, _REFERENCE = "#0072B2", "#D55E00", "#000000"
 
 
@@ -385,14 +385,14 @@ def gauge_history(
     Args:
         result: The blast.
         gauge: Name of the gauge.
-        free_field: Whether to draw Kingery and Bulmash's incident wave at its distance, as
-            Friedlander's waveform: what would come there if nothing stood anywhere.
+        free_field: Whether to draw Kingery and Bulmash's incident wave at its distance, with
+            Friedlander's waveform: the wave at the same place on an empty site.
         beside: Another result with the same site and charge, drawn into the same axes.
 
     Raises:
         UnknownNameError: If there is no gauge of that name.
-        BlastEnvError: If Kingery and Bulmash have no wave for this distance, or site or charge
-            differ.
+        BlastEnvError: If the curves of Kingery and Bulmash do not cover this distance, or site or
+            charge differ.
     """
     results = both_results(result, beside)
     figure = Figure(figsize=(8.6, 6.8), layout="constrained")
@@ -404,7 +404,7 @@ def gauge_history(
         history = each.history(gauge)
         row = each.gauges.set_index("name").loc[gauge]
         time_s, overpressure = history["time_s"].to_numpy(), history["overpressure_pa"].to_numpy()
-        # Still air before.
+        # Ambient pressure before the first sample.
         time_s = np.concatenate(([0.0, 2.0 * time_s[0] - time_s[1]], time_s))
         overpressure = np.concatenate(([0.0, 0.0], overpressure))
         words = barrier_text(each.blast.layout)

@@ -55,7 +55,7 @@ _FEW_LEVELS: Final = 7
 _NUMBER_CLEAR: Final = 0.025  # of the site's width
 _MOST_OF_THE_GROUND: Final = 0.93
 _MAP_WIDTHS_IN: Final = (6.0, 7.4)
-_RISKS: Final = ("#fdeec2", "#f9c46b", "#d9682b", "#7a1f2b")  # darker is worse
+_RISKS: Final = ("#fdeec2", "#f9c46b", "#d9682b", "#7a1f2b")  # from low to high risk
 _FINER: Final = "spherical stage, finer than the grid"
 _FINER_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
     {"color": unit_interval(INK), "linewidth": 1.4, "linestyle": (0, (1.0, 2.0))}
@@ -67,21 +67,21 @@ _MAP_HEIGHTS_IN: Final = (3.4, 7.0)
 
 
 def ground_recorders(grid: GasGrid) -> tuple[GroundMap, ...]:
-    """Return what a blast must be run with for `ground_map`, as `GasBlast.run(recorders=...)`."""
+    """Return the recorders that `ground_map` needs, for `GasBlast.run(recorders=...)`."""
     return (GroundMap(grid),)
 
 
 def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
-    """Return a quantity in the lowest cells over the whole grid, nan in solids (nx, ny).
+    """Return a quantity in the lowest cells of the whole grid (nx, ny), NaN in solids.
 
-    Around a charge on the ground it has what the spherical stage did before the grid took over.
+    Near a charge on the ground it includes the spherical stage before the grid took over.
 
     Args:
         result: A blast that was run with `ground_recorders`.
         quantity: `"impulse"`, in Pa s, or `"peak"`, in Pa.
 
     Raises:
-        BlastEnvError: If it was run without them.
+        BlastEnvError: If it was run without the recorders.
         UnknownNameError: If there is no such quantity.
     """
     kind_of(quantity)
@@ -104,10 +104,10 @@ def _distances_m(grid: GasGrid, opening: Opening) -> FloatArray:
 
 
 def map_levels(result: GasResult, quantity: Quantity) -> tuple[float, ...]:
-    """Return the contours that `ground_map` draws, in Pa s or kPa, to draw other maps with them.
+    """Return the contour levels of `ground_map`, in Pa s or kPa, for use in further maps.
 
     Raises:
-        BlastEnvError: If it was run without the recorders.
+        BlastEnvError: If the blast was run without the recorders.
         UnknownNameError: If there is no such quantity.
     """
     values = kind_of(quantity).factor * ground_values(result, quantity)
@@ -120,15 +120,15 @@ def ground_map(
     beside: GasResult | None = None,
     levels: Sequence[float] | None = None,
 ) -> Figure:
-    """Return a map of the load over the ground, with contours and what stands on it.
+    """Return a map of the load over the ground, with contours and the features of the site.
 
     Args:
         result: A blast that was run with `ground_recorders`.
         quantity: `"peak"`, overpressure in kPa, or `"impulse"`, of all positive phases in Pa s.
         beside: Another result with the same site and charge, drawn to the left on the same scale:
             without the barrier, or with another layout.
-        levels: Contours, and with them the scale, for maps that are to be compared; see
-            `map_levels`. Without them they are chosen by what is drawn.
+        levels: Contour levels, which also set the scale, for comparisons of maps; see
+            `map_levels`. By default they follow from the values drawn.
 
     Raises:
         BlastEnvError: If a blast was run without the recorders, or site or charge differ.
@@ -159,10 +159,11 @@ def ground_map(
 
 
 def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
-    """Return a map of where windows and eardrums are at risk, so that people can be sent elsewhere.
+    """Return a map of the areas with a risk to windows and eardrums.
 
-    Regions by the peak overpressure on the ground, as the cells have it; dashed, how far each
-    threshold reaches in the open by Kingery and Bulmash's curves, which no cell clips.
+    Regions follow the peak overpressure on the ground as the cells resolve it. Dashed circles show
+    the reach of each threshold over open ground by the curves of Kingery and Bulmash, which do not
+    depend on cells.
 
     Args:
         result: A blast that was run with `ground_recorders`.
@@ -201,7 +202,7 @@ def threshold_map(result: GasResult, beside: GasResult | None = None) -> Figure:
 
 
 def _plans(results: Sequence[GasResult], more_in: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
-    """Return a figure with the ground of each site, to draw upon."""
+    """Return a figure with the empty ground of each site."""
     width_in, height_in = _map_size_in(results[0].run.site, len(results))
     figure = Figure(figsize=(width_in, height_in + more_in), layout="constrained")
     plans = figure.subplots(1, len(results), squeeze=False, sharex=True, sharey=True)[0]
@@ -216,7 +217,7 @@ def _plans(results: Sequence[GasResult], more_in: float = 0.0) -> tuple[Figure, 
 
 
 def _draw_standing(axes: Axes, result: GasResult) -> None:
-    """Draw what is on a site over its ground, and bring all of it into view."""
+    """Draw the features of a site over its ground, and set the limits of the axes."""
     site_m = result.run.site.site_m
     draw_features(axes, without(_features(result), Kinds.SITE))
     add_outline(axes, site_m, edgecolor=unit_interval(BORDER), linewidth=1.8)
@@ -242,13 +243,13 @@ def _write(
 
 
 def open_distance_m(peak_pa: float, charge: Charge) -> float:
-    """Return how far a peak reaches over open ground, by Kingery and Bulmash's curves, m.
+    """Return the reach of a peak over open ground by the curves of Kingery and Bulmash, m.
 
-    The side-on peak of a surface burst. A charge too high for that (`burst_of`) has its reflection
-    on the ground besides: the wave of a burst in free air, as if it met the ground at right angles,
-    an upper bound. The farther of both counts.
+    It is that of the side-on peak of a surface burst. For a charge too high for that (`burst_of`),
+    the reflection on the ground also counts: the wave of a burst in free air at normal incidence,
+    an upper bound. The larger reach is returned.
 
-    Infinite beyond where the curves end, at some 40 m/kg^(1/3).
+    It is infinite beyond the end of the curves, at some 40 m/kg^(1/3).
     """
     distance_m = _reach_m(peak_pa, "incident_overpressure", charge.tnt_kg, "hemispherical")
     if burst_of(charge.height_m, charge.tnt_kg) == "hemispherical":
@@ -294,7 +295,7 @@ def _on_site(result: GasResult, values: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _contour_levels(parts: Sequence[FloatArray]) -> list[float]:
-    """Return levels of few digits over most of the ground; near the charge there is no end."""
+    """Return levels of few digits for most of the ground; loads near the charge exceed them."""
     values = np.concatenate([part[np.isfinite(part)] for part in parts])
     high = float(np.quantile(values, _MOST_OF_THE_GROUND))
     low = max(float(values.min()), 1e-3 * high)
@@ -330,12 +331,12 @@ def _draw_ground(
     _write_levels(axes, lines, result)
     _draw_standing(axes, result)
     if result.run.charge.on_ground:
-        # How far the front was when the grid took over: inside, peaks are sharper.
+        # The radius of the front when the grid took over: inside, peaks are sharper.
         _add_circle(axes, result.run.site.charge, result.run.handover_radius_m, **_FINER_STYLE)
 
 
 def _write_levels(axes: Axes, lines: QuadContourSet, result: GasResult) -> None:
-    """Write the numbers of contours, but not on the border, nor over what stands."""
+    """Write the numbers of contours, except near the border, solids and the charge."""
     grid, site = result.run.grid, result.run.site.site_m
     clear_m = _NUMBER_CLEAR * (site.right - site.left)
     solid = np.argwhere(grid.solid[:, :, 0])

@@ -66,8 +66,8 @@ class LoadScale:
     """The colour scale of a heat map.
 
     Attributes:
-        full: The load of a module that has the last colour, in the unit.
-        unit: In what the loads are shown.
+        full: The load of a module at the end of the scale, in the unit.
+        unit: Unit of the loads shown.
     """
 
     full: float
@@ -86,10 +86,10 @@ def heat_map(
 
     Args:
         result: The blast.
-        structure: The structure or building to enlarge. Without it these are the protected
-            buildings, or all if none is protected; at most four, those with the largest impulses.
-        scale: The colour scale, for maps that are to be compared; see `common_scale`. Without it
-            it ends at the largest load of what is enlarged, rounded up.
+        structure: The structure or building to enlarge. By default the protected buildings, or
+            all if none is protected; at most four, those with the largest impulses.
+        scale: The colour scale, for comparisons of maps; see `common_scale`. By default it ends
+            at the largest load in the enlarged buildings, rounded up.
 
     Raises:
         UnknownNameError: If there is no structure or building of that name.
@@ -122,10 +122,10 @@ def heat_map(
 
 
 def common_scale(results: Sequence[BlastResult], structure: str | None = None) -> LoadScale:
-    """Return one colour scale for the heat maps of several results, say without and with a barrier.
+    """Return one colour scale for the heat maps of several results.
 
     Args:
-        results: The results; the calibration is applied to the one with the largest load.
+        results: The results; the unit is that of the one with the largest load.
         structure: As for `heat_map`.
 
     Raises:
@@ -142,11 +142,11 @@ def common_scale(results: Sequence[BlastResult], structure: str | None = None) -
 
 @dataclass(frozen=True, eq=False)
 class _Building:
-    """A building, or a structure, that is enlarged.
+    """A building, or a structure, to enlarge.
 
     Attributes:
         name: Its name.
-        obstacles: The structures that it is of.
+        obstacles: Its structures.
     """
 
     name: str
@@ -154,22 +154,22 @@ class _Building:
 
     @property
     def protected(self) -> bool:
-        """Whether the load of one of them counts."""
+        """Whether the load of at least one structure counts."""
         return any(each.protected for each in self.obstacles)
 
     @property
     def impulse(self) -> float:
-        """Sum over them, simulation units."""
+        """Sum over the structures, simulation units."""
         return sum(each.impulse for each in self.obstacles)
 
     @property
     def modules(self) -> tuple[ModularPart, ...]:
-        """Their modules."""
+        """The modules of the structures."""
         return tuple(part for each in self.obstacles for part in each.parts)
 
     @property
     def size_modules(self) -> tuple[float, float]:
-        """Columns and rows of modules around them."""
+        """Columns and rows of modules in the rectangle around the structures."""
         left, bottom, right, top = Rectangle.around([each.rectangle_m for each in self.obstacles])
         return (right - left) / MODULE_SIDE_M, (top - bottom) / MODULE_SIDE_M
 
@@ -193,7 +193,7 @@ def _chosen(result: BlastResult, structure: str | None) -> list[_Building]:
 def _widths_in(
     result: BlastResult, chosen: list[_Building], columns: int, rows: int
 ) -> tuple[float, float]:
-    """Return widths for plan and panels that leave little empty beside them."""
+    """Return widths for plan and panels that leave little empty space beside them."""
     site = result.blast.scene.site
     plan = _PLAN_HEIGHT_IN * (site.right - site.left) / (site.top - site.bottom)
     widest = max(across / along for across, along in (each.size_modules for each in chosen))
@@ -206,7 +206,7 @@ def _widths_in(
 
 
 def _draw_overview(axes: Axes, result: BlastResult, scale: LoadScale) -> None:
-    # Modules have the colours of their loads in the place of a fill.
+    # Modules are filled with the colours of their loads.
     features = _features(result)
     draw_plan(axes, without(features, *STANDING))
     for obstacle in result.obstacles:
@@ -221,7 +221,7 @@ def _features(result: BlastResult) -> tuple[Feature, ...]:
 
 
 def _total(result: BlastResult, building: _Building) -> str:
-    """Return the load on a building in words: in Pa s for one part, where a calibration has it."""
+    """Return the load on a building in words: in Pa s for a single part with a calibration."""
     if len(building.obstacles) == 1:
         try:
             return f"{result.impulse(building.obstacles[0].name).pa_s:,.0f} Pa s"
@@ -252,7 +252,7 @@ def _draw_panel(
 
 
 def _write_numbers(axes: Axes, building: _Building, scale: LoadScale, size_pt: float) -> None:
-    """Write the impulse into every module that was hit, if there is room."""
+    """Write the impulse into every module that was hit, if the text size is legible."""
     if size_pt < _SMALLEST_NUMBER_PT:
         return
     for part in building.modules:

@@ -1,4 +1,4 @@
-"""The plan of an imported site: what the map shows, and the modules that stand for it."""
+"""The plan of an imported site: the outlines on the map, and the modules fitted to them."""
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def _box(label: str, colour: tuple[float, float, float]) -> Patch:
 
 
 def _legend() -> list[Artist]:
-    """Return the legend entries for what the features of the site do not show."""
+    """Return the legend entries for the fitted buildings, in addition to those of features."""
     return [
         Line2D([], [], color=unit_interval(INK), linewidth=1.3, label="outline on the map"),
         _box("modules, protected", unit_interval(PROTECTED)),
@@ -45,9 +45,9 @@ def _legend() -> list[Artist]:
 
 
 def imported_plan(imported: ImportedSite) -> Figure:
-    """Return the plan of an imported site: modules filled, the map's outlines as lines over them.
+    """Return the plan of an imported site: filled modules, with the outlines on the map as lines.
 
-    North is marked, and each building has its name and how far its modules are off.
+    North is marked, and each building has its name and the deviation of its modules.
     """
     scenario = imported.scenario
     width_m, height_m = scenario.site.width_m, scenario.site.height_m

@@ -1,4 +1,4 @@
-"""The oblique view of a site: isometric, so that lengths, widths and heights have one scale."""
+"""The oblique view of a site: isometric, with one scale for lengths, widths and heights."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,26 +34,26 @@ with render_extra():
     from matplotlib.patches import Polygon
 
 CORNERS: Final = ("southwest", "southeast", "northeast", "northwest")
-"""Over which corner of a site one looks at it; south is towards smaller y, west smaller x."""
+"""Corners of a site nearest to the viewer; south is towards smaller y, west towards smaller x."""
 
 _ACROSS, _UP = cos(radians(30.0)), sin(radians(30.0))
 
-_LEAST_M = 1e-6  # between things that lie on each other
-_BOXES_LEVEL, _LEVEL_STEP = 3.0, 1e-4  # of the boxes among what else is drawn
+_LEAST_M = 1e-6  # between features that lie on each other
+_BOXES_LEVEL, _LEVEL_STEP = 3.0, 1e-4  # drawing levels of the boxes
 
 _TOP, _RIGHT_SIDE, _LEFT_SIDE = 1.0, 0.82, 0.66
-"""How bright the three faces are that one sees of a box."""
+"""Brightness of the three visible faces of a box."""
 
 Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class ObliqueView:
-    """How places on a site and heights above it become places in the picture.
+    """The projection of places on a site, and heights above it, to the picture.
 
     Attributes:
         site_m: The site.
-        corner: The corner that is nearest to whoever looks.
+        corner: The corner nearest to the viewer.
     """
 
     site_m: Rectangle
@@ -69,7 +69,7 @@ class ObliqueView:
             raise UnknownNameError("corner", self.corner, CORNERS)
 
     def towards(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return how far places are from the near corner, m: up to the right, up to the left."""
+        """Return the distances from the near corner, m: up to the right, and up to the left."""
         left, bottom, right, top = self.site_m
         if self.corner == "southwest":
             return x - left, y - bottom
@@ -80,7 +80,7 @@ class ObliqueView:
         return top - y, x - left
 
     def places(self, points_m: FloatArray) -> FloatArray:
-        """Return places in the picture, in metres along each of the three axes (n, 2).
+        """Return positions in the picture (n, 2), with metres to scale along all three axes.
 
         Args:
             points_m: x, y and height above the ground, (n, 3), m.
@@ -96,7 +96,7 @@ class ObliqueView:
     def faces(
         self, rectangle_m: Rectangle, height_m: float, base_m: float = 0.0
     ) -> tuple[FloatArray, ...]:
-        """Return the faces that one sees of a box: the right side, the left side, the top."""
+        """Return the visible faces of a box: the right side, the left side, the top."""
         low, high = (self.on_ground(rectangle_m, each) for each in (base_m, height_m))
         right = np.array([low[0], low[1], high[1], high[0]])
         left = np.array([low[0], low[3], high[3], high[0]])
@@ -111,10 +111,10 @@ class ObliqueView:
 
 
 def corner_towards(scenario: Scenario) -> str:
-    """Return the corner over which one sees the sides that the charges are on.
+    """Return the corner from which the walls that face the charges are visible.
 
-    It is on the side of the charges as seen from what is protected; where they are straight to a
-    side, the one to the south or west of it.
+    It is on the side of the charges as seen from the protected structures; if they are straight
+    to one side, it is the corner of that side to the south or west.
     """
     protected = [each.rectangle_m for each in scenario.structures if each.protected]
     rectangles = protected or [each.rectangle_m for each in scenario.structures]
@@ -129,10 +129,10 @@ def corner_towards(scenario: Scenario) -> str:
 
 
 class Tile(NamedTuple):
-    """A part of a wall in a colour of its own.
+    """A part of a wall in a separate colour.
 
     Attributes:
-        wall: The wall that it is on: west, east, south or north.
+        wall: Its wall: west, east, south or north.
         corners_m: Its corners in order (4, 3).
         colour: Its colour.
     """
@@ -143,7 +143,7 @@ class Tile(NamedTuple):
 
 
 class Box(NamedTuple):
-    """Something on the ground that a view shows.
+    """A structure or a barrier in a view.
 
     Attributes:
         rectangle_m: Its plan.
@@ -151,10 +151,10 @@ class Box(NamedTuple):
         colour: Colour of its top.
         edge: Colour of its edges.
         tiles: Parts of its walls.
-        base_m: How high it begins.
-        sides: The parts of its outline that have a line, counterclockwise; not those where it goes
-            on into another box.
-        corners: Where walls meet, and have an upright line.
+        base_m: Height of its base.
+        sides: The parts of its outline with a line, counterclockwise; without those at which it
+            continues in another box.
+        corners: Corners between walls, with an upright line.
     """
 
     rectangle_m: Rectangle
@@ -173,8 +173,8 @@ class Lid(NamedTuple):
     Attributes:
         rectangle_m: Its plan.
         height_m: The height of the terrace.
-        feature: What it is.
-        sides: The parts of its outline that have a line.
+        feature: The feature of which it is a part.
+        sides: The parts of its outline with a line.
     """
 
     rectangle_m: Rectangle
@@ -184,23 +184,23 @@ class Lid(NamedTuple):
 
     @property
     def base_m(self) -> float:
-        """Where it lies for the order of painting: below all that stands there."""
+        """Its height in the order of painting: below all boxes on the terrace."""
         return self.height_m - _LEAST_M * (Kinds.CHARGE.level - self.feature.kind.level)
 
 
 def painted_order(
     view: ObliqueView, rectangles_m: Sequence[Rectangle], bases_m: Sequence[float] | None = None
 ) -> list[int]:
-    """Return in which order boxes are painted, so that none covers one that is before it.
+    """Return the order of painting of boxes, from the rear to the front.
 
-    A box is behind another if there is a wall between them, along the x or the y axis, with the
-    other on the viewer's side, and none with itself on that side. Boxes that stand apart have such
-    an order whatever their heights are: it is the same for all directions of one quadrant.
+    A box is behind another if a plane along the x or the y axis separates them with the other on
+    the viewer's side, and none separates them with itself on that side. Disjoint boxes have such an
+    order for any heights: it is the same for all directions of one quadrant.
 
     Args:
         view: The view.
         rectangles_m: The plans of the boxes.
-        bases_m: How high they begin; on the ground unless given. Boxes whose plans overlap are
+        bases_m: Heights of their bases; by default on the ground. Boxes with overlapping plans are
             above each other, and the lowest comes first.
     """
     left, bottom, right, top = np.array(rectangles_m, dtype=np.float64).reshape(-1, 4).T
@@ -228,20 +228,20 @@ def draw_oblique(
     corner: str | None = None,
     tiles: Mapping[str, Sequence[Tile]] = MappingProxyType({}),
 ) -> tuple[ObliqueView, tuple[Feature, ...]]:
-    """Draw a site with what stands on it, heights to scale, and where charges may go off.
+    """Draw a site with structures and barriers, heights to scale, and the places of charges.
 
-    What has no height is drawn as high as the air; charges and stand-offs are drawn over
-    everything, so that they can be seen.
+    Structures without a height are drawn as high as the air; charges and stand-offs are drawn over
+    everything else, to be visible.
 
     Args:
         axes: Empty axes.
         scenario: The scenario.
-        layout: What stands on the build zone; it must fit there.
-        corner: Over which corner one looks; that on the side of the charges unless given.
+        layout: The layout of the build zone; it must fit there.
+        corner: The corner nearest to the viewer; by default that of `corner_towards`.
         tiles: Parts of the walls of structures, by the names of these.
 
     Returns:
-        The view, to draw more in it, and what was drawn.
+        The view, for further drawing, and the features drawn.
 
     Raises:
         UnknownNameError: If there is no such corner.
@@ -264,12 +264,12 @@ def draw_oblique(
 
 
 def boxes_of(scenario: Scenario, layout: Sequence[Element] = ()) -> list[Box]:
-    """Return what stands on a site: the structures, then each module or piece of the layout."""
+    """Return the boxes of a site: structures, and the modules or pieces of the layout."""
     return _boxes_of([each for each in _raised(scenario, layout) if each.kind in STANDING])
 
 
 def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...]:
-    """Return what is on a site; what stands there without a height is as high as the air."""
+    """Return the features of a site; structures without a height get that of the air."""
     air = {"height_m": scenario.air_height_m}
     return tuple(
         replace(each, properties={**air, **each.properties}) if each.kind in STANDING else each
@@ -278,7 +278,7 @@ def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...
 
 
 def _outlined(features: Sequence[Feature]) -> list[tuple[list[Side], frozenset[Place]]]:
-    """Return the sides of each feature that have a line, and the corners of what it is part of."""
+    """Return the sides of each feature with a line, and the corners of the whole it belongs to."""
     wholes: dict[object, list[int]] = {}
     for number, each in enumerate(features):
         whole = (each.kind, each.look, each.part_of) if each.part_of else number
@@ -295,7 +295,7 @@ def _outlined(features: Sequence[Feature]) -> list[tuple[list[Side], frozenset[P
 
 
 def _boxes_of(features: Sequence[Feature]) -> list[Box]:
-    """Return features as boxes; those that are parts of one thing have no lines between them."""
+    """Return features as boxes, without lines between the parts of one building."""
     return [
         _box_of(each)._replace(sides=sides, corners=corners)
         for each, (sides, corners) in zip(features, _outlined(features), strict=True)
@@ -303,7 +303,7 @@ def _boxes_of(features: Sequence[Feature]) -> list[Box]:
 
 
 def _lids_of(features: Sequence[Feature]) -> list[Lid]:
-    """Return what lies on terraces."""
+    """Return features on terraces as lids."""
     return [
         Lid(each.bounds_m, each.base_m, each, sides)
         for each, (sides, _) in zip(features, _outlined(features), strict=True)
@@ -321,7 +321,7 @@ def _box_of(feature: Feature) -> Box:
 
 
 def scale_length_m(site_m: Rectangle) -> float:
-    """Return the length of a scale bar for a site: a round one, at most a third of its width."""
+    """Return a round length for the scale bar of a site, at most a third of its width, m."""
     return nice_floor((site_m.right - site_m.left) / 3.0)
 
 
@@ -342,7 +342,7 @@ def _set_up(axes: Axes, view: ObliqueView, boxes: Sequence[Box]) -> None:
 
 
 class _Shapes:
-    """Polygons in the order in which they are painted."""
+    """Polygons in the order of painting."""
 
     def __init__(self) -> None:
         self._shapes: list[FloatArray] = []
@@ -350,13 +350,13 @@ class _Shapes:
         self._edges: list[Colour] = []
 
     def paint(self, shape: FloatArray, colour: Colour, edge: Colour) -> None:
-        """Take one more."""
+        """Add a polygon."""
         self._shapes.append(shape)
         self._colours.append(colour)
         self._edges.append(edge)
 
     def draw(self, axes: Axes, level: float) -> None:
-        """Draw them, at a level among what else is drawn."""
+        """Draw all polygons at a drawing level."""
         shapes = PolyCollection(self._shapes, facecolor=self._colours, edgecolor=self._edges)
         shapes.set(linewidth=0.5, zorder=level, joinstyle="round")
         axes.add_collection(shapes, autolim=False)
@@ -387,7 +387,7 @@ def _paint_box(shapes: _Shapes, view: ObliqueView, box: Box) -> None:
     for line in _lines_of(view, box):
         shapes.paint(line, box.edge, box.edge)
     for tile in box.tiles:
-        if tile.wall in view.corner:  # "southwest": its south and west walls are seen
+        if tile.wall in view.corner:  # "southwest": south and west walls are visible
             shapes.paint(view.places(tile.corners_m), tile.colour, box.edge)
 
 
@@ -406,7 +406,7 @@ def _draw_lid(axes: Axes, view: ObliqueView, lid: Lid, level: float) -> None:
 
 
 def _lines_of(view: ObliqueView, box: Box) -> Iterator[FloatArray]:
-    """Yield the lines that one sees of a box: round its top, below and between its walls."""
+    """Yield the visible lines of a box: around its top, below and between its walls."""
     low_m, high_m = box.base_m, box.height_m
     for start, end in box.sides:
         yield view.places(np.array([(*start, high_m), (*end, high_m)]))
@@ -417,14 +417,14 @@ def _lines_of(view: ObliqueView, box: Box) -> Iterator[FloatArray]:
 
 
 def _wall_of(start: Place, end: Place) -> str:
-    """Return which wall a side of a counterclockwise outline is."""
+    """Return the name of the wall at a side of a counterclockwise outline."""
     if start[1] == end[1]:
         return "south" if end[0] > start[0] else "north"
     return "east" if end[1] > start[1] else "west"
 
 
 def _draw_scale(axes: Axes, view: ObliqueView) -> None:
-    """Draw a scale bar along the near side of the site, and how its x and y axes run."""
+    """Draw a scale bar along the near side of the site."""
     length_m, ink = scale_length_m(view.site_m), unit_interval(INK)
     near = view.on_ground(view.site_m)[:2]
     along = (near[1] - near[0]) / np.hypot(*(near[1] - near[0]))

@@ -41,12 +41,12 @@ with render_extra():
 class PlacingPainter:
     """Draws the layouts of one episode, all on the same ground.
 
-    The site is in the same place as in the frames of `FramePainter`, and with this height in
-    those, all are of the same size: both fit into one film.
+    The site has the same position as in the frames of `FramePainter`, and the height is at least
+    that of those frames, so that both fit into one film.
 
     Args:
         scenario: The scenario; it has a build zone.
-        sources: Where the charge is, when it is a single point, or may be.
+        sources: The place of the charge, if a single point, or its possible places.
         width_px: Width of the frames, as for `FramePainter`.
     """
 
@@ -77,7 +77,7 @@ class PlacingPainter:
         Args:
             placement: The modules placed so far.
             lines: At most two lines of text for the upper right corner.
-            marked: What may be placed next, outlined; in another colour where it may not be.
+            marked: An element to outline, in green if it may be placed, in red if not.
         """
         axes, features = self._sheet.axes, self._of(placement)
         moving = [*draw_features(axes, features), *write_names(axes, features)]
@@ -89,7 +89,7 @@ class PlacingPainter:
         return frame
 
     def _of(self, placement: Placement) -> tuple[Feature, ...]:
-        """Return everything that a frame shows, the lowest first."""
+        """Return all features of a frame, the lowest first."""
         scenario, layout = placement.scenario, placement.layout
         found = [*self._features]
         if self._has_vehicles:
@@ -110,7 +110,7 @@ class PlacingPainter:
         return cell if _is_in(zone, cell) else None
 
     def _mark(self, placement: Placement, element: Element) -> list[Artist]:
-        """Outline what may be placed next."""
+        """Outline an element in the colour of its legality; no artist outside the zone."""
         zone = placement.scenario.zone
         colour = PROTECTED if placement.explain(element) is None else EXPLOSIVE
         cells = [cell for cell in placement.catalogue.cells(element) if _is_in(zone, cell)]
@@ -121,7 +121,7 @@ class PlacingPainter:
         return [add_outline(self._sheet.axes, around, **style)]
 
     def _handles(self) -> list[Artist]:
-        """Return the entries of the legend: one of each item, since they differ in colour."""
+        """Return the entries of the legend, one per item, since items differ in colour."""
         placement = Placement.empty(self._scenario)
         catalogue = placement.catalogue
         numbers = {each.name: number for number, each in enumerate(catalogue.variants)}
@@ -137,7 +137,7 @@ def _is_in(zone: BuildZone, cell: Cell) -> bool:
 
 
 def sources_text(sources: Sequence[AnySource]) -> str:
-    """Return what is known of a charge, in words."""
+    """Return the known properties of a charge, in words."""
     first = sources[0]
     if len(sources) == 1 and isinstance(first, PointSource):
         return f"charge {charge_text(Charge(first.position_m, first.tnt_kg))}"
@@ -149,7 +149,7 @@ def sources_text(sources: Sequence[AnySource]) -> str:
 
 
 def _particle_frames_px(scenario: Scenario, width_px: int) -> int:
-    """Return how high frames of particles are; 0 where particles cannot run the scenario."""
+    """Return the height of frames of particles; 0 if particles cannot run the scenario."""
     try:
         return FramePainter(_fullest_blast(scenario), width_px=width_px).size_px[1]
     except BlastEnvError:
@@ -157,7 +157,7 @@ def _particle_frames_px(scenario: Scenario, width_px: int) -> int:
 
 
 def _fullest_blast(scenario: Scenario) -> Blast:
-    """Return a blast with everything that one of the scenario may show: it needs most room."""
+    """Return a blast with all legend entries that the scenario can have: it needs most room."""
     empty = Placement.empty(scenario)
     legal = np.flatnonzero(empty.legal)
     return Blast(scenario, [empty.catalogue.element(int(action)) for action in legal[:1]])
@@ -168,14 +168,14 @@ _LEAST_FULL_IMPULSE: Final = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class BlastScreening:
-    """Shows one blast, with a text about what came of it.
+    """Shows one blast, with a text about its outcome.
 
     The blast is simulated again, since assessments of layouts keep only its loads.
 
     Attributes:
         blast: The blast.
-        outcome: What came of it; in every frame.
-        remark: About which blast is shown; after the scenario's name.
+        outcome: Its outcome in words, shown in every frame.
+        remark: Remark about the blast, after the scenario's name.
         size_px: Width and least height of the frames, as for `FramePainter`.
     """
 
@@ -195,7 +195,7 @@ class BlastScreening:
         """Yield the frames of a film of 8 to 12 s, as `write_film` plans it.
 
         Args:
-            frames_per_s: Frames in a second of the film.
+            frames_per_s: Frames per second of the film.
         """
         result = self.blast.run()
         plan = plan_film(result, frames_per_s)

@@ -43,13 +43,13 @@ from blast_env.rendering.pressure_frames import (
 from blast_env.rendering.style import barrier_text, nice_ceiling
 from blast_env.runner import Tell, share_of
 
-_EVERY_S: Final = 0.0002  # of 100 kg
-_LONGEST_S: Final = 4.0  # of 100 kg
-_CURVES: Final = (0.2, 30.0)  # scaled distances, m/kg^(1/3), that both kinds of burst have
+_EVERY_S: Final = 0.0002  # for 100 kg
+_LONGEST_S: Final = 4.0  # for 100 kg
+_CURVES: Final = (0.2, 30.0)  # scaled distances, m/kg^(1/3), of the curves of both bursts
 _LONGEST_WAY_M: Final = 100.0
 _NARROWEST_PX, _WIDEST_PX = 480, 4096
 PLAN_HEIGHT_M: Final = 1.5
-"""Height of the plan of a film unless another is given."""
+"""Default height of the plan of a film."""
 
 
 def write_pressure_film(
@@ -72,20 +72,20 @@ def write_pressure_film(
         path: The film, `.mp4` or `.gif`; a GIF is at most 640 pixels wide.
         beside: Another blast with the same site and charge, shown to the left, at the same moments
             and on the same scale: without the barrier, or with another layout.
-        height_m: Height of the plan; the layer of cells that holds it is drawn.
-        section: The section; without it `default_section`.
-        frames_per_s: Frames in a second of the film.
-        slow_motion: Seconds of the film for a second of the blast; by default it lasts about 10 s.
-        width_px: Width of the film; 960, or 1600 with two blasts.
+        height_m: Height of the plan, which shows the layer of cells around it.
+        section: The section; by default `default_section`.
+        frames_per_s: Frames per second of the film.
+        slow_motion: Seconds of the film per second of the blast; by default it lasts about 10 s.
+        width_px: Width of the film; by default 960, or 1600 with two blasts.
         further: Further recorders for each blast, as for `GasBlast.run`.
-        progress: Called from time to time with the share of the work that is done.
+        progress: Called from time to time with the finished share of the work.
 
     Returns:
         The results of the blasts, from left to right.
 
     Raises:
         BlastEnvError: If site or charge of the blasts differ, the suffix is another one, an
-            argument is out of bounds or the file cannot be written; nothing is left behind then.
+            argument is out of bounds or the file cannot be written; no file remains then.
     """
     suffix = known_suffix(path)
     blasts = [blast] if beside is None else [beside, blast]
@@ -115,12 +115,12 @@ def write_pressure_film(
 
 @dataclass(frozen=True)
 class PressureScreening:
-    """Shows a blast as overpressure, in frames of a size that something else sets.
+    """Shows a blast as overpressure, in frames of a given size.
 
     Attributes:
         blast: The blast.
-        outcome: What came of it, for those who ask; a film of overpressure has no room for it.
-        remark: About which blast is shown, as well.
+        outcome: Its outcome in words, not shown: a film of overpressure has no room for it.
+        remark: Remark about the blast, not shown either.
         size_px: Width and height of the frames, both even.
     """
 
@@ -130,14 +130,14 @@ class PressureScreening:
     size_px: tuple[int, int] = (960, 720)
 
     def last_frame(self) -> Frame | None:
-        """Return nothing: when all loads are there, the pressure that made them is gone."""
+        """Return None: at the end of a blast, the overpressure is gone."""
         return None
 
     def frames(self, frames_per_s: float) -> Iterator[Frame]:
-        """Yield the frames of a film of 8 to 12 s, uint8 (height, width, 3) each.
+        """Yield the frames of a film of 8 to 12 s, uint8 (height, width, 3).
 
         Args:
-            frames_per_s: Frames in a second of the film.
+            frames_per_s: Frames per second of the film.
         """
         shot = record_planes(self.blast, PLAN_HEIGHT_M, default_section(self.blast.site))
         plan = plan_until(shot.result.time_s, frames_per_s)
@@ -149,10 +149,10 @@ class PressureScreening:
 
 
 class PressureNow:
-    """Shows a blast that is on its way, whatever comes of it.
+    """Shows a blast in progress.
 
-    The scale ends at the peak that Kingery and Bulmash have in the open as near to the charge as
-    the nearest structure that counts, so that all layouts of a site have the same one.
+    The scale ends at the free-field peak of Kingery and Bulmash at the distance of the nearest
+    structure that counts, so that all layouts of a site have the same one.
 
     Args:
         blast: The blast.
@@ -173,15 +173,15 @@ class PressureNow:
         self._painter = PressurePainter([shot], _free_field_peak_kpa(blast.site), width_px)
 
     def frame(self) -> Frame:
-        """Return a picture of now, uint8 (height, width, 3)."""
+        """Return a picture of the present state, uint8 (height, width, 3)."""
         return self._painter.paint(self._run.time_s)
 
 
 def _free_field_peak_kpa(site: BlastSite) -> float:
-    """Return a peak that a scale can end at before the blast is run, rounded up.
+    """Return a peak for the end of the scale before the blast is run, kPa, rounded up.
 
-    It is Kingery and Bulmash's for the incident wave where the nearest structure that counts is,
-    as far as their curves reach; reflections go beyond it.
+    It is that of the incident wave of Kingery and Bulmash at the nearest structure that counts,
+    within the range of their curves; reflections exceed it.
     """
     solids = [each for each in site.structures if each.cells is None]
     chosen = [each for each in solids if each.protected] or solids
@@ -209,7 +209,7 @@ def _comment(shots: Sequence["PressureShot"], plan: FilmPlan) -> str:
 
 
 def scale_end_kpa(results: Sequence[GasResult]) -> float:
-    """Return the end of the scale: the largest peak on the walls that count, rounded up."""
+    """Return the end of the scale, kPa: the largest peak on the walls that count, rounded up."""
     peaks = []
     for result in results:
         table = result.structures
@@ -225,13 +225,13 @@ def record_planes(
     progress: Tell = lambda _: None,
     further: Recorders = lambda _: (),
 ) -> PressureShot:
-    """Run a blast and take pictures of two planes all the while.
+    """Run a blast and record pictures of two planes.
 
     Args:
         blast: The blast.
         height_m: Height of the plan.
         section: The section.
-        progress: Called from time to time with the share of the time limit that has passed.
+        progress: Called from time to time with the elapsed share of the time limit.
         further: Further recorders, as for `GasBlast.run`.
 
     Raises:
@@ -254,7 +254,7 @@ def record_planes(
 def _cell_of(
     grid: GasGrid, site: BlastSite, height_m: float, section: VerticalSection
 ) -> tuple[int, int, int]:
-    """Return a cell that both planes go through.
+    """Return a cell on both planes.
 
     Raises:
         BlastEnvError: If a plane is outside the grid.
