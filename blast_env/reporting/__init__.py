@@ -1,4 +1,4 @@
-"""A report on a layout, for whoever has to decide on it: HTML that needs nothing else, and PDF."""
+"""A report on a layout, for its decision makers: self-contained HTML, and PDF."""
 
 from blast_env.reporting.loads import UNITS, UnitSystem
 from blast_env.reporting.outcomes import Limit

@@ -80,7 +80,7 @@ def _page(height_in: float) -> tuple[Figure, Axes]:
 def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout) -> bytes:
     """Return the plan of a site with buildings, heights, threats and the layout.
 
-    Vehicles and their charges are where the layout lets them come.
+    Vehicles and their charges stand at the places that the layout leaves them.
     """
     figure, axes = _page(_height_in(scenario) + 0.9)
     charges = [
@@ -100,7 +100,10 @@ def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout
 
 
 def _unlabelled(features: Sequence[Feature]) -> list[Feature]:
-    """Return what is on a site, its charges without labels: threats have names of their own."""
+    """Return the features of a site without point charges and labels of charges.
+
+    The threats are drawn with labels in their place.
+    """
     return [
         replace(each, label="") if each.kind is Kinds.CHARGE_PLACE else each
         for each in features
@@ -117,7 +120,7 @@ def _height_in(scenario: Scenario) -> float:
 
 
 def kinds(units: UnitSystem) -> dict[str, Kind]:
-    """Return how impulses and peaks are drawn in some units."""
+    """Return the kinds of loads for drawing, impulse and peak, in the given units."""
     factors = {
         "impulse": (units.impulse, 1.0 / units.pa_s_per_impulse),
         "peak": (units.pressure, 1.0 / units.pa_per_pressure),
@@ -131,7 +134,7 @@ def kinds(units: UnitSystem) -> dict[str, Kind]:
 def blast_pictures(
     bare: MeasuredBlast, walled: MeasuredBlast, units: UnitSystem
 ) -> tuple[Picture, ...]:
-    """Return the facades of what is protected, unfolded, and the histories on it."""
+    """Return the unfolded facades of the protected buildings, and the histories on them."""
     pictures: list[Picture] = []
     for target in walled.targets:
         if not target.protected or target.name not in walled.loads:
@@ -174,9 +177,10 @@ def _history(
 def damage_pictures(
     scenario: Scenario, layout: Layout, bare: Consequences, walled: Consequences, threat: str
 ) -> tuple[Picture, ...]:
-    """Return the damage of buildings with facades under one threat, without the layout and with it.
+    """Return pictures of the damage to facades under one threat, without the layout and with it.
 
-    The site in three dimensions, each building unfolded, and its pressure-impulse diagram.
+    They are the site in three dimensions, and the unfolded facades and the pressure-impulse diagram
+    of each building.
     """
     if not walled.responses:
         return ()
@@ -197,7 +201,10 @@ def damage_pictures(
 
 
 def risk_picture(bare: MeasuredBlast, walled: MeasuredBlast) -> Picture:
-    """Return where windows and eardrums are at risk, without the layout where the charge stays."""
+    """Return the map of risk to windows and eardrums.
+
+    The map without the layout stands beside it if the charge is at the same place in both.
+    """
     charges = (bare.result.run.site.charge, walled.result.run.site.charge)
     beside = bare.result if charges[0] == charges[1] else None
     figure = threshold_map(walled.result, beside)
@@ -210,7 +217,7 @@ def film_stills(
     moments_s: Sequence[float],
     progress: Tell,
 ) -> tuple[Picture, ...]:
-    """Return moments of two blasts side by side, in plan and in a section."""
+    """Return stills of two blasts side by side, in plan and in a section."""
     if not moments_s:
         return ()
     section = default_section(walled.site)
@@ -227,11 +234,11 @@ def film_stills(
     return tuple(pictures)
 
 
-# What is worth what.
+# The worth of items.
 
 
 def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
-    """Return the layout with every module or piece in the colour of what it is worth."""
+    """Return the layout with every module or piece in the colour of its worth."""
     figure, axes = _page(_height_in(scenario) + 0.3)
     features = without(site_features(scenario), Kinds.CHARGE_PLACE)
     draw_plan(axes, features)
@@ -256,7 +263,7 @@ def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
 
 
 def mass_figure(masses: dict[str, tuple[Outcome, ...]], units: UnitSystem) -> bytes:
-    """Return impulses without and with the layout for other masses, a threat a panel."""
+    """Return impulses without and with the layout for other masses, one panel per threat."""
     figure = Figure(figsize=(_WIDTH_IN, 3.2), layout="constrained")
     panels = figure.subplots(1, len(masses), squeeze=False, sharey=True)[0]
     for axes, (name, outcomes) in zip(panels, masses.items(), strict=True):
@@ -287,8 +294,8 @@ def place_figure(
 
     Args:
         scenario: The scenario.
-        charges: Where they go off with the layout.
-        outcomes: One a charge.
+        charges: The charges at their places with the layout.
+        outcomes: One per charge.
     """
     figure, axes = _page(_height_in(scenario) + 0.3)
     features = without(_unlabelled(site_features(scenario)), *_ZONE)
@@ -315,7 +322,7 @@ def place_figure(
 def front_figure(
     points: Sequence[FrontPoint], own: tuple[float, float], threat_count: int
 ) -> bytes:
-    """Return reduction against cost, with the layout of the report."""
+    """Return the diagram of reduction against cost, with the layout of the report."""
     figure, axes = _page(3.6)
     axes.plot(
         [each.cost for each in points],

@@ -1,4 +1,4 @@
-"""Loads by building and wall, with how long they last, and the units that a report has."""
+"""Loads by building and wall, with their durations, and the units of a report."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class UnitSystem:
     """Units of loads; lengths are metres and masses kilograms in both.
 
     Attributes:
-        name: How the command line calls it.
+        name: Its name on the command line.
         impulse: Unit of impulses.
         pressure: Unit of overpressures.
         pa_s_per_impulse: Pascal seconds in a unit of impulse.
@@ -56,7 +56,7 @@ class UnitSystem:
         """Return the units of a name.
 
         Raises:
-            UnknownNameError: If there are none.
+            UnknownNameError: If no units have that name.
         """
         if name not in UNITS:
             raise UnknownNameError("units", name, UNITS)
@@ -77,7 +77,7 @@ UNITS: Final[Mapping[str, UnitSystem]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class ReportedBuilding:
-    """A building: one structure, or those that make it together.
+    """A building: one structure, or several that form it.
 
     Attributes:
         name: Its name.
@@ -175,19 +175,19 @@ class WallHistories:
 
 @dataclass(frozen=True)
 class TargetLoad:
-    """The load on a building, over its walls that count.
+    """The load on a building, over its counted walls.
 
     Attributes:
         target: Its name.
         impulse_pa_s: Impulse of all positive phases, mean over the walls.
         first_impulse_pa_s: Impulse of the first positive phase, mean over the walls.
         peak_pa: Largest overpressure on a face of a cell.
-        counted: The peak that limits are held against.
-        arrival_s: When the wave comes; NaN if it does not.
+        counted: The peak to compare with limits.
+        arrival_s: Arrival of the wave; NaN if none arrives.
         wall: The wall with the largest impulse.
         wall_impulse_pa_s: Impulse of all positive phases on it, mean.
-        duration_s: How long the mean overpressure on it stays positive at first; NaN if no wave
-            comes or the run ends before.
+        duration_s: Duration of the first positive phase of the mean overpressure on it; NaN if no
+            wave arrives or the run ends before.
         complete: Whether at most 2 % of these impulses is still to come.
         flagged: Whether there is a note on them.
     """
@@ -236,9 +236,9 @@ class MeasuredBlast:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Why loads are outside what the engine was checked for, and which are not complete.
+        """Notes on loads outside the checked range of the engine, and on incomplete loads.
 
-        What protected buildings are checked for counts alone; completeness does for all.
+        The checked range counts for protected buildings alone, completeness for all.
         """
         names = (name for each in self.targets if each.protected for name in each.names)
         notes = [note for name in names for note in self.result.impulse(name).notes]
@@ -284,9 +284,10 @@ _NO_PHASE: Final = float("nan")
 
 
 def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
-    """Return how long an overpressure stays above 0 after it has reached 1 kPa first, s.
+    """Return the duration of the first positive phase that reaches 1 kPa, s.
 
-    It begins where it rose above 0 before that. NaN if it never comes, or never ends.
+    The phase starts at the last value of at most 0 before 1 kPa. NaN if there is none, or it does
+    not end.
     """
     arrived = np.flatnonzero(overpressure_pa >= ARRIVAL_PA)
     if len(arrived) == 0:
@@ -300,7 +301,7 @@ def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
 
 
 def _zero_s(time_s: FloatArray, pressure_pa: FloatArray, index: int) -> float:
-    """Return when a pressure falls to 0 in the step before an index."""
+    """Return the time at which a pressure falls to 0 in the step before an index, s."""
     high, low = pressure_pa[index - 1], pressure_pa[index]
     share = high / (high - low)
     return float(time_s[index - 1] + share * (time_s[index] - time_s[index - 1]))

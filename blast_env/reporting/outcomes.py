@@ -1,6 +1,6 @@
-"""What comes out of the blasts of a report, and whether buildings keep limits that the user gives.
+"""Results of the blasts of a report, and the user's limits of loads on buildings.
 
-Damage is for whoever knows the building: there is no model of it here.
+This module has no model of damage: judging loads takes knowledge of the building.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from blast_env.values import plain_number
 
 @dataclass(frozen=True)
 class Limit:
-    """What a building may take.
+    """The limits of the loads on a building.
 
     Attributes:
         target: Name of the building.
@@ -32,14 +32,14 @@ class Limit:
 
     @classmethod
     def parsed(cls, text: str, units: UnitSystem) -> "Limit":
-        """Return the limit that a text such as `school=200,40` stands for.
+        """Return the limit of a text such as `school=200,40`.
 
         Args:
             text: NAME=IMPULSE,PEAK; one of the two may be left out.
             units: The units of both.
 
         Raises:
-            BlastEnvError: If it is anything else.
+            BlastEnvError: If the text has another form, or a value is not above 0.
         """
         name, sign, values = text.partition("=")
         parts = values.split(",")
@@ -60,12 +60,12 @@ class Limit:
         return cls(name, impulse * units.pa_s_per_impulse, peak * units.pa_per_pressure)
 
     def is_kept(self, load: TargetLoad) -> bool:
-        """Whether a load is within the limit."""
+        """Return whether a load is within the limit."""
         return load.wall_impulse_pa_s <= self.impulse_pa_s and load.counted.pa <= self.peak_pa
 
 
 def check_limits(limits: Sequence[Limit], targets: Sequence[ReportedBuilding]) -> None:
-    """Refuse limits of buildings that do not exist, or two of one.
+    """Refuse limits of unknown buildings, and two limits of one building.
 
     Raises:
         UnknownNameError: If there is no such building.
@@ -105,13 +105,13 @@ class LoadPair:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The weighted impulse on what is protected under one charge or layout.
+    """The weighted impulse on the protected structures under one charge or layout.
 
     Attributes:
-        name: Of the charge, or of the layout.
-        words: What more there is to say of it.
-        bare_pa_s: Without the layout.
-        walled_pa_s: With it.
+        name: Name of the charge, or of the layout.
+        words: Further words on it.
+        bare_pa_s: Impulse without the layout.
+        walled_pa_s: Impulse with it.
     """
 
     name: str
@@ -127,13 +127,13 @@ class Outcome:
 
 @dataclass(frozen=True)
 class ItemWorth:
-    """What one module or piece of the layout is worth.
+    """The worth of one module or piece of the layout.
 
     Attributes:
         name: Its row and column, and its item if it is a piece.
         rectangle_m: The ground that it covers.
-        worth: By how much of the impulse without a barrier the impulse grows where it is left
-            out, mean over the threats; below 0 where the layout is better without it.
+        worth: Growth of the impulse if it is left out, as a share of the impulse without a barrier,
+            mean over the threats; below 0 if the layout is better without it.
     """
 
     name: str
@@ -148,7 +148,7 @@ class FrontPoint:
     Attributes:
         layout: Its modules or pieces.
         cost: Its cost.
-        reduction: Share of the impulse that is gone, mean over the threats.
+        reduction: Reduction of the impulse, as a share, mean over the threats.
     """
 
     layout: Layout

@@ -1,4 +1,4 @@
-"""The report as HTML that needs nothing else, and as PDF."""
+"""The report as self-contained HTML, and as PDF."""
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -57,17 +57,17 @@ def write_report(
     """Write a report.
 
     Args:
-        study: What it shows.
+        study: Its content.
         html: The page: one file, with its pictures inside.
-        pdf: The same as PDF, if it is wanted.
-        commands: How it was made; by default the command line of this process.
+        pdf: The same as PDF, if requested.
+        commands: The command that made it; by default the command line of this process.
 
     Returns:
         The files.
 
     Raises:
-        BlastEnvError: If a suffix is another one, a file cannot be written, or WeasyPrint lacks
-            its libraries; the page is written before the PDF.
+        BlastEnvError: If a suffix is wrong, a file cannot be written, or WeasyPrint lacks its
+            libraries; the page is written before the PDF.
     """
     check_targets(html, pdf)
     page = report_html(study, command() if commands is None else commands)
@@ -81,10 +81,10 @@ def write_report(
 
 
 def check_targets(html: str | Path, pdf: str | Path | None) -> None:
-    """Refuse files of no use before any blast is run.
+    """Refuse unusable files before any blast is run.
 
     Raises:
-        BlastEnvError: If a suffix is another one, or a PDF is wanted and WeasyPrint not there.
+        BlastEnvError: If a suffix is wrong, or a PDF is requested without WeasyPrint.
     """
     if Path(html).suffix.lower() not in HTML_SUFFIXES:
         raise BlastEnvError(f"{html}: suffix is {Path(html).suffix!r}, must be .html")
@@ -97,7 +97,7 @@ def check_targets(html: str | Path, pdf: str | Path | None) -> None:
 def _weasyprint() -> Any:
     """Return the package that makes PDF; it needs libraries of the system, Pango above all."""
     with import_extra("report", "PDF"), catch_warnings():
-        # WeasyPrint's hint to whoever packages it; without that library fonts are larger, no more.
+        # WeasyPrint's hint to packagers; without that library, embedded fonts are only larger.
         filterwarnings("ignore", "HarfBuzz-Subset", DeprecationWarning)
         try:
             import weasyprint
@@ -185,7 +185,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class SummaryLine:
-    """What a layout does for one building, over all threats, with the finer cells.
+    """The effect of a layout on one building, over all threats, with the finer cells.
 
     Attributes:
         name: The building.
@@ -232,13 +232,13 @@ def _spread(study: Study) -> tuple[float, float] | None:
 
 @dataclass(frozen=True)
 class BayTable:
-    """The bays of a building under a threat, those that panes leave most first.
+    """The bays of a building under a threat, those with the most severe panes first.
 
     Attributes:
         title: Building and charge.
-        rows: Bay; then, without the layout and with it: share of panes that break, condition of
-            these, damage of the wall panel.
-        left_out: How many more bays there are.
+        rows: Bay; then, without the layout and with it: share of panes that break, their
+            condition, damage of the wall panel.
+        left_out: Number of bays left out.
     """
 
     title: str
@@ -250,7 +250,7 @@ def _bay_tables(study: Study) -> list[BayTable]:
     tables = []
     for bare, walled in zip(study.bare.responses, study.walled.responses, strict=True):
         both = list(zip(bay_rows(bare.facade), bay_rows(walled.facade), strict=True))
-        # "5" is worse than "3b", and that than "3a": text will do.
+        # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
         both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
         rows = tuple(
             (str(first["bay"]), *(text for each in (first, second) for text in _bay_texts(each)))
@@ -276,11 +276,11 @@ def _bay_texts(row: Mapping[str, object]) -> tuple[str, str, str]:
 
 
 Source = tuple[str, str, str]
-"""A number of the summary: what it is, its value, and where it comes from."""
+"""A number of the summary: its name, its value and its source."""
 
 
 def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine]) -> list[Source]:
-    """Return every number of the summary with where it comes from."""
+    """Return every number of the summary with its source."""
     units, fine = study.options.units, study.options.words[1]
     digests = dict(study.digests)
 
@@ -336,7 +336,7 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
 
 
 def _front(study: Study) -> bytes:
-    """Return the front with the layout of the report, on the same cells."""
+    """Return the figure of the front with the layout of the report, on the same cells."""
     weighted = []
     for threat in study.threats:
         outcomes = {each.name: each for each in study.masses[threat.name]}
@@ -349,7 +349,7 @@ def _front(study: Study) -> bytes:
 
 
 def _number(value: float) -> str:
-    """Return a number with three significant digits, or a dash where there is none."""
+    """Return a number with three significant digits, or a dash if it is not finite."""
     if not isfinite(value):
         return _NONE
     if value == 0.0:
@@ -359,7 +359,7 @@ def _number(value: float) -> str:
 
 
 def _counted(load: TargetLoad, units: UnitSystem) -> str:
-    """Return the peak that limits are held against, and where it comes from."""
+    """Return the peak to compare with limits, and its source."""
     peak, source = _number(units.pressure_of(load.counted.pa)), load.counted.source
     if source is PeakSource.GAS:
         return f"{peak} ({source})"
@@ -375,7 +375,7 @@ def _points(share: float) -> str:
 
 
 def _layout_file(study: Study) -> str:
-    """Return the layout as a file that commands take."""
+    """Return the content of the layout's file, as commands read it."""
     with scratch_folder() as folder:
         path = write_layout(folder / "layout.json", study.scenario, study.layout)
         return path.read_text(encoding="utf-8")

@@ -1,10 +1,10 @@
-"""The peak that a limit is held against: cells clip peaks, and no limit is kept by that.
+"""The peak to compare with a limit: cells clip peaks, and clipping must not keep a limit.
 
-Where the charge sees a face, the larger of the peak on its cells and of Kingery and Bulmash's
-reflected one counts. That is the hemispherical one at right angles, whatever the angle and the
-height of the charge: the safe side. Elsewhere the peak on the cells is multiplied by what they may
-clip (`peak_factor`), up to the curve: what hides a face adds nothing to the wave in the open. Where
-the cells alone exceed the curve, as between walls, it is no bound.
+On a face in sight of the charge, the larger of the peak on its cells and Kingery and Bulmash's
+reflected peak counts: that of a hemispherical burst at normal incidence, whatever the angle and the
+height of the charge, which is conservative. On other faces, the peak on the cells is multiplied by
+the possible clipping (`peak_factor`), up to the curve, since an obstacle adds nothing to the wave
+in the open. If the cells alone exceed the curve, as between walls, it is no bound.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from blast_env.response.facade import peak_factor
 
 
 class PeakSource(StrEnum):
-    """Where a peak comes from, in the words of a report."""
+    """The sources of a peak, in the words of a report."""
 
     GAS = "gas"
     CURVE = "Kingery-Bulmash reflected"
@@ -29,11 +29,11 @@ class PeakSource(StrEnum):
 
 @dataclass(frozen=True)
 class CountedPeak:
-    """The peak on a building that limits are held against.
+    """The peak on a building to compare with limits.
 
     Attributes:
         pa: The peak.
-        source: Where it comes from.
+        source: Its source.
     """
 
     pa: float
@@ -41,10 +41,10 @@ class CountedPeak:
 
 
 def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> CountedPeak:
-    """Return the largest of the peaks that count on faces of cells.
+    """Return the largest of the counted peaks on faces of cells.
 
     Args:
-        site: What stands where, with the barrier.
+        site: The site with the barrier.
         cell_m: Side of the cells.
         faces: The faces, as in `GasResult.on_walls`; at least one.
     """

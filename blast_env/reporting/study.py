@@ -1,4 +1,4 @@
-"""Everything that a report needs to know, blast by blast."""
+"""The study behind a report: its blasts and their results."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -64,27 +64,27 @@ _FILM, _MASSES_PART, _ITEMS, _PLACES, _FRONT = (
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """What is to be looked at, and how finely.
+    """The scope and the resolution of a study.
 
     Attributes:
-        charges: The threats; without any, of each source the worst of the places looked at.
-        most_threats: How many of those at most, 1 to 6.
-        cells: Sides of cells in m, two of them, the coarser one first: loads with both say what the
-            grid does. The same twice is one size, and nothing is said of that. For large sites
-            "coarse" and "fine", which grow.
-        limits: What buildings may take.
+        charges: The threats; without any, the worst of the places of each source.
+        most_threats: Greatest number of such threats, 1 to 6.
+        cells: Two sides of cells in m, the coarser one first: their loads show the error of the
+            grid. Twice the same is one size, without that error. For large sites "coarse" and
+            "fine", which grow.
+        limits: Limits of the loads on buildings.
         target: Level of protection that buildings with facades must reach; `None` for that of the
             scenario's objective, or low if it has none.
         units: Units of loads.
         front: CSV file of a search with the layouts of a front.
-        places: How many places of each source the sensitivity looks at.
-        items: Whether to rank what each module or piece is worth.
-        stills: Moments of the film.
+        places: Number of places of each source in the sensitivity study.
+        items: Whether to rank the worth of each module or piece.
+        stills: Number of moments of the film.
         processes: Worker processes of blasts that need no pictures.
-        cache: Folder in which those blasts are kept.
+        cache: Folder of the loads of those blasts.
 
     Raises:
-        BlastEnvError: If something is out of bounds.
+        BlastEnvError: If an option is out of bounds.
     """
 
     charges: tuple[AnyCharge, ...] = ()
@@ -101,7 +101,7 @@ class StudyOptions:
     cache: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check them."""
+        """Check the options."""
         for name, value, low, high in (
             ("threats", self.most_threats, 1, MOST_THREATS),
             ("charges", len(self.charges), 0, MOST_THREATS),
@@ -124,42 +124,42 @@ class StudyOptions:
 
     @property
     def coarse(self) -> GasEngine:
-        """The engine of what is run many times."""
+        """The engine of the blasts without pictures, with the coarser cells."""
         return GasEngine.with_cells(self.cells[0])
 
     @property
     def words(self) -> tuple[str, str]:
-        """The coarser and the finer cells, for people."""
+        """The coarser and the finer cells, in words."""
         coarse, fine = (GasEngine.with_cells(each).cell_words for each in self.cells)
         return coarse, fine
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What a report shows.
+    """The content of a report.
 
     Attributes:
         scenario: The scenario.
         layout: The layout.
-        options: What was asked for.
+        options: The options.
         targets: The buildings.
         threats: The threats.
-        bill: What the layout is made of; `blast_env.export.bill.BILL_COLUMNS`.
+        bill: Bill of quantities of the layout; `blast_env.export.bill.BILL_COLUMNS`.
         cost: Its cost.
         pairs: Loads by threat, building and cell size.
-        bare: What becomes of buildings without the layout, with the finer cells.
-        walled: What becomes of them, and of the barrier, with it.
+        bare: Response of the buildings without the layout, with the finer cells.
+        walled: Response of the buildings and of the barrier with it.
         walled_coarse: The same with the coarser cells.
         pictures: Facades and histories, by threat.
         stills: Moments of the film of the first threat.
-        items: What each module or piece is worth, the most valuable one first.
-        masses: The first threats with other masses, by the name of the threat.
+        items: The worth of each module or piece, the most valuable one first.
+        masses: The threats with other masses, by the name of the threat.
         places: Charges at other places.
-        front: The front, if one was searched.
-        notes: What loads are to be distrusted for, by threat and cell size.
-        left_out: What could not be looked at.
+        front: The front, if one was given.
+        notes: Reasons to distrust loads, by threat and cell size.
+        left_out: Notes on the cases left out.
         digests: Digest of every blast with pictures.
-        stopped: Before which part it was stopped; empty for a whole report.
+        stopped: The part before which it was stopped; empty for a whole report.
     """
 
     scenario: Scenario
@@ -217,7 +217,7 @@ class Study:
 
 
 Told = Callable[[str, float], None]
-"""Told what is going on, and which share of it is done."""
+"""Called with the label of the current part, and its completed share, 0 to 1."""
 
 
 def run_study(
@@ -228,19 +228,19 @@ def run_study(
 ) -> Study:
     """Run all blasts of a report.
 
-    Without threats that were named, charges at other places come first: the worst are the threats.
-    Whoever stops it (`KeyboardInterrupt`) after the threats with the coarser cells gets a report on
-    what is done by then.
+    Without given threats, charges at other places come first: the worst of them are the threats.
+    An interruption (`KeyboardInterrupt`) after the threats with the coarser cells gives a report on
+    the parts finished by then.
 
     Args:
         scenario: The scenario.
         layout: The layout.
-        options: What is to be looked at.
-        progress: Told what is going on, and which share of it is done.
+        options: The scope and the resolution.
+        progress: Called with the label of the current part, and its completed share, 0 to 1.
 
     Raises:
-        BlastEnvError: If the layout does not fit, a charge is out of place, a limit is of no
-            building, or a front cannot be read; all that before the first blast.
+        BlastEnvError: If the layout is not legal, a charge is out of place, a limit names no
+            building, or a front cannot be read; all before the first blast.
     """
     options = options or StudyOptions()
     cells = check_layout(scenario, layout)
@@ -309,10 +309,10 @@ class PlannedPart(NamedTuple):
     """A part of a report before it is run.
 
     Attributes:
-        label: The label that `run_study` reports; of parts with several, how they begin.
+        label: The label that `run_study` reports; of parts with several, their common start.
         cells: Their cells.
         charges: The charge of each blast; of equal blasts, only the first is run.
-        is_drawn: Whether there are pictures of each blast.
+        is_drawn: Whether each blast has pictures.
     """
 
     label: str
@@ -324,12 +324,12 @@ class PlannedPart(NamedTuple):
 def blasts_of(
     scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[NamedCharge]
 ) -> tuple[PlannedPart, ...]:
-    """Return the parts of a report in their order, with the blasts that are run for each."""
+    """Return the parts of a report in their order, with the blasts of each."""
     coarse = options.cells[0]
     own = [threat.charge for threat in threats]
     places = [each.charge for each in other_places(scenario, options.places)]
     both = ((), layout)
-    first = [] if options.charges else places  # of which the threats are chosen
+    first = [] if options.charges else places  # the candidates for the threats
     known = {(each, charge) for each in both for charge in (*first, *own)}
     parts = [PlannedPart(_PLACES, coarse, tuple(first * len(both)))] if first else []
     parts += [
@@ -358,19 +358,19 @@ def blasts_of(
 
 
 def _fewer(layout: Layout) -> list[Layout]:
-    """Return a layout without each of its modules or pieces."""
+    """Return the layouts that lack one module or piece, one for each."""
     return [tuple(each for each in layout if each != piece) for piece in standing(layout)]
 
 
 def _label(threat: NamedCharge, words: str, cells: Cells) -> str:
-    """Return what a blast of the threats is called while it runs, and where its digest is."""
+    """Return the label of a blast of the threats, for progress and for its digest."""
     return f"{threat.name} {words}, {GasEngine.with_cells(cells).cell_words}"
 
 
 def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[NamedCharge, ...]:
     """Return the threats of a report before any blast, for its cost.
 
-    Those that were asked for, or stand-ins: of each source a place that is looked at.
+    Those given, or stand-ins: one of the places of each source.
     """
     if options.charges:
         return asked_threats(scenario, options.charges)
@@ -402,7 +402,7 @@ class Runs:
     def run_threats(self) -> None:
         """Run every threat with both sizes of cells, without and with the layout.
 
-        The coarser ones first: with them alone there is a report, if it is stopped then.
+        The coarser ones come first: they suffice for a report if the rest is stopped.
         """
         for size in self.options.sizes:
             for threat in self.threats:
@@ -420,10 +420,10 @@ class Runs:
                 )
 
     def options_of_what_is_done(self) -> StudyOptions:
-        """Return the options of a report on what is done: with the coarser cells alone, perhaps.
+        """Return the options of a report on the finished cells, perhaps the coarser ones alone.
 
         Raises:
-            KeyboardInterrupt: If not even these are done.
+            KeyboardInterrupt: If not even these are finished.
         """
         done = [
             size
@@ -435,7 +435,7 @@ class Runs:
         return replace(self.options, cells=(done[0], done[-1]))
 
     def consequences(self, cells: Cells, *, walled: bool) -> Consequences:
-        """Return what all threats did, with such cells, without the layout or with it."""
+        """Return the consequences of all threats on the given cells, without or with the layout."""
         return Consequences.together(self._found[cells, walled])
 
     def _damage_pictures(self, threat: str, cells: Cells) -> tuple[Picture, ...]:
@@ -462,7 +462,7 @@ class Runs:
                 yield LoadPair(target, threat, cells, *loads)
 
     def film(self) -> tuple[Picture, ...]:
-        """Return moments of the first threat, without and with the layout."""
+        """Return stills of the first threat, without and with the layout."""
         charge = self.threats[0].charge
         blasts = [
             GasBlast(self.scenario, layout, 0, self.options.coarse, charge)
@@ -472,7 +472,7 @@ class Runs:
         return film_stills(blasts[0], blasts[1], moments_s, partial(self.progress, _FILM))
 
     def _moments_s(self) -> list[float]:
-        """Return the times of the stills: before and after the arrival at what is protected."""
+        """Return the times of the stills, s: around the arrival at a protected building."""
         own = [
             each
             for each in self.pairs
@@ -490,7 +490,7 @@ class Runs:
         return [float(moment_s) for moment_s in moments_s]
 
     def other_masses(self) -> tuple[dict[str, tuple[Outcome, ...]], tuple[str, ...]]:
-        """Return every threat with other masses, and what is not possible."""
+        """Return the outcomes of every threat with other masses, and notes on those left out."""
         found, left_out = {}, []
         for threat in self.threats:
             charges, notes = other_masses(self.scenario, threat.charge, _MASSES)
@@ -501,12 +501,12 @@ class Runs:
         return found, tuple(left_out)
 
     def other_places(self) -> tuple[Outcome, ...]:
-        """Return the same charges at other places."""
+        """Return the outcomes of the charges at other places."""
         places = other_places(self.scenario, self.options.places)
         return self._outcomes(_PLACES, places)
 
     def choose_threats(self) -> None:
-        """Take the worst of those places with the layout, which is what the verdict is on."""
+        """Choose the worst places as threats, by loads with the layout, as in the verdict."""
         places = other_places(self.scenario, self.options.places)
         charges = [each.charge for each in places]
         loads = self._blasts(_PLACES, ((), self.layout), charges)[len(places) :]
@@ -526,7 +526,7 @@ class Runs:
         )
 
     def item_worths(self) -> tuple[ItemWorth, ...]:
-        """Return what every module or piece is worth: the impulse where it alone is left out."""
+        """Return the worth of every module or piece, by the impulse if it alone is left out."""
         pieces = standing(self.layout)
         charges = [each.charge for each in self.threats]
         impulses = self._loads(_ITEMS, ((), self.layout, *_fewer(self.layout)), charges)
@@ -559,7 +559,7 @@ class Runs:
     def _loads(
         self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
     ) -> FloatArray:
-        """Return the loads that count on what is protected (layouts, charges)."""
+        """Return the counted loads on the protected structures (layouts, charges)."""
         objective = self.scenario.objective
         counted = [each.load(objective) for each in self._blasts(label, layouts, charges)]
         return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
@@ -567,7 +567,7 @@ class Runs:
     def _blasts(
         self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
     ) -> list[BlastLoads]:
-        """Return the loads of every layout under every charge; those that are known, at once."""
+        """Return the loads of every layout under every charge, from the cache if possible."""
         pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]
         told = partial(self.progress, label)
         return self._evaluator.loads_of_many(pairs, self.options.processes, told)
@@ -575,7 +575,7 @@ class Runs:
 
 @dataclass(frozen=True)
 class _FrontRow:
-    """What is read of a row of a front."""
+    """The column that is read from a row of a front."""
 
     layout: str
 
@@ -584,7 +584,7 @@ def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
     """Return the layouts of a front that a search wrote.
 
     Raises:
-        BlastEnvError: If the file is anything else, or a layout does not fit the scenario.
+        BlastEnvError: If the file is no front, or a layout is not legal in the scenario.
     """
     if path is None:
         return ()
@@ -601,7 +601,7 @@ def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
 
 
 def layout_from(text: str) -> Layout:
-    """Return a layout from what `layout_text` writes: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
+    """Return a layout from the text of `layout_text`: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
     return tuple(_element_from(element) for element in text.split())
 
 

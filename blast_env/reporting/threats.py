@@ -1,4 +1,4 @@
-"""The charges that a report looks at: the worst places, other places, other masses."""
+"""The charges of a report: the worst places, other places, other masses."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ from blast_env.scenario import (
 from blast_env.scenario.build_scene import charge_against
 
 _STEPS: Final = 400
-"""Into how many parts a segment is cut to find its place nearest to a building."""
+"""Number of parts of a segment in the search for its place nearest to a building."""
 
 
 @dataclass(frozen=True)
 class NamedCharge:
-    """A charge with what a report calls it.
+    """A charge with its name in a report.
 
     Attributes:
-        name: `T1`, or what it stands for.
+        name: `T1`, or its place or mass.
         charge: The charge, at its place or on its vehicle.
-        why: Why it is there.
-        source: The charge source that it is of, -1 for none.
+        why: The reason for its choice.
+        source: Number of its charge source, -1 for none.
     """
 
     name: str
@@ -43,11 +43,11 @@ class NamedCharge:
     source: int = -1
 
     def against(self, scenario: Scenario, layout: Layout = ()) -> Charge:
-        """Return the charge where it goes off: that of a vehicle depends on the layout."""
+        """Return the charge at its place, which for a vehicle depends on the layout."""
         return charge_against(scenario, layout, self.charge)
 
     def place_text(self, scenario: Scenario, layout: Layout) -> str:
-        """Return where it goes off, with a layout and without if that makes a difference."""
+        """Return its place in words, with a layout, and without if that differs."""
         bare, walled = (_place_text(self.against(scenario, each)) for each in ((), layout))
         return walled if bare == walled else f"{bare} without the layout, {walled} with it"
 
@@ -55,12 +55,12 @@ class NamedCharge:
 def chief_threats(
     places: Sequence[NamedCharge], severity: Callable[[NamedCharge], Severity], most: int
 ) -> tuple[NamedCharge, ...]:
-    """Return the charges that do most: of each source the place that governs.
+    """Return the most severe charges: of each source, the place that governs.
 
     Args:
-        places: The places that are looked at, see `other_places`.
-        severity: How bad a charge there is.
-        most: How many at most; the worst are taken.
+        places: The candidate places, see `other_places`.
+        severity: Severity of a charge.
+        most: Greatest number of charges; the worst are taken.
     """
     sources: dict[int, list[NamedCharge]] = {}
     for each in places:
@@ -74,7 +74,7 @@ def chief_threats(
 
 
 def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[NamedCharge, ...]:
-    """Return the charges that the user named.
+    """Return the charges given by the user.
 
     Raises:
         ScenarioError: If one is out of bounds, or not clear of structures and the border.
@@ -89,12 +89,12 @@ def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[N
 def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
     """Return charges at even steps along segments, over areas, and at points; each only once.
 
-    And that of each source nearest to what is protected. Those of a vehicle are at its worst place,
-    its second worst, and so on.
+    The place of each source nearest to a protected structure is added. Those of a vehicle are at
+    its worst place, its second worst, and so on.
 
     Args:
         scenario: The scenario.
-        count: How many of each segment and vehicle, and along each side of an area.
+        count: Number of places of each segment and vehicle, and along each side of an area.
     """
     found: dict[AnyCharge, NamedCharge] = {}
     for index, source in enumerate(scenario.charge):
@@ -115,7 +115,7 @@ def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
 def other_masses(
     scenario: Scenario, charge: AnyCharge, factors: tuple[float, ...]
 ) -> tuple[tuple[NamedCharge, ...], tuple[str, ...]]:
-    """Return the same charge with other masses, and why some are not possible."""
+    """Return the same charge with other masses, and notes on those that are not possible."""
     possible, notes = [], []
     for factor in factors:
         other = _with_mass(charge, factor * charge.tnt_kg)
@@ -152,7 +152,7 @@ Placed = PointSource | SegmentSource | RectangleSource
 
 
 def _candidates(scenario: Scenario, source: Placed) -> Iterator[tuple[float, float]]:
-    """Yield places of a source of which one is the nearest, or nearly."""
+    """Yield candidates for the place of a source nearest to a protected structure, or nearly so."""
     if isinstance(source, RectangleSource):
         left, bottom, right, top = source.rectangle_m
         for target in _protected(scenario):

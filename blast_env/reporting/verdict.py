@@ -1,4 +1,4 @@
-"""The verdict of a report: passes or fails, by the response of facades, or by the limits given."""
+"""The verdict of a report: pass or fail, by the response of facades and by given limits."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -37,12 +37,12 @@ class BuildingLine:
 
     Attributes:
         name: The building.
-        levels: Level of protection in words, with that on the cells where it is another one.
-        broken: Panes that are expected to break.
-        panes: Panes that it has.
+        levels: Level of protection in words, with that on the cells if it differs.
+        broken: Expected number of broken panes.
+        panes: Number of its panes.
         conditions: Performance condition of the worst pane, GSA.
-        failed: Wall panels with hazardous damage or worse.
-        panels: Wall panels that it has.
+        failed: Number of wall panels with hazardous damage or worse.
+        panels: Number of its wall panels.
         damages: Damage of the worst panel.
     """
 
@@ -61,9 +61,9 @@ class OtherGlass:
     """All windows with the glass of another component.
 
     Attributes:
-        title: What people call it.
-        cost: What the measures of the site ask for it, without those that the layout takes already;
-            `None` where they do not put it into all windows.
+        title: Its title.
+        cost: Cost by the measures of the site, without those already in the layout; `None` if they
+            do not put it into all windows.
         passes: Whether the buildings pass with it behind the layout.
         passes_bare: The same without the layout.
     """
@@ -76,17 +76,17 @@ class OtherGlass:
 
 @dataclass(frozen=True)
 class ReportVerdict:
-    """Does the layout do?
+    """Whether the layout passes.
 
     Attributes:
-        passes: Whether all that was asked for is kept; `None` where nothing was.
+        passes: Whether all requirements are kept; `None` without any.
         passes_bare: The same without the layout.
-        flagged: Whether there is a note on a load that the verdict rests on.
+        flagged: Whether a load behind the verdict has a note.
         flagged_bare: The same without the layout.
-        words: What was asked for.
-        doubt: Why a verdict that fails rests on sharper peaks; empty if it does not.
+        words: The requirements.
+        doubt: Why a fail rests on sharper peaks; empty if it does not.
         buildings: The buildings with a facade.
-        limits: The limits that were given.
+        limits: The given limits.
         barrier: The barrier under the threat that tilts a piece most.
         glazing: Other glass in all windows.
     """
@@ -104,15 +104,15 @@ class ReportVerdict:
 
     @property
     def word(self) -> str:
-        """In a word."""
+        """The verdict in a word."""
         return "NO VERDICT" if self.passes is None else verdict_word(self.passes, self.flagged)
 
 
 def verdict_of(study: Study) -> ReportVerdict:
     """Return the verdict of a report.
 
-    By the level of protection that was asked for, where buildings have facades, and by the limits
-    that were given; both must be kept, on the finer cells and under every threat.
+    It goes by the required level of protection, if buildings have facades, and by the given limits;
+    both must be kept, on the finer cells and under every threat.
     """
     limits = tuple(_limits(study))
     target = study.target
@@ -168,7 +168,7 @@ def _line(study: Study, name: str) -> BuildingLine:
 
 
 def _glazing(study: Study) -> Iterator[OtherGlass]:
-    """Yield other glass, where a building has panes at all."""
+    """Yield the verdicts with other glass, if any building has panes."""
     if not any(each.facade.panes for each in study.walled.responses):
         return
     for name, glazing in other_glazing(study.scenario).items():
@@ -179,9 +179,9 @@ def _glazing(study: Study) -> Iterator[OtherGlass]:
 
 
 def _price(study: Study, glazing: str) -> float | None:
-    """Return what the site's measures ask for a glass in all windows that do not have it yet.
+    """Return the cost by the site's measures of a glass in all windows that lack it.
 
-    Of measures that overlap, the dearest that can be left out are.
+    Of overlapping measures, the dearest ones that are not needed are left out.
     """
     bays = [bay for bay in study.scenario.named_bays(study.layout) if bay.glazing]
     missing = [bay.bay for bay in bays if bay.glazing != glazing]
