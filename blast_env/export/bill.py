@@ -28,12 +28,12 @@ class LayoutPlan:
     Attributes:
         scenario: The scenario; its bundled name or path will do.
         layout: (row, column) of each module, or the pieces; their order is kept.
-        charge: The charge that the layout was made for; `None` where it is for all the places
-            where the scenario may have one, or nobody knows.
-        provenance: How the layout was made: anything that JSON can hold.
+        charge: The charge that the layout was made for; `None` if it is for all possible places of
+            the charge, or unknown.
+        provenance: The origin of the layout: anything that JSON can hold.
 
     Raises:
-        LayoutError: If the layout does not fit the scenario.
+        LayoutError: If the layout is not legal in the scenario.
     """
 
     scenario: ScenarioField = ScenarioField()
@@ -47,14 +47,14 @@ class LayoutPlan:
 
     @property
     def modules(self) -> tuple[ModularPart, ...]:
-        """The modules, in the order of the layout, with the names that the blast's tables have."""
+        """The modules, in the order of the layout, with their names in the tables of a blast."""
         if self.scenario.build_zone is None:
             return ()
         return tuple(barrier_outline(self.scenario, self.layout).build().parts)
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
-        """Everything on the site, in metres; what lies on top comes last."""
+        """All features of the site, in metres, the topmost last."""
         return site_features(self.scenario, self.layout, self.charge)
 
 
@@ -68,7 +68,7 @@ MODULE_COLUMNS: Final = (
     Column("centre_y_m", "m", "centre, from the lower border"),
     Column("side_m", "m", "side of the module"),
 )
-"""Of the modules of a zone without a catalogue."""
+"""Columns of the modules of a zone without a catalogue."""
 
 PIECE_COLUMNS: Final = (
     Column("piece", "", "name of the piece, made from its item and its centre in metres"),
@@ -86,7 +86,7 @@ PIECE_COLUMNS: Final = (
     Column("cost", "", "cost at that place, in the unit of the budget"),
     Column("stops_vehicles", "", "whether no vehicle gets past it"),
 )
-"""Of the pieces of a zone with a catalogue."""
+"""Columns of the pieces of a zone with a catalogue."""
 
 BILL_COLUMNS: Final = (
     Column("item", "", "item or measure of the zone, or `module`; `total` is all of them"),
@@ -99,10 +99,10 @@ BILL_COLUMNS: Final = (
     Column("unit_cost", "", "cost of a piece where no cost area says otherwise"),
     Column("cost", "", "cost of these pieces at their places, in the unit of the budget"),
 )
-"""Of the bill of quantities."""
+"""Columns of the bill of quantities."""
 
 MODULE: Final = "module"
-"""What the bill calls the single module of a zone without a catalogue."""
+"""Name in the bill of the single module of a zone without a catalogue."""
 
 TOTAL: Final = "total"
 """The last line of the bill."""
@@ -115,7 +115,7 @@ def element_columns(plan: LayoutPlan) -> tuple[Column, ...]:
 
 
 def element_table(plan: LayoutPlan) -> "pd.DataFrame":
-    """Return one row a module or a piece in the order of the layout; see `element_columns`."""
+    """Return one row per module or piece in the order of the layout; see `element_columns`."""
     columns = element_columns(plan)
     rows = _piece_rows(plan) if columns is PIECE_COLUMNS else _module_rows(plan)
     return table_of(list(rows), columns)
@@ -142,7 +142,7 @@ def _piece_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
     items = {item.name: item for item in zone.items}
     for piece, cost in _with_costs(plan):
         if isinstance(piece, Measure):
-            continue  # the bill has it
+            continue  # it is in the bill
         if not isinstance(piece, Piece):
             raise AssertionError("a zone with a catalogue has pieces")
         item, rectangle = items[piece.item], zone.element_rectangle_m(piece)
@@ -164,14 +164,14 @@ def _piece_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
 
 
 def _with_costs(plan: LayoutPlan) -> list[tuple[Element, float]]:
-    """Return the elements of a layout, each with what it costs where it stands."""
+    """Return the elements of a layout, each with its cost at its place."""
     placement = Placement.of(plan.scenario, plan.layout)
     number, costs = placement.catalogue.variant_number, placement.costs
     return [(each, float(costs[number(each), each[0], each[1]])) for each in placement.layout]
 
 
 class _Line(NamedTuple):
-    """One line of the bill but for its counts and its cost."""
+    """One line of the bill without its counts and its cost."""
 
     item: str
     description: str
@@ -183,7 +183,7 @@ class _Line(NamedTuple):
 
 
 def bill_of_quantities(plan: LayoutPlan) -> "pd.DataFrame":
-    """Return what a layout takes, one row an item that it has, and the total; `BILL_COLUMNS`."""
+    """Return the bill of quantities, one row per item used, and the total; `BILL_COLUMNS`."""
     lines = _lines(plan)
     of_items: dict[str, list[float]] = {line.item: [] for line in lines}
     for element, cost in _with_costs(plan):
@@ -225,7 +225,7 @@ def _lines(plan: LayoutPlan) -> Sequence[_Line]:
 
 
 def write_excel(plan: LayoutPlan, path: Path) -> None:
-    """Write a workbook: the bill of quantities, the modules or pieces, and what they are for.
+    """Write a workbook: the bill of quantities, the modules or pieces, and a record of their site.
 
     Raises:
         BlastEnvError: If the file cannot be written.

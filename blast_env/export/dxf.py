@@ -1,4 +1,4 @@
-"""What a drawing has to say beside its lines: conditions of the site, and how far they reach."""
+"""DXF drawings of a layout on its site: outlines, labels, clearances, and notes."""
 
 import textwrap
 from collections import Counter
@@ -18,7 +18,7 @@ from blast_env.scenario import BuildZone, Placement
 from blast_env.scenario.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
-_DIGITS: Final = 9  # of a metre: what is beyond is rounding
+_DIGITS: Final = 9  # decimals of a metre: the rest is rounding error
 
 BULGE_OF_A_QUARTER: Final = tan(pi / 8.0)
 """Bulge of an arc over a right angle: the tangent of a quarter of it, counterclockwise."""
@@ -28,7 +28,7 @@ CornerM = tuple[float, float, float]
 
 
 def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
-    """Return the notes of a drawing, a line a subject, without the key to the letters."""
+    """Return the notes of a drawing, one line per subject, without the key to the letters."""
     lines = [
         f"Scenario: {plan.scenario.name}",
         "Units: metres, from the lower left corner of the site",
@@ -64,7 +64,7 @@ def _items(plan: LayoutPlan, zone: BuildZone) -> list[str]:
 
 
 def _conditions(zone: BuildZone) -> tuple[str, str]:
-    """Return how near modules may come to structures, and what must stay open."""
+    """Return the clearance between modules and structures, and the access way, in words."""
     clearance, way = "none required", "none required"
     if zone.clearance_m > 0.0:
         clearance = f"{_number(zone.clearance_m)} m at least between modules and structures"
@@ -88,7 +88,7 @@ def _number(value: float) -> str:
 
 
 def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[CornerM, ...], ...]:
-    """Return how near modules may come to each structure; nothing if they may touch it.
+    """Return the outline of the clearance around each structure; none if modules may touch it.
 
     The clearance is the least distance of any two points of module and structure. So the outline
     is a rectangle whose corners are rounded by the clearance: four sides and four arcs,
@@ -120,16 +120,16 @@ def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]
     )
 
 
-_SIGN_WIDTH: Final = 0.75  # in heights; of most typefaces that programs take for drawings
+_SIGN_WIDTH: Final = 0.75  # in heights; of most typefaces for drawings
 
 
 @dataclass(frozen=True)
 class Text:
-    """A text on the drawing: structures and pieces have it inside them, the others a letter.
+    """A text on the drawing: a name inside a structure or piece, a letter beside the others.
 
     Attributes:
         text: The text.
-        feature: What it belongs to.
+        feature: Its feature.
         centre_m: Its middle.
         height_m: Height of the letters.
         upright: Whether it is turned by 90 degrees.
@@ -143,13 +143,13 @@ class Text:
 
     @property
     def size_m(self) -> tuple[float, float]:
-        """Width and height of what it takes."""
+        """Width and height of the text, m."""
         long, short = _SIGN_WIDTH * len(self.text) * self.height_m, self.height_m
         return (short, long) if self.upright else (long, short)
 
     @property
     def box_m(self) -> Rectangle:
-        """The rectangle that it takes."""
+        """The rectangle around the text."""
         (width, height), (x, y) = self.size_m, self.centre_m
         return Rectangle(x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0)
 
@@ -164,8 +164,8 @@ def texts_of(plan: LayoutPlan, height_m: float) -> tuple[Text, ...]:
     """Return all texts on the site.
 
     Args:
-        plan: What is drawn.
-        height_m: Height of the letters; names inside things are smaller where they must.
+        plan: The layout on its site.
+        height_m: Height of the letters; names inside things are smaller if they must fit.
     """
     inside = [_text_inside(each, height_m) for each in plan.features if _words_inside(each)]
     key = key_of(plan)
@@ -202,7 +202,7 @@ def _has_letter(feature: Feature) -> bool:
 
 
 def _words_inside(feature: Feature) -> str:
-    """Return what is written inside a structure or a piece; nothing in a module."""
+    """Return the text inside a structure or a piece; empty for the others."""
     if feature.kind.named == "inside":
         return _name(feature)
     if "item" in feature.properties:
@@ -211,7 +211,7 @@ def _words_inside(feature: Feature) -> str:
 
 
 def _text_inside(feature: Feature, height_m: float) -> Text:
-    """Return a text along the middle, as high as there is room for."""
+    """Return a text along the middle of a feature, as high as fits."""
     text, outline = _words_inside(feature), feature.bounds_m
     width_m, depth_m = outline.right - outline.left, outline.top - outline.bottom
     signs = _SIGN_WIDTH * len(text)
@@ -223,7 +223,7 @@ def _text_inside(feature: Feature, height_m: float) -> Text:
 
 
 def wrapped(lines: Sequence[str], characters: int) -> list[str]:
-    """Return lines that have at most so many characters, broken between words."""
+    """Return the lines broken between words to at most `characters`."""
     return [part for line in lines for part in textwrap.wrap(line, characters)]
 
 
@@ -238,24 +238,24 @@ with import_extra("export", "DXF files"):
 VERSION: Final = "R2010"
 
 APPLICATION: Final = "BLAST_ENV"
-"""Under this name the outline of a module has its identifier, as extended data."""
+"""Application name of the extended data with the identifier of a module's outline."""
 
 CLEARANCE_LAYER: Final = "CLEARANCE"
 NOTES_LAYER: Final = "NOTES"
 
 ITEMS_LAYER: Final = "ITEMS"
-"""What the pieces of a catalogue are, in words; they can be hidden."""
+"""Layer of the texts in the pieces of a catalogue; it can be hidden."""
 
 _STRING: Final = 1000  # group code of a text in extended data
 _TEXT_HEIGHT_M: Final = 0.4
 _ROUNDING: Final = 1e-6  # of a count of signs
 _LINE_SPACING: Final = 5.0 / 3.0  # of lines of text, in heights of the text
 _POINT_SIZE_M: Final = 1.0
-_CROSS_IN_CIRCLE: Final = 35  # how points are drawn ($PDMODE)
+_CROSS_IN_CIRCLE: Final = 35  # style of points ($PDMODE)
 
 
 class _Style(NamedTuple):
-    """How a layer is drawn: a colour of AutoCAD's index, and a line type."""
+    """The style of a layer: a colour of AutoCAD's index, and a line type."""
 
     colour: int
     line_type: str = "CONTINUOUS"
@@ -273,7 +273,7 @@ def _style_of(kind: FeatureKind) -> _Style:
 
 
 def layer_name(kind: FeatureKind) -> str:
-    """Return the layer that a kind of feature is on: `KEEP_OUT`."""
+    """Return the layer of a kind of feature: `KEEP_OUT`."""
     return kind.name.upper()
 
 
@@ -330,13 +330,13 @@ def _draw(space: Modelspace, feature: Feature) -> None:
         outline.dxf.elevation = feature.base_m
         height_m = feature.properties.get("height_m")
         if isinstance(height_m, float):
-            outline.dxf.thickness = height_m - feature.base_m  # what stands is as high as it is
+            outline.dxf.thickness = height_m - feature.base_m  # extruded to its top
         if feature.kind is Kinds.BARRIER:
             outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
 
 
 def _barrier_texts(feature: Feature) -> list[str]:
-    """Return what is said of a module or piece: its name, and for a piece its item and height."""
+    """Return the data of a module or piece: its name, and for a piece its item and height, m."""
     if "item" not in feature.properties:
         return [feature.name]
     top_m = feature.properties["height_m"]
@@ -346,7 +346,7 @@ def _barrier_texts(feature: Feature) -> list[str]:
 
 
 def _write(space: Modelspace, text: Text) -> None:
-    """Write a text; those of pieces are on a layer of their own."""
+    """Write a text; those of pieces are on the layer `ITEMS_LAYER`."""
     kind = text.feature.kind
     entity = space.add_text(
         text.text,
@@ -364,16 +364,16 @@ def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:
 
 
 def text_height_m(plan: LayoutPlan) -> float:
-    """Return the height of the notes: as high as fits the width of the site, but readable."""
-    # Signs are at most as wide as high, whatever typeface a program has.
+    """Return the height of the notes, m: as fits the width of the site, but readable."""
+    # Characters are at most as wide as high in any typeface.
     return max(plan.scenario.site.width_m / max(map(len, note_lines(plan))), _TEXT_HEIGHT_M)
 
 
 def _write_notes(space: Modelspace, plan: LayoutPlan, height_m: float) -> Rectangle:
     """Write the notes above everything; return the site with them.
 
-    Lines that are longer than the site is wide are broken here, not by the program that shows
-    them. The text grows upwards, so it never covers the site.
+    Lines longer than the width of the site are broken here, not by the viewing program. The text
+    grows upwards, so it never covers the site.
     """
     site, width_m = plan.scenario.site.rectangle_m, plan.scenario.site.width_m
     key = [f"{letter}: {name}" for name, letter in key_of(plan).items()]
@@ -389,5 +389,5 @@ def _write_notes(space: Modelspace, plan: LayoutPlan, height_m: float) -> Rectan
 
 
 def _escaped(line: str) -> str:
-    """Return a line in which no sign is a command to the program that shows it."""
+    """Return a line with the control characters of DXF texts escaped."""
     return line.replace("\\", "\\\\").replace("{", "\\{").replace("}", "\\}")

@@ -24,7 +24,7 @@ SITE_METRES: Final = (
     "local site metres: x to the right and y upwards from the lower left corner of the site; "
     "not longitude and latitude (not WGS 84)"
 )
-"""Coordinates of a site that lies on no map."""
+"""Coordinates of a site without a map."""
 
 _LONGITUDE_LATITUDE: Final = "longitude and latitude (WGS 84)"
 
@@ -32,11 +32,11 @@ _LONGITUDE_LATITUDE: Final = "longitude and latitude (WGS 84)"
 def feature_collection(plan: LayoutPlan) -> dict[str, Any]:
     """Return a FeatureCollection of everything on the site, as plain data.
 
-    With a georeference of the scenario it lies on its map: in longitude and latitude, as GeoJSON
-    has it, or in the reference system of the map, which then is the older form's member `crs`.
+    With a georeference of the scenario, its coordinates are longitude and latitude, the rule of
+    GeoJSON, or those of the map, named in the member `crs` of the older GeoJSON.
     """
     georeference = plan.scenario.georeference
-    # It stands in every feature too, because many programs read features alone.
+    # Repeated in every feature, because many programs read features alone.
     words = _coordinate_words(georeference)
     collection: dict[str, Any] = {
         "type": "FeatureCollection",
@@ -62,7 +62,7 @@ def _coordinate_words(georeference: AnyGeoreference | None) -> str:
 
 
 def write_geojson(plan: LayoutPlan, path: Path) -> None:
-    """Write the collection, a feature a line.
+    """Write the collection, one feature per line.
 
     Raises:
         BlastEnvError: If the file cannot be written.
@@ -91,7 +91,7 @@ def _feature(
 
 
 def _on_map(places_m: Sequence[PointM], georeference: AnyGeoreference | None) -> list[list[float]]:
-    """Return places of the site in the coordinates of its map, if it has one."""
+    """Return places of the site in the coordinates of its map, or in site metres without one."""
     if georeference is None:
         return [list(place) for place in places_m]
     # Here, because sites without a map do not need the extra `maps`.
@@ -121,7 +121,7 @@ def _write_json(plan: LayoutPlan, path: Path) -> None:
 
 
 def _write_dxf(plan: LayoutPlan, path: Path) -> None:
-    # Here, because the other forms do not need the extra `export`.
+    # Here, because the other formats do not need the extra `export`.
     from blast_env.export.dxf import write_dxf
 
     write_dxf(plan, path)
@@ -139,11 +139,11 @@ _WRITERS: Final[Mapping[str, Callable[[LayoutPlan, Path], object]]] = MappingPro
 )
 
 SUFFIXES: Final = tuple(_WRITERS)
-"""The forms in which a layout can be written."""
+"""Suffixes of the formats of a layout."""
 
 
 def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
-    """Write a layout in the form that the suffix names.
+    """Write a layout in the format of the suffix.
 
     Args:
         plan: The layout on its site.
@@ -155,8 +155,8 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
         The path.
 
     Raises:
-        BlastEnvError: If the suffix is another one, the file cannot be written, or a package
-            that it needs is not installed.
+        BlastEnvError: If the suffix is unknown, the file cannot be written, or a required package
+            is not installed.
     """
     path = path_of(path)
     check_target(path, 1)
@@ -168,12 +168,12 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
 
 
 def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[Path]:
-    """Write layouts to a folder in all forms, or a single one to a file.
+    """Write layouts to a folder in all formats, or a single one to a file.
 
     Args:
-        plans: By the name that its files get.
-        target: A file as for `export_layout`, if there is one layout; otherwise a folder, which
-            is made if need be.
+        plans: The layouts by the names of their files.
+        target: A file as for `export_layout`, if there is one layout; otherwise a folder, created
+            if it is missing.
 
     Returns:
         The files.
@@ -194,15 +194,15 @@ def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[
 
 
 def check_target(target: str | Path, count: int) -> None:
-    """Refuse a target before any work is done for it.
+    """Refuse an unusable target before any work is done for it.
 
     Args:
         target: As for `export_layouts`.
-        count: How many layouts there are to be.
+        count: Number of layouts to write.
 
     Raises:
-        BlastEnvError: If the suffix is of no use, a file is to hold more than one layout, or a
-            package that is needed is not installed.
+        BlastEnvError: If the suffix is unknown, a file would hold more than one layout, or a
+            required package is not installed.
     """
     target = Path(target)
     suffix = _suffix(target)
@@ -216,7 +216,7 @@ def check_target(target: str | Path, count: int) -> None:
             f"{target}: is one file, but there are {count} layouts: name a folder, without a suffix"
         )
     if suffix == ".dxf" or not is_file(target):
-        import_module("blast_env.export.dxf")  # says how to get what is missing
+        import_module("blast_env.export.dxf")  # its error names the missing extra
 
 
 def is_file(target: Path) -> bool:
@@ -225,7 +225,7 @@ def is_file(target: Path) -> bool:
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix that names a form; the last one, unless the last two are known."""
+    """Return the suffix of the format: the last two suffixes if they are known, else the last."""
     both = "".join(path.suffixes[-2:]).lower()
     return both if both in SUFFIXES else path.suffix.lower()
 
