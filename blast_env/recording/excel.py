@@ -31,25 +31,25 @@ from blast_env.values import path_of
 SUFFIX: Final = ".xlsx"
 
 EXCEL_ROWS: Final = 1_048_576
-"""The most rows that Excel's format allows on a sheet."""
+"""The most rows on a sheet that Excel's format allows."""
 
 LONGEST_VALUE: Final = 400
-"""The most characters of the run record in one cell; the rest goes on in the next row."""
+"""The most characters of the run record in one cell; the rest follows in the next row."""
 
 MOST_PRINTED_ROWS: Final = 400
-"""The most rows of a sheet that are printed, some ten pages; the print area can be lifted."""
+"""The most rows in the print area of a sheet, some ten pages; it can be removed."""
 
 CHARTED_MODULES: Final = 30
-"""The most bars of a chart; the labels of more cannot be read."""
+"""The most bars of a chart; labels of more are not readable."""
 
 _OPTIONS: Final[Mapping[str, bool]] = MappingProxyType(
     {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
 )
-"""A name of the user's that begins with = is a text, and no formula."""
+"""Keeps a user's name that begins with = a text, not a formula."""
 
 _CREATED: Final = datetime(2000, 1, 1)
 _EXACT_INTEGER: Final = 10**15  # Excel rounds greater ones
-_BUTTON: Final = 4  # characters that the button of the filter takes
+_BUTTON: Final = 4  # width of the button of the filter, in characters
 _RECORD_WIDTH: Final = 44  # characters of a column of the run record
 _ROW_HEIGHT: Final = 15  # points
 
@@ -85,12 +85,12 @@ _LABEL_COLUMNS: Final = tuple(
 _WIDTH: Final = 640  # pixels
 _HEIGHT_WITHOUT_BARS: Final = 150
 _BAR_HEIGHT: Final = 19
-_FEWEST_BARS: Final = 10  # what the height is at least made for; the axis's title needs it
+_FEWEST_BARS: Final = 10  # least bars for the height of a chart; the title of the axis needs it
 _COLOURS: Final = ("#7A042E", "#F08030", "#2F6690", "#5B8E7D", "#8E7DBE", "#8A8A8A")
 
 
 class SheetTable(NamedTuple):
-    """A table for a sheet of its own, with what its columns mean."""
+    """A table for one sheet, with the meanings of its columns."""
 
     name: str
     table: pd.DataFrame
@@ -103,20 +103,20 @@ def write_workbook(
     """Write a workbook with the run record, the tables and charts of the impulse per module.
 
     Its sheets are `Run` (with the charts), `Structures`, `Modules`, `Collisions`, `Most loaded`
-    (what the charts show) and `Columns`, which explains every column. A table that is too long
-    for one sheet goes on in `Collisions 2` and so on. The file is written whole or not at all,
-    and two workbooks of the same blast are the same to the last byte.
+    (the data of the charts) and `Columns`, which explains every column. A table too long for one
+    sheet continues in `Collisions 2` and so on. The file is written whole or not at all, and two
+    workbooks of the same blast are identical to the last byte.
 
     Args:
         blast: The blast.
         path: The file, with the suffix `.xlsx`; an existing one is replaced.
-        max_rows_per_sheet: The most rows that a table has on one sheet, its header included.
+        max_rows_per_sheet: The most rows of a table on one sheet, its header included.
 
     Returns:
         The path.
 
     Raises:
-        BlastEnvError: If the suffix is another one or the file cannot be written there.
+        BlastEnvError: If the suffix is wrong or the file cannot be written there.
         ValueError: If `max_rows_per_sheet` is less than 2 or more than Excel allows.
     """
     if not 2 <= max_rows_per_sheet <= EXCEL_ROWS:
@@ -146,19 +146,20 @@ def write_tables(
 ) -> Path:
     """Write a workbook with a run record and tables, and a sheet that explains their columns.
 
-    As `write_workbook`: whole or not at all, and the same to the last byte for the same content.
+    As with `write_workbook`, the file is written whole or not at all, and is identical to the last
+    byte for the same content.
 
     Args:
-        record: What was run, with the version of the package.
+        record: The run record, with the version of the package.
         tables: The tables.
         path: The file.
-        title: Of the file; of a blast unless given.
+        title: Title of the file; by default that of a blast.
 
     Returns:
         The path.
 
     Raises:
-        BlastEnvError: If the suffix is another one or the file cannot be written there.
+        BlastEnvError: If the suffix is wrong or the file cannot be written there.
     """
     title = title or f"Blast {record['scenario']}, engine {record['engine']}"
     with _workbook(path, record, title) as writer:
@@ -171,15 +172,15 @@ def write_tables(
 
 @contextmanager
 def _workbook(path: str | Path, record: RunRecord, title: str) -> Iterator[Any]:
-    """Give a writer of an empty workbook that becomes the file when the block ends well."""
+    """Yield a writer of an empty workbook, which becomes the file if the block succeeds."""
     path = path_of(path)
     if path.suffix.lower() != SUFFIX:
         raise BlastEnvError(f"{path}: has the suffix {path.suffix!r}, must have {SUFFIX!r}")
     digest = f", digest {record['digest']}" if "digest" in record else ""
-    # XlsxWriter's own scratch files would stay if it failed.
+    # XlsxWriter would leave its scratch files after a failure.
     with write_atomically(path) as temporary, scratch_folder() as scratch:
         options = {**_OPTIONS, "tmpdir": str(scratch), "use_zip64": True}
-        # In memory first: where a device is full, the archive would try again when it is collected.
+        # In memory first: on a full device, the archive would try again at garbage collection.
         content = BytesIO()
         try:
             with pd.ExcelWriter(
@@ -202,8 +203,8 @@ class _Sheets:
     """Adds sheets with frozen headings to a workbook.
 
     Args:
-        writer: Of an empty workbook.
-        max_rows: The most rows that a table has on one sheet, its header included.
+        writer: Writer of an empty workbook.
+        max_rows: The most rows of a table on one sheet, its header included.
     """
 
     def __init__(self, writer: Any, max_rows: int) -> None:
@@ -215,7 +216,7 @@ class _Sheets:
         self._number_heading = writer.book.add_format(heading | {"align": "right", "indent": 0})
 
     def add(self, part: SheetTable) -> None:
-        """Add a table, on several sheets where it is too long for one."""
+        """Add a table, on several sheets if it is too long for one."""
         per_sheet = self._max_rows - 1
         for number, start in enumerate(range(0, max(len(part.table), 1), per_sheet), start=1):
             name = part.name if number == 1 else f"{part.name} {number}"
@@ -256,7 +257,7 @@ class _Sheets:
         for index, heading in enumerate(("quantity", "value")):
             sheet.write_string(0, index, heading, self._text_heading)
         for row, (_, line) in enumerate(pairs, start=1):
-            # Set, not left to the program: the charts beside are placed by it.
+            # Set here, not by the viewing program: it determines the place of the charts beside.
             lines = textwrap.wrap(str(line), _RECORD_WIDTH - 2)
             sheet.set_row(row, _ROW_HEIGHT * max(1, len(lines)))
 
@@ -273,7 +274,7 @@ class _Sheets:
         return sheet
 
     def _format(self, number_format: str) -> Any:
-        # The indent keeps a text off the number on its left.
+        # The indent separates a text from the number on its left.
         indent = {"align": "left", "indent": 1} if number_format == "@" else {}
         style = {"num_format": number_format, "valign": "top"} | indent
         return self._writer.book.add_format(style)
@@ -289,16 +290,16 @@ def header(column: Column) -> str:
 
 
 def readable(values: "pd.Series[Any]") -> "pd.Series[Any]":
-    """Return the values with words for booleans; programs differ in how they show those."""
+    """Return the values with words for booleans, which programs show in different ways."""
     if types.is_bool_dtype(values):
         return values.map({True: "yes", False: "no"}).astype("str")
     return values
 
 
 def record_cells(value: str | int | float) -> list[str | int | float]:
-    """Return a value of the run record as it can stand in cells, one below the other.
+    """Return the contents of the cells, one below the other, for a value of the run record.
 
-    Nothing is cut or rounded: long texts take several cells, great integers become texts.
+    Nothing is cut or rounded: long texts take several cells, large integers become texts.
     """
     if isinstance(value, bool):
         return ["yes" if value else "no"]
@@ -310,14 +311,14 @@ def record_cells(value: str | int | float) -> list[str | int | float]:
 
 
 def _number_format(values: "pd.Series[Any]", unit: str) -> str:
-    """Return how values of a unit are shown, in Excel's notation; "@" for texts."""
+    """Return the number format for values of a unit, in Excel's notation; "@" for texts."""
     if types.is_float_dtype(values):
         return _NUMBER_FORMATS.get(unit, "0.000")
     return "0" if types.is_integer_dtype(values) else "@"
 
 
 def _values_width(values: "pd.Series[Any]", number_format: str) -> int:
-    """Return the characters that the longest value takes."""
+    """Return the number of characters of the longest value."""
     present = values.dropna()
     if present.empty:
         return 0
@@ -328,7 +329,7 @@ def _values_width(values: "pd.Series[Any]", number_format: str) -> int:
 
 
 def _heading_width(text: str) -> int:
-    """Return the fewest characters in which a heading takes two lines and no unit is broken."""
+    """Return the fewest characters for a heading of at most two lines with its unit unbroken."""
     unit = text[text.find("(") :] if "(" in text else ""
     width = max(len(word) for word in text.split())
     while True:
@@ -339,7 +340,7 @@ def _heading_width(text: str) -> int:
 
 
 def _explanations(tables: Sequence[SheetTable], units: Sequence[tuple[str, str]]) -> SheetTable:
-    """Return what every column and every unit means, as a table of its own."""
+    """Return a table of the meanings of every column and every unit."""
     rows = [
         (each.name, header(column), column.unit, column.meaning)
         for each in tables
@@ -363,14 +364,14 @@ class Ranking(NamedTuple):
 
 
 class ChartData(NamedTuple):
-    """What the charts of a workbook show.
+    """The data of the charts of a workbook.
 
     Attributes:
-        label: What the bars are, with the unit.
-        rankings: One a chart.
+        label: The quantity of the bars, with its unit.
+        rankings: One per chart.
         structures: The structures of the ranked modules, as the legend names them.
         columns: The columns of the table; the last ones belong to the structures.
-        table: One row a module, chart after chart; its impulse is in its structure's column.
+        table: One row per module, chart after chart; its impulse is in its structure's column.
     """
 
     label: str
@@ -381,11 +382,11 @@ class ChartData(NamedTuple):
 
 
 def chart_data(blast: RecordedBlast) -> ChartData:
-    """Return what there is to chart of a blast."""
+    """Return the data of the charts of a blast."""
     rankings = tuple(_rankings(blast))
-    # The empty head gives the columns when nothing was hit.
+    # The empty head provides the columns if nothing was hit.
     ranked = pd.concat([blast.modules.head(0), *(ranking.modules for ranking in rankings)])
-    # In the order of the scenario, so that the colours do not depend on who is hit most.
+    # In the order of the scenario, so that the colours do not depend on the loads.
     present = blast.structures["structure"].isin(ranked["structure"])
     structures = tuple(blast.structures.loc[present, "structure"])
     unit = blast.load_unit
@@ -404,7 +405,7 @@ def chart_data(blast: RecordedBlast) -> ChartData:
 
 
 def _names(structures: Sequence[str], unit: LoadUnit) -> tuple[str, ...]:
-    """Return what structures are called in the legend: with their loads, where known."""
+    """Return the names of structures in the legend, with their loads if known."""
     loads = (unit.of_structures.get(structure) for structure in structures)
     return tuple(
         structure if load is None else f"{structure}: {load.scaled.pa_s:,.1f} Pa s"
@@ -416,9 +417,9 @@ def add_charts(workbook: Any, sheet: Any, data: ChartData) -> None:
     """Put the charts onto the sheet of the run record, or a note that there is nothing to chart.
 
     Args:
-        workbook: The workbook, which has the table of `data` on a sheet of its own.
-        sheet: The sheet that the charts are put onto, side by side.
-        data: What to show.
+        workbook: The workbook, which has the table of `data` on another sheet.
+        sheet: The sheet for the charts, side by side.
+        data: The data of the charts.
     """
     if not data.rankings:
         options = {"x_offset": 20, "height": 40}
@@ -434,7 +435,7 @@ def add_charts(workbook: Any, sheet: Any, data: ChartData) -> None:
 
 
 def _rankings(blast: RecordedBlast) -> Iterator[Ranking]:
-    """Yield a ranking of the protected structures and one of the barrier, as far as hit."""
+    """Yield a ranking of the protected structures and one of the barrier, if they were hit."""
     structures = blast.structures
     is_barrier = structures["structure"] == BARRIER_NAME
     protected = structures["protected"] & ~is_barrier
@@ -453,14 +454,14 @@ def _ranking(name: str, hit: pd.DataFrame, unit: LoadUnit) -> Ranking:
     ranked = hit.sort_values("impulse_sim", ascending=False, kind="stable")
     top = ranked.head(CHARTED_MODULES)
     which = "" if len(top) == len(hit) else f"the {len(top)} most loaded of "
-    # In Pa s there is no sum over structures; the legend has the load on each.
+    # Loads in Pa s have no sum over structures; the legend gives the load on each.
     total = "" if unit.is_calibrated else f": {hit['impulse_sim'].sum():,.0f} (sim)"
     modules = "module" if len(hit) == 1 else "modules"
     return Ranking(f"Impulse on the {name}{total}, {which}{len(hit)} {modules} hit", top)
 
 
 def _add_series(chart: Any, data: ChartData, rows: slice) -> None:
-    """Add one series a structure, for some rows of the table."""
+    """Add one series per structure, for some rows of the table."""
     part = data.table.iloc[rows]
     first, last = rows.start + 1, rows.stop  # on the sheet, below the headings
     label = data.columns.index(_LABEL_COLUMNS[0])

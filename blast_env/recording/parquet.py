@@ -36,7 +36,7 @@ def write_parquet(blast: RecordedBlast, path: str | Path) -> Path:
         The path.
 
     Raises:
-        BlastEnvError: If the suffix is another one or the file cannot be written there.
+        BlastEnvError: If the suffix is wrong or the file cannot be written there.
     """
     return write_table(blast.collisions, COLLISION_COLUMNS, blast.run_record, path)
 
@@ -56,7 +56,7 @@ def write_table(
         The path.
 
     Raises:
-        BlastEnvError: If the suffix is another one or the file cannot be written there.
+        BlastEnvError: If the suffix is wrong or the file cannot be written there.
     """
     path = path_of(path)
     if path.suffix.lower() != SUFFIX:
@@ -80,8 +80,7 @@ def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         The collision table and the run record.
 
     Raises:
-        BlastEnvError: If there is no such file, if it is damaged or no Parquet, or if something
-            else wrote it.
+        BlastEnvError: If the file is missing, damaged or no Parquet, or has no run record.
     """
     path = path_of(path)
     frame, metadata = _read(path)
@@ -96,7 +95,7 @@ def read_frame(path: Path, columns: Sequence[str]) -> pd.DataFrame:
         columns: The names of its columns.
 
     Raises:
-        BlastEnvError: If there is no such file, if it is damaged, no Parquet, or another table.
+        BlastEnvError: If the file is missing, damaged or no Parquet, or holds another table.
     """
     frame, _ = _read(path)
     if list(frame.columns) != list(columns):
@@ -109,10 +108,10 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[bytes, bytes]]:
     if not path.is_file():
         raise BlastEnvError(f"{path}: there is no such file")
     try:
-        # Not read_table: it takes the folder's name for a partition, "seed=3" for a column.
+        # Not read_table: it reads a folder named "seed=3" as a partition, and adds a column.
         with pq.ParquetFile(path) as file:
             table = file.read()
-        # What pandas says of itself in there is not needed, and not checked when it is read.
+        # The metadata of pandas in the file are not needed, and would not be checked.
         return table.to_pandas(ignore_metadata=True), table.schema.metadata or {}
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = shortened(str(error), 300)

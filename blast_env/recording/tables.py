@@ -16,31 +16,31 @@ from blast_env.tables import Column, as_types, texts
 Columns = tuple[Column, ...]
 
 RunRecord = dict[str, str | int | float]
-"""What was run, with which versions, and how it ended; names and plain values."""
+"""The scenario, parameters, versions and end of a run, as names and plain values."""
 
 
 class RecordedBlast(Protocol):
-    """What is written of a blast: its tables, and what repeats it."""
+    """The written part of a blast: its tables, and the record to repeat it."""
 
     @property
     def collisions(self) -> pd.DataFrame:
-        """One row a collision; the columns are `COLLISION_COLUMNS`."""
+        """One row per collision; the columns are `COLLISION_COLUMNS`."""
 
     @property
     def modules(self) -> pd.DataFrame:
-        """One row a module; the columns are `MODULE_COLUMNS`."""
+        """One row per module; the columns are `MODULE_COLUMNS`."""
 
     @property
     def structures(self) -> pd.DataFrame:
-        """One row a structure; the columns are `STRUCTURE_COLUMNS`."""
+        """One row per structure; the columns are `STRUCTURE_COLUMNS`."""
 
     @property
     def load_unit(self) -> LoadUnit:
-        """The unit of the loads: Pa s where a calibration gives them."""
+        """The unit of the loads: Pa s with a calibration, else simulation units."""
 
     @property
     def run_record(self) -> RunRecord:
-        """What was run, with which versions, and how it ended."""
+        """The record of the run, see `RunRecord`."""
 
 
 COLLISION_COLUMNS: Final = (
@@ -140,11 +140,11 @@ def modules_in_pa_s(modules: pd.DataFrame, unit: LoadUnit) -> tuple[pd.DataFrame
 def collision_table(
     collisions: CollisionArray, obstacles: Sequence[ModularObstacle]
 ) -> pd.DataFrame:
-    """Return one row a collision, in the order of time; see `COLLISION_COLUMNS`.
+    """Return one row per collision, in the order of time; see `COLLISION_COLUMNS`.
 
     Args:
         collisions: Records of `COLLISION_DTYPE` (n,).
-        obstacles: The obstacles of the blast, whose modules the records count through.
+        obstacles: The obstacles of the blast, whose modules the records number in this order.
     """
     parts = [part for obstacle in obstacles for part in obstacle.parts]
     module_ids = np.array([part.module_id for part in parts], dtype=object)
@@ -152,7 +152,7 @@ def collision_table(
     angle = incidence_angle_rad(collisions)
     vx: FloatArray = collisions["vx"]
     vy: FloatArray = collisions["vy"]
-    module: Any = collisions["module"]  # as what it is, it takes mypy seconds to index with
+    module: Any = collisions["module"]  # with its exact type, mypy takes seconds for the indexing
     values: dict[str, Any] = {
         "time_s": collisions["time_s"],
         "particle_type": [CollisionType(kind).name for kind in collisions["kind"]],
@@ -177,7 +177,7 @@ def collision_table(
 
 
 def faces_hit(collisions: pd.DataFrame) -> pd.Series:
-    """Return the facade (n,) that each collision hit, told by its normal.
+    """Return the facade (n,) that each collision hit, from its normal.
 
     Args:
         collisions: A collision table.
@@ -190,7 +190,7 @@ def faces_hit(collisions: pd.DataFrame) -> pd.Series:
 
 
 def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
-    """Return one row a module; see `MODULE_COLUMNS`."""
+    """Return one row per module; see `MODULE_COLUMNS`."""
     rows = [
         (
             part.module_id,
@@ -213,7 +213,7 @@ def module_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
 
 
 def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
-    """Return one row a structure; see `STRUCTURE_COLUMNS`."""
+    """Return one row per structure; see `STRUCTURE_COLUMNS`."""
     rows = [
         (
             obstacle.name,
@@ -234,12 +234,12 @@ def structure_table(obstacles: Sequence[ModularObstacle]) -> pd.DataFrame:
 
 
 def building_table(structures: pd.DataFrame, buildings: Mapping[str, str]) -> pd.DataFrame:
-    """Return one row a building; see `BUILDING_COLUMNS`.
+    """Return one row per building; see `BUILDING_COLUMNS`.
 
     Args:
         structures: The structure table of a blast.
-        buildings: The building that a structure is part of, by its name; what is not there, as the
-            barrier, is one of its own.
+        buildings: The building of each structure, by its name; a structure without an entry, as
+            the barrier, is a separate building.
     """
     together = dict.fromkeys(("modules", "hits", "modules_destroyed", "weight"), "sum")
     together |= {"impulse_sim": "sum", "transferred_impulse_sim": "sum"}
