@@ -97,7 +97,7 @@ _QUANTITIES: Final[tuple[Quantity, ...]] = ("peak", "impulse")
 
 
 def warm_engines() -> None:
-    """Load the compiled code of the engines, so that the next blasts start at once."""
+    """Run one small blast of particles, so that the compiled code is loaded for the next."""
     scenario = load_scenario("courtyard")
     Blast(scenario, (), 0, "event").run()
     GasEngine()

@@ -162,7 +162,7 @@ def value_of(section: Document, field: FormField) -> Any:
 
 
 def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]:
-    """Return the values for `edits.with_values` from the text of a field."""
+    """Return the values for `edits.with_values` from the input in a field."""
     value = _of_form(field, typed)
     if field.part is not None:
         coordinates = [*section[field.key]]
