@@ -213,7 +213,7 @@ def _site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
     return SiteCost(
         site=scenario.name,
         cells=engine.cells,
-        told=result.run.told,
+        told=result.run.cost,
         steps=result.steps,
         cell_updates=result.run.solver.cell_updates,
         cpu_s=cpu_s,

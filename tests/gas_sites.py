@@ -2,6 +2,9 @@
 
 from typing import Any
 
+import pandas as pd
+
+from blast_env.engines.gas import GasResult
 from blast_env.scenario import Scenario
 
 WALL = tuple((row, 0) for row in range(6))
@@ -57,3 +60,10 @@ def glazed_hut() -> Scenario:
         "wall": "brick_215",
     }
     return Scenario.from_document(document, "glazed_hut")
+
+
+def net_on_modules(result: GasResult) -> pd.DataFrame:
+    """Return the modules of a blast with their running impulses at its end, `net_pa_s`."""
+    keys = ["structure", "module_id", "face"]
+    by_module = result.faces.groupby(keys)["net_impulse_pa_s"].mean()
+    return result.modules.join(by_module.rename("net_pa_s"), on=keys)

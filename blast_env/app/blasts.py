@@ -241,8 +241,8 @@ def _gas(
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
     notes += [*result.stepped_notes, *result.gauge_notes]
     return {
-        "loads": _gas_loads(result),
-        "buildings": tuple(_buildings(result)),
+        "loads": gas_loads(result),
+        "buildings": tuple(building_loads(result)),
         "notes": tuple(dict.fromkeys(notes)),
         "unchecked": (
             *unchecked(scenario, result),
@@ -299,32 +299,31 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
             yield Picture(file=name, label=f"{quantity} on the walls of {building}")
 
 
-def _gas_loads(result: GasResult) -> tuple[Load, ...]:
+def gas_loads(result: GasResult) -> tuple[Load, ...]:
+    """Return the load on the protected buildings together, then those on each structure."""
+    found = result.loads()
     rows = result.structures.to_dict("records")
-    loads = [_load(str(row["structure"]), row) for row in rows]
-    weights = [float(row["weight"]) for row in rows]
-    counted = [
-        (each, weight) for each, weight in zip(loads, weights, strict=True) if each.protected
-    ]
     together = Load(
         structure="",
         protected=True,
-        impulse_pa_s=sum(weight * each.impulse_pa_s for each, weight in counted),
-        peak_kpa=max(each.peak_kpa for each, _ in counted),
+        impulse_pa_s=found.protected_impulse_pa_s,
+        peak_kpa=found.protected_peak_pa / PA_PER_KPA,
     )
-    return (together, *loads)
+    return (together, *(_load(str(row["structure"]), row) for row in rows))
 
 
 def _load(name: str, row: Mapping[Hashable, Any]) -> Load:
     return Load(
         structure=name,
         protected=bool(row["protected"]),
-        impulse_pa_s=float(row["positive_impulse_pa_s"]),
+        impulse_pa_s=float(row["impulse_pa_s"]),
         peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
+        area_m2=float(row["area_m2"]),
     )
 
 
-def _buildings(result: GasResult) -> Iterator[Load]:
+def building_loads(result: GasResult) -> Iterator[Load]:
+    """Yield the loads on the buildings of several structures."""
     sizes = Counter(each.building_name for each in result.blast.scenario.structures)
     for row in result.buildings.to_dict("records"):
         if sizes[row["building"]] > 1:
@@ -340,7 +339,7 @@ def _waves(result: GasResult) -> Iterator[Wave]:
         yield Wave(
             gauge=str(row["name"]),
             peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
-            impulse_pa_s=float(row["positive_impulse_pa_s"]),
+            impulse_pa_s=float(row["impulse_pa_s"]),
             time_ms=tuple(np.round(time_ms[chosen], 4).tolist()),
             overpressure_kpa=tuple(np.round(kpa[chosen], 4).tolist()),
         )

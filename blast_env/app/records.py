@@ -1,8 +1,8 @@
 """The record of a blast, and the table that compares layouts."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from math import nan
 from pathlib import Path
@@ -13,7 +13,12 @@ from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import read_text
 from blast_env.engines import Engine, find_engine
-from blast_env.engines.contract import CALIBRATED_ENGINES
+from blast_env.engines.contract import (
+    CALIBRATED_ENGINES,
+    BlastLoads,
+    StructureLoad,
+    counted_parts,
+)
 from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
@@ -92,6 +97,7 @@ class Load(Kept):
         low_pa_s: Lower end of its 95 % interval; NaN without noise.
         high_pa_s: Upper end.
         peak_kpa: Largest overpressure, kPa; NaN with particles.
+        area_m2: Area of the walls that count; `None` with particles.
     """
 
     structure: str
@@ -100,6 +106,7 @@ class Load(Kept):
     low_pa_s: float = nan
     high_pa_s: float = nan
     peak_kpa: float = nan
+    area_m2: float | None = None
 
 
 class Wave(Kept):
@@ -108,7 +115,7 @@ class Wave(Kept):
     Attributes:
         gauge: Its name.
         peak_kpa: Largest overpressure.
-        impulse_pa_s: Of all positive phases.
+        impulse_pa_s: Peak specific impulse.
         time_ms: Times of the thinned history.
         overpressure_kpa: Overpressure at these times.
     """
@@ -313,23 +320,34 @@ class LoadJudge:
         """The objective of the site."""
         return self.scenario.objective
 
-    def counted(self, record: BlastRecord, load: Load) -> float:
-        """Return the counted load of a structure, or of all protected ones, in its unit.
+    def counted(self, record: BlastRecord, loads: Iterable[Load]) -> float:
+        """Return the load that counts of some structures together, in its unit.
 
-        NaN where a peak counts and the engine has none.
+        NaN where a peak counts and the engine knows none.
+
+        Args:
+            record: The blast.
+            loads: Loads on structures: of them, the protected ones count, or else all; or the load
+                on all protected ones together.
         """
-        if not load.structure:
-            own = {each.name for each in self.scenario.structures if each.protected}
-            return sum(self.counted(record, each) for each in record.loads if each.structure in own)
-        structure = next(each for each in self.scenario.structures if each.name == load.structure)
-        peak_pa = PA_PER_KPA * load.peak_kpa if self.objective.needs_peaks else 0.0
-        return self.objective.load(
-            load.impulse_pa_s, peak_pa, structure.weight, structure.counted_peak_weight
-        )
+        chosen = {each.structure for each in loads}
+        every = {each.structure: each for each in record.loads}
+        parts = [
+            StructureLoad.on(
+                each,
+                load.impulse_pa_s,
+                PA_PER_KPA * load.peak_kpa if self.objective.needs_peaks else 0.0,
+                area_m2=load.area_m2,
+            )
+            for each in self.scenario.structures
+            if (each.name in chosen or "" in chosen) and (load := every.get(each.name)) is not None
+        ]
+        counted = [replace(each, protected=True) for each in counted_parts(parts)]
+        return BlastLoads(tuple(counted), np.zeros(0)).load(self.objective)
 
     def together(self, record: BlastRecord) -> float:
-        """Return the counted load of all protected structures."""
-        return self.counted(record, record.loads[0])
+        """Return the load that counts of all protected structures."""
+        return self.counted(record, record.loads[:1])
 
     def text(self, load: float) -> str:
         """Return a counted load with its unit; a dash for NaN."""
@@ -357,10 +375,10 @@ def comparison(
         unprotected = bare.get(record.threat)
         without = {each.structure: each for each in _loads_of(unprotected)}
         for load, parts in _shown(record, scenario):
-            counted, share = sum(judge.counted(record, each) for each in parts), nan
+            counted, share = judge.counted(record, parts), nan
             if unprotected is not None and without and record.layout:
                 bare_parts = [without[each.structure] for each in parts]
-                bare_load = sum(judge.counted(unprotected, each) for each in bare_parts)
+                bare_load = judge.counted(unprotected, bare_parts)
                 share = reductions(counted, bare_load).item()
             rows.append(
                 Row(

@@ -53,7 +53,7 @@ CELLS_HELP: Final = (
     "for search; fine: later, for final statements."
 )
 UNTIL_HELP: Final = (
-    "What a blast of gas dynamics waits for. structures: those protected; walls: all; "
+    "Loads that a blast of gas dynamics waits for. structures: those protected; walls: all; "
     "gauges; or a number of seconds."
 )
 TARGET_HELP: Final = "Level of protection to reach, else the scenario's, else {}."

@@ -366,7 +366,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     """A blast of gas dynamics."""
 
     headers = (
-        *("building", "protected", "impulse (Pa s)", "to come (Pa s)", "first phase (Pa s)"),
+        *("building", "protected", "impulse (Pa s)", "captured"),
         *("peak (kPa)", "arrival (ms)", "most loaded wall", "roof (Pa s)"),
     )
 
@@ -466,9 +466,8 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
             (
                 each["building"],
                 "yes" if each["protected"] else "no",
-                f"{'' if in_range[each['building']] else '~'}{each['positive_impulse_pa_s']:,.0f}",
-                _to_come_text(each),
-                f"{each['first_impulse_pa_s']:,.0f}",
+                f"{'' if in_range[each['building']] else '~'}{each['impulse_pa_s']:,.0f}",
+                _known_text(each),
                 f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
                 _number(MS_PER_S * each["arrival_s"], ".1f"),
                 f"{each['most_loaded_face']} {each['most_loaded_pa_s']:,.0f}",
@@ -513,21 +512,19 @@ def _print_gauges(gauges: "pd.DataFrame") -> None:
         return
     table = ResultTable(
         "gauges",
-        ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)", "to come (Pa s)"),
+        ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)", "captured"),
         1,
     )
     for row in gauges.to_dict("records"):
         places = (f"{row[axis]:.2f}" for axis in ("x_m", "y_m", "z_m"))
-        peak, impulse = row["peak_pa"] / PA_PER_KPA, row["positive_impulse_pa_s"]
-        table.add_row(row["name"], *places, f"{peak:,.1f}", f"{impulse:,.0f}", _to_come_text(row))
+        peak, impulse = row["peak_pa"] / PA_PER_KPA, row["impulse_pa_s"]
+        table.add_row(row["name"], *places, f"{peak:,.1f}", f"{impulse:,.0f}", _known_text(row))
     result_console().print(table)
 
 
-def _to_come_text(row: Mapping[Any, Any]) -> str:
-    """Return an estimate of the impulse still to come, Pa s; `?` if some waves are yet to come."""
-    if row["complete"]:
-        return "complete"
-    return "?" if isnan(row["to_come_pa_s"]) else f"{row['to_come_pa_s']:,.1f}"
+def _known_text(row: Mapping[Any, Any]) -> str:
+    """Return whether an impulse was captured when the run ended."""
+    return "yes" if row["known"] else "not yet"
 
 
 def _number(value: float, form: str) -> str:

@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.gas_tables import TAIL_COLUMNS
+from blast_env.engines.gas_tables import KNOWN_COLUMN
 from blast_env.engines.oblique_walls import ObliqueLoads
 from blast_env.errors import UnknownNameError
-from blast_env.physics.gas.settings import FACE_NAMES, is_complete, still_to_come
+from blast_env.physics.gas.ending import is_known
+from blast_env.physics.gas.settings import FACE_NAMES
 from blast_env.physics.scene import StructureOutline
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
 from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
 from blast_env.response.glass import GlazingCondition
+from blast_env.response.sdof import impulses
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -37,7 +39,7 @@ BAY_COLUMNS: Final = (
     Column("number", "", "counted from 1 along the wall, from west or from south"),
     Column("area_m2", "m2", "area of the bay"),
     Column("peak_pa", "Pa", "largest mean overpressure on the bay"),
-    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases of that mean"),
+    Column("impulse_pa_s", "Pa s", "peak specific impulse of that mean"),
     Column("panes", "", "panes in the bay"),
     Column("break_probability", "", "share of such panes that break"),
     Column("condition", "", "performance condition of glazing, GSA: 1, 2, 3a, 3b, 4, 5"),
@@ -48,20 +50,8 @@ BAY_COLUMNS: Final = (
 )
 """A row a bay; what a bay does not have is empty."""
 
-LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, *TAIL_COLUMNS)
-"""A row a bay of a blast, with what is still to come."""
-
-
-class BayTail(NamedTuple):
-    """How much of the impulse on a bay is still to come.
-
-    Attributes:
-        to_come_pa_s: About that; NaN if not all waves have come.
-        complete: Whether it is at most 2 %.
-    """
-
-    to_come_pa_s: float = np.nan
-    complete: bool = False
+LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN)
+"""A row a bay of a blast."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +106,7 @@ class BayLoads:
     @cached_property
     def response(self) -> FacadeResponse:
         """What becomes of the bays."""
-        return respond(self.bays, *self._histories)
+        return respond(self.bays, *self.histories)
 
     def damages(
         self, alternatives: Sequence[Alternatives], peak_factor: float
@@ -129,10 +119,10 @@ class BayLoads:
         """
         by_name = {each.name: each for each in alternatives}
         own = [by_name[each.bay.name] for each in self.bays]
-        return bay_damages(own, *self._histories, peak_factor) if own else ()
+        return bay_damages(own, *self.histories, peak_factor) if own else ()
 
     @property
-    def _histories(self) -> tuple[FloatArray, FloatArray]:
+    def histories(self) -> tuple[FloatArray, FloatArray]:
         """Times, two or more however soon a run ended, and overpressures at them (bays, times)."""
         time_s, step_s = self.recorder.time_s, self.recorder.step_s
         history_pa = self.history_pa.astype(np.float64)
@@ -164,35 +154,24 @@ class BayLoads:
         """
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
-        tails = self.tails(run)
-        rows = [row | tails[str(row["bay"])]._asdict() for row in bay_rows(self.response)]
+        known = self.known(run)
+        rows = [row | {"known": known[str(row["bay"])]} for row in bay_rows(self.response)]
         return table_of(rows, LOADED_BAY_COLUMNS)
 
-    def tails(self, run: "GasRun") -> dict[str, BayTail]:
-        """Return how much of its impulse is still to come to each bay, by name.
+    def known(self, run: "GasRun") -> dict[str, bool]:
+        """Return whether the load of each bay is known, by its name.
 
         Args:
             run: The run that has recorded them.
         """
         names = [each.name for each in run.site.structures]
-        passed = {name: run.has_passed(index) for index, name in enumerate(names)}
-        (middle_s, first_s), time_s = run.tail.since_s, self.response.time_s
-        tails = {}
-        for filled, pressure in zip(self.bays, self.response.pressure_pa, strict=True):
-            positive = np.maximum(pressure, 0.0)
-            impulse_pa_s, last, before = (
-                float(np.trapezoid(np.where(part, positive, 0.0), time_s))
-                for part in (
-                    time_s >= 0.0,
-                    time_s > middle_s,
-                    (time_s > first_s) & (time_s <= middle_s),
-                )
-            )
-            to_come_pa_s = float(still_to_come(last, before))
-            to_come_pa_s = to_come_pa_s if passed[filled.bay.structure] else np.nan
-            complete = bool(is_complete(impulse_pa_s, to_come_pa_s))
-            tails[filled.bay.name] = BayTail(to_come_pa_s, complete)
-        return tails
+        come = {name: run.has_come(index) for index, name in enumerate(names)}
+        net = impulses(self.response.time_s, self.response.pressure_pa)
+        known = is_known(net.max(axis=1, initial=0.0), net[:, -1])
+        return {
+            filled.bay.name: come[filled.bay.structure] and is_one
+            for filled, is_one in zip(self.bays, known.tolist(), strict=True)
+        }
 
 
 class UnjudgedWalls(NamedTuple):
@@ -269,7 +248,7 @@ def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
             "number": bay.number,
             "area_m2": bay.area_m2,
             "peak_pa": pressure.max(),
-            "positive_impulse_pa_s": np.trapezoid(np.maximum(pressure, 0.0), found.time_s),
+            "impulse_pa_s": impulses(found.time_s, pressure).max(),
             "panes": filled.panes,
             "break_probability": np.nan,
             "condition": "",

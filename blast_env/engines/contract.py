@@ -16,11 +16,12 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blast_env.arrays import FloatArray
 from blast_env.calibration.model import Calibration
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
 from blast_env.geometry import Element
@@ -46,11 +47,14 @@ class StructureLoad:
         weight: How much it counts among the protected structures.
         impulse_sim: Sum of m |v| over the collisions, simulation units.
         transferred_impulse_sim: Momentum really transferred, simulation units.
-        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s.
+        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; by gas
+            dynamics the peak specific impulse, as a mean over the walls that count.
         peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which know none.
         peak_weight: How much that counts among the protected structures.
         in_range: Whether the calibration was made for this distance and charge.
         notes: Why not, a sentence each.
+        building: The building that it is part of; its own name where it is one by itself.
+        area_m2: Area of the walls that count; `None` where the engine knows none.
         response: What counts of the response of its bays, where the objective counts that.
         worst_damage: The largest damage of its bays, where that counts.
     """
@@ -65,6 +69,8 @@ class StructureLoad:
     peak_weight: float
     in_range: bool
     notes: tuple[str, ...]
+    building: str
+    area_m2: float | None = None
     response: float | None = None
     worst_damage: float | None = None
 
@@ -76,6 +82,7 @@ class StructureLoad:
         peak_pa: float | None = None,
         in_range: bool = False,
         notes: tuple[str, ...] = (),
+        area_m2: float | None = None,
     ) -> Self:
         """Return the load on a structure of a scenario by an engine without simulation units.
 
@@ -85,6 +92,7 @@ class StructureLoad:
             peak_pa: Largest overpressure on its walls, Pa.
             in_range: Whether the engine was checked for this distance and charge.
             notes: Why not, a sentence each.
+            area_m2: Area of the walls that count.
         """
         return cls(
             name=structure.name,
@@ -97,7 +105,67 @@ class StructureLoad:
             peak_weight=structure.counted_peak_weight,
             in_range=in_range,
             notes=notes,
+            building=structure.building_name,
+            area_m2=area_m2,
         )
+
+
+class _Part(Protocol):
+    @property
+    def protected(self) -> bool: ...
+
+
+AnyPart = TypeVar("AnyPart", bound=_Part)
+
+
+def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
+    """Return the parts of a building whose loads are its load: those protected, or else all."""
+    return [each for each in parts if each.protected] or parts
+
+
+def mean_over_area(load: FloatArray, area: FloatArray) -> float:
+    """Return the load of a wall, structure or building: the mean over its area; NaN without any.
+
+    Args:
+        load: Loads on its parts (n,).
+        area: Their areas, in any unit (n,).
+    """
+    return float(np.average(load, weights=area)) if len(load) else np.nan
+
+
+def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
+    """Return the loads on buildings, from those on the structures that they consist of.
+
+    Impulses are means over the area of the walls that count. Where the engine knows no areas the
+    structures' weights stand for them.
+    """
+    parts: dict[str, list[StructureLoad]] = {}
+    for load in loads:
+        parts.setdefault(load.building, []).append(load)
+    return tuple(
+        replace(own[0], name=name) if len(own) == 1 else _on_building(name, own)
+        for name, own in parts.items()
+    )
+
+
+def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
+    counted = counted_parts(parts)
+    areas_m2 = [each.area_m2 for each in counted if each.area_m2 is not None]
+    weights = [each.weight for each in counted]
+    is_known = len(areas_m2) == len(counted)
+    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
+    impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
+    return replace(
+        counted[0],
+        name=name,
+        weight=sum(weights),
+        impulse_sim=sum(each.impulse_sim for each in parts),
+        transferred_impulse_sim=sum(each.transferred_impulse_sim for each in parts),
+        impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
+        peak_pa=max(peaks_pa, default=None),
+        in_range=all(each.in_range for each in counted),
+        area_m2=sum(areas_m2) if is_known else None,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +241,8 @@ class BlastLoads:
 
     @property
     def protected_impulse_pa_s(self) -> float:
-        """Impulses of the protected structures, by weight, added up, Pa*s."""
-        return sum(load.weight * load.impulse_pa_s for load in self.protected)
+        """Impulses of the protected buildings, by weight, added up, Pa*s."""
+        return sum(each.weight * each.impulse_pa_s for each in on_buildings(self.protected))
 
     @property
     def protected_impulse_sim(self) -> float:
@@ -193,9 +261,10 @@ class BlastLoads:
         Args:
             objective: Says which load counts.
         """
+        impulse_pa_s = {each.name: each.impulse_pa_s for each in on_buildings(self.protected)}
         return sum(
             objective.load(
-                load.impulse_pa_s,
+                impulse_pa_s[load.building],
                 load.peak_pa or 0.0,
                 load.weight,
                 load.peak_weight,
@@ -453,7 +522,7 @@ def find_engine(
     Args:
         engine: The name, or the engine.
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
-        until: What a blast of gas dynamics waits for; as the engine says unless given.
+        until: Loads that a blast of gas dynamics waits for; as the engine says unless given.
         cells: Whether cells of gas dynamics grow, and how soon; as the engine says unless given.
 
     Raises:

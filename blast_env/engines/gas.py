@@ -1,8 +1,7 @@
 """Gas dynamics as an engine: loads in Pa s and Pa directly, no calibration between.
 
-Impulse is the sum of all positive phases; the first positive phase and the negative ones stand
-beside it. One charge and one layout have one result: there is no noise, and a seed only draws the
-charge.
+An impulse is the peak specific impulse (`blast_env.physics.gas.probes`). One charge and one layout
+have one result: there is no noise, and a seed only draws the charge.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -19,7 +18,13 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.calibration.model import ScaledImpulse
 from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayLoads, UnjudgedWalls, unjudged_walls
-from blast_env.engines.contract import BlastLoads, Engine, EngineOption, StructureLoad
+from blast_env.engines.contract import (
+    BlastLoads,
+    Engine,
+    EngineOption,
+    StructureLoad,
+    mean_over_area,
+)
 from blast_env.engines.gas_tables import (
     BUILDING_COLUMNS,
     FACE_COLUMNS,
@@ -48,7 +53,7 @@ from blast_env.physics.gas.settings import (
 from blast_env.physics.scene import WALLS, BlastSite, Charge
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
-from blast_env.response.facade import peak_factor
+from blast_env.response.facade import peak_factor, slowest_period_s
 from blast_env.scenario import (
     AnyCharge,
     AnyScenario,
@@ -68,10 +73,27 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     from blast_env.physics.gas.engine import GasRun, Recorders
     from blast_env.recording.tables import RunRecord
 
-NOT_COMPLETE: Final = "more than 2 % of the impulse may still come"
-"""Note on a load that is not complete; `GasSettings.until` says what a run waits for."""
+NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
+"""Note on a load that is not known; `GasSettings.until` says which loads a run waits for."""
 
 _PROGRESS_CALLS: Final = 100
+
+
+_PEAK_AND_REBOUND: Final = 0.75
+"""Of a natural period: when a component that was hit has swung in and back out."""
+
+
+def response_time_s(scenario: Scenario) -> float:
+    """Return how long the slowest component of the facades of a site takes to respond, s.
+
+    Components that hardening may put there count, too.
+    """
+    hardened = (
+        bay
+        for each in scenario.alternatives
+        for bay in (*each.glazing.values(), *each.wall.values())
+    )
+    return _PEAK_AND_REBOUND * slowest_period_s([*scenario.bays, *hardened])
 
 
 @dataclass(frozen=True)
@@ -84,21 +106,24 @@ class GasEngine(GasSettings, Engine):
     options: ClassVar[tuple[EngineOption, ...]] = (
         EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
         EngineOption("cells", "Whether cells of gas dynamics grow with the blast."),
-        EngineOption("until", "What a blast of gas dynamics waits for."),
+        EngineOption("until", "Loads that a blast of gas dynamics waits for."),
     )
     unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
     screening: ClassVar[str] = "blast_env.rendering.pressure_film:PressureScreening"
     shown: ClassVar[str] = "blast_env.cli.simulate:ShownGas"
 
     name: str = "gas"
-    version: str = f"gas 5 (numba {version('numba')})"
+    version: str = f"gas 6 (numba {version('numba')})"
 
-    def start_on(self, site: BlastSite, recorders: "Recorders" = lambda _: ()) -> "GasRun":
+    def start_on(
+        self, site: BlastSite, recorders: "Recorders" = lambda _: (), response_s: float = 0.0
+    ) -> "GasRun":
         """Return a run at time 0, independent of every other run.
 
         Args:
             site: What stands where.
             recorders: Makes further recorders for the grid: maps, pictures.
+            response_s: How long it goes on at least after the last load was reached.
 
         Raises:
             BlastEnvError: If the grid would not fit into memory, or the charge or a gauge is in a
@@ -106,7 +131,7 @@ class GasEngine(GasSettings, Engine):
         """
         from blast_env.physics.gas.engine import GasRun  # Numba takes half a second to import
 
-        return GasRun(self, site, recorders)
+        return GasRun(self, site, recorders, response_s)
 
     def blast(
         self,
@@ -129,7 +154,7 @@ class GasEngine(GasSettings, Engine):
             structures=outlines(scenario),
             air_height_m=scenario.air_height_m,
         )
-        return cost_of_run(self, site)
+        return cost_of_run(self, site, response_time_s(scenario))
 
     @property
     def words(self) -> str:
@@ -181,7 +206,7 @@ class GasBlast:
             recorders: Makes further recorders for the grid: maps, pictures. They stay in the
                 result, in `run.solver.recorders`.
         """
-        run = self.engine.start_on(self.site, recorders)
+        run = self.engine.start_on(self.site, recorders, response_time_s(self.scenario))
         oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
         bays = BayLoads.begin(run, self.scenario.bays_with(self.layout), oblique)
         if bays.bays:
@@ -298,9 +323,9 @@ class GasResult:
 
     @property
     def gauge_notes(self) -> tuple[str, ...]:
-        """Which gauges are not complete, a sentence each."""
-        late = ~self.gauges["complete"].to_numpy(dtype=bool)
-        return tuple(f"gauge {name}: {NOT_COMPLETE}" for name in self.gauges["name"][late])
+        """Gauges whose load is not known, a sentence each."""
+        late = ~self.gauges["known"].to_numpy(dtype=bool)
+        return tuple(f"gauge {name}: {NOT_KNOWN}" for name in self.gauges["name"][late])
 
     def history(self, gauge: str) -> "pd.DataFrame":
         """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
@@ -364,7 +389,7 @@ class GasResult:
         return self.piece_loads.history(name)
 
     def impulse(self, structure: str) -> ScaledImpulse:
-        """Return the impulse of all positive phases, mean over the walls that count.
+        """Return the peak specific impulse, mean over the walls that count.
 
         Args:
             structure: Name of the structure.
@@ -391,6 +416,7 @@ class GasResult:
                 float(self._peak_pa[self._walls(index)].max(initial=0.0)),
                 scaled.in_range,
                 scaled.notes,
+                self._area_m2(index),
             )
             for index, outline in enumerate(self.run.site.structures)
             if outline.cells is None
@@ -414,18 +440,25 @@ class GasResult:
         peak_pa = self.run.loads.peak_pa
         return peak_pa if self.oblique is None else self.oblique.peaks_pa(peak_pa)
 
-    @cached_property
-    def _impulse_pa_s(self) -> FloatArray:
-        """Positive impulses on the faces of cells, in the same way (faces,)."""
-        impulse_pa_s = self.run.loads.positive_impulse_pa_s
-        return impulse_pa_s if self.oblique is None else self.oblique.along_normals(impulse_pa_s)
+    def _mean(self, index: int, values: FloatArray) -> float:
+        """Return the mean of a load over the walls of a structure that count; NaN without any."""
+        own = self._walls(index)
+        along = values if self.oblique is None else self.oblique.along_normals(values)
+        return mean_over_area(along[own], self._share[own])
 
     def _scaled(self, index: int) -> ScaledImpulse:
         """Return the impulse on a structure, by its index into those of the site."""
-        own, notes = self._walls(index), self._notes(index)
-        share = None if self.oblique is None else self.oblique.share[own]
-        pa_s = float(np.average(self._impulse_pa_s[own], weights=share)) if len(own) else np.nan
-        return ScaledImpulse(pa_s, not notes, notes)
+        notes = self._notes(index)
+        return ScaledImpulse(self._mean(index, self.run.loads.impulse_pa_s), not notes, notes)
+
+    def _area_m2(self, index: int) -> float:
+        """Return the area of the walls of a structure that count."""
+        return float(self._share[self._walls(index)].sum()) * self.run.grid.cell_m**2
+
+    @cached_property
+    def _share(self) -> FloatArray:
+        """Share of the area of each face that its wall has (faces,)."""
+        return np.ones(len(self.run.table.faces)) if self.oblique is None else self.oblique.share
 
     @cached_property
     def module_impulse_n_s(self) -> FloatArray:
@@ -438,7 +471,7 @@ class GasResult:
             if outline.cells is None:
                 own = (table.structure == index) & (table.face < len(WALLS))
                 momentum = np.zeros((outline.rows, outline.columns))
-                values = self.run.loads.positive_impulse_pa_s[own] * self.run.grid.cell_m**2
+                values = self.run.loads.impulse_pa_s[own] * self.run.grid.cell_m**2
                 np.add.at(momentum, (table.row[own], table.column[own]), values)
                 sums.append(momentum.ravel())
         return np.concatenate(sums) if sums else np.zeros(0)
@@ -533,8 +566,8 @@ class GasResult:
             notes.append(
                 f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
             )
-        if not self.run.is_complete(self._walls(index), index):
-            notes.append(f"{NOT_COMPLETE}: the run ended because {self.end_reason}")
+        if not self.run.is_known(index):
+            notes.append(f"{NOT_KNOWN}: {self.end_reason}")
         if self.run.solver.lifted:
             notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")
         return tuple(notes)

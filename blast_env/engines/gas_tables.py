@@ -1,6 +1,8 @@
 """Tables of a blast of gas dynamics: loads by face, module, wall, structure, building and gauge.
 
-Each says of its loads whether they are complete, see `blast_env.physics.gas.tail`.
+Impulses are peak specific impulses (`blast_env.physics.gas.probes`): that of a face of a cell, else
+the mean over the area. Each row says whether its load was known when the run ended
+(`blast_env.physics.gas.ending`).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -9,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.physics.gas.settings import FACE_NAMES, ROOF, is_complete, still_to_come
+from blast_env.engines.contract import counted_parts, mean_over_area
+from blast_env.physics.gas.ending import AREA, is_known
+from blast_env.physics.gas.settings import FACE_NAMES, ROOF
 from blast_env.physics.scene import WALLS, StructureOutline
 from blast_env.tables import Column, as_types, table_of, texts
 from blast_env.units import MODULE_SIDE_M
@@ -20,21 +24,14 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     from blast_env.physics.gas.engine import GasRun
     from blast_env.physics.gas.probes import LoadTable
 
-TAIL_COLUMNS: Final = (
-    Column("to_come_pa_s", "Pa s", "about the impulse that still comes; NaN if not all waves came"),
-    Column("complete", "", "whether at most 2 % of the impulse still comes"),
-)
-"""Whether a load is complete; see `blast_env.physics.gas.tail`."""
+KNOWN_COLUMN: Final = Column("known", "", "whether the load was known when the run ended")
+"""Whether a load can still have grown; see `blast_env.physics.gas.ending`."""
 
 _LOADS: Final = (
-    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases, mean over the area"),
-    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase, mean over the area"),
-    Column(
-        "negative_impulse_pa_s", "Pa s", "impulse of the negative phases, 0 or below, as a mean"
-    ),
+    Column("impulse_pa_s", "Pa s", "peak specific impulse, mean over the area"),
     Column("peak_pa", "Pa", "largest overpressure anywhere on it"),
     Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
-    *TAIL_COLUMNS,
+    KNOWN_COLUMN,
 )
 
 FACE_COLUMNS: Final = (
@@ -96,7 +93,10 @@ BUILDING_COLUMNS: Final = (
     Column("stepped", "", "whether it has an oblique wall, whose loads are along its own normal"),
     *_OF_COUNTING_WALLS,
 )
-"""A row a building; its loads are means over the walls that count of all its parts."""
+"""A row a building; its loads are those on the walls that count of its protected parts.
+
+Of a building without a protected part all parts count.
+"""
 
 GAUGE_COLUMNS: Final = (
     Column("name", "", "name of the gauge"),
@@ -105,17 +105,15 @@ GAUGE_COLUMNS: Final = (
     Column("z_m", "m", "centre of its cell, above the ground"),
     Column("arrival_s", "s", "time at which 1 kPa is reached first, from the detonation"),
     Column("peak_pa", "Pa", "largest overpressure"),
-    Column("positive_impulse_pa_s", "Pa s", "impulse of all positive phases"),
-    Column("first_impulse_pa_s", "Pa s", "impulse of the first positive phase"),
-    Column("negative_impulse_pa_s", "Pa s", "impulse of all negative phases, 0 or below"),
-    *TAIL_COLUMNS,
+    Column("impulse_pa_s", "Pa s", "peak specific impulse"),
+    KNOWN_COLUMN,
 )
 """A row a gauge."""
 
 
 def load_values(loads: "LoadTable") -> dict[str, FloatArray]:
     """Return the loads on the points of a table, by column."""
-    names = [column.name for column in _LOADS if column not in TAIL_COLUMNS]
+    names = [column.name for column in _LOADS if column is not KNOWN_COLUMN]
     return {name: getattr(loads, name) for name in names}
 
 
@@ -126,8 +124,7 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
     table = run.table
     names = np.array([outline.name for outline in run.site.structures], dtype=object)
     loads = load_values(run.loads)
-    passed = np.array([run.has_passed(index) for index in range(len(names))])[table.structure]
-    last, before = run.tail.came_pa_s(0)
+    has_come = np.array([run.has_come(index) for index in range(len(names))])[table.structure]
     frame = pd.DataFrame(
         {
             "structure": names[table.structure],
@@ -144,32 +141,22 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
             **loads,
             "row": table.row,
             "column": table.column,
-            "last_pa_s": np.where(passed, last, np.nan),
-            "before_pa_s": before,
+            "net_impulse_pa_s": run.loads.net_impulse_pa_s,
+            "known": has_come & is_known(loads["impulse_pa_s"], run.loads.net_impulse_pa_s),
         }
     )
-    _add_tail(frame)
     return as_types(frame, {"structure": "str", "face": "str", "module_id": "str"})
-
-
-def _add_tail(table: "pd.DataFrame") -> None:
-    """Add what is still to come, by what came last and before that."""
-    last, before = table["last_pa_s"].to_numpy(), table["before_pa_s"].to_numpy()
-    table["to_come_pa_s"] = still_to_come(last, before)
-    impulse = table["positive_impulse_pa_s"].to_numpy()
-    table["complete"] = is_complete(impulse, table["to_come_pa_s"].to_numpy())
 
 
 def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
     """Return impulses as means over the area, peaks as the largest, arrivals as the first."""
-    means = [each for each in map(str, faces) if each.endswith("_pa_s")]
+    means = ["impulse_pa_s", "known"]
     weighed = faces.assign(**{each: faces[each] * faces["share"] for each in means})
     groups: Any = weighed.groupby(keys, sort=False, observed=True)
     table: pd.DataFrame = groups.agg({"peak_pa": "max", "arrival_s": "min"})
     area = groups["share"].sum()
-    # Of what came last a structure's are all there, or none.
-    table[means] = groups[means].sum(min_count=1).div(area, axis=0)
-    _add_tail(table)
+    table[means] = groups[means].sum().div(area, axis=0)
+    table["known"] = table["known"] >= AREA
     return table.assign(area_m2=area * run.grid.cell_m**2).reset_index()
 
 
@@ -239,51 +226,43 @@ def structure_table(
     return table_of(rows, STRUCTURE_COLUMNS if buildings is None else BUILDING_COLUMNS)
 
 
-def mean_over_area(faces: "pd.DataFrame", column: str) -> float:
-    """Return the mean of a load over faces, each by its `share` of the area; NaN without any."""
-    if not len(faces):
-        return np.nan
-    return float((faces[column] * faces["share"]).sum(skipna=False) / faces["share"].sum())
-
-
 def means_by_wall(faces: "pd.DataFrame", column: str) -> "pd.Series[float]":
-    """Return the mean of a load over each wall that there is, as `mean_over_area`, by its name."""
+    """Return the mean of a load over the area of each wall, by its name."""
     groups = faces.assign(load=faces[column] * faces["share"]).groupby("face", observed=True)
     means: pd.Series[float] = groups["load"].sum() / groups["share"].sum()
     return means
+
+
+def _mean_load(faces: "pd.DataFrame", column: str) -> float:
+    return mean_over_area(faces[column].to_numpy(), faces["share"].to_numpy())
 
 
 def _structure_row(
     run: "GasRun", faces: "pd.DataFrame", name: str, parts: Sequence[StructureOutline]
 ) -> dict[str, object]:
     """Return the loads on the walls that count of some structures together."""
+    counted = counted_parts(parts)
     structure, face = faces["structure"], faces["face"]
-    counting = [(structure == each.name) & face.isin(each.faces) for each in parts]
+    counting = [(structure == each.name) & face.isin(each.faces) for each in counted]
     walls = faces[np.logical_or.reduce(counting)]
-    roof = faces[structure.isin([each.name for each in parts]) & (face == ROOF)]
-    of_walls = means_by_wall(walls, "positive_impulse_pa_s")
-    impulse_pa_s = mean_over_area(walls, "positive_impulse_pa_s")
-    last_pa_s, before_pa_s = (mean_over_area(walls, f"{each}_pa_s") for each in ("last", "before"))
-    to_come_pa_s = float(still_to_come(last_pa_s, before_pa_s))
+    roof = faces[structure.isin([each.name for each in counted]) & (face == ROOF)]
+    of_walls = means_by_wall(walls, "impulse_pa_s")
     return {
         "structure": name,
         "building": name,
         "parts": " ".join(each.name for each in parts),
         "protected": any(each.protected for each in parts),
-        "weight": parts[0].weight,
+        "weight": sum(each.weight for each in counted),
         "height_m": max(each.height_m or run.site.air_height_m for each in parts),
-        "faces": " ".join(wall for wall in WALLS if any(wall in each.faces for each in parts)),
+        "faces": " ".join(wall for wall in WALLS if any(wall in each.faces for each in counted)),
         "area_m2": walls["share"].sum() * run.grid.cell_m**2,
-        "positive_impulse_pa_s": impulse_pa_s,
-        "first_impulse_pa_s": mean_over_area(walls, "first_impulse_pa_s"),
-        "negative_impulse_pa_s": mean_over_area(walls, "negative_impulse_pa_s"),
+        "impulse_pa_s": _mean_load(walls, "impulse_pa_s"),
         "peak_pa": walls["peak_pa"].max(),
         "arrival_s": walls["arrival_s"].min(),
-        "to_come_pa_s": to_come_pa_s,
-        "complete": bool(is_complete(impulse_pa_s, to_come_pa_s)),
+        "known": bool((means_by_wall(walls, "known") >= AREA).all()),
         "most_loaded_face": of_walls.idxmax() if len(of_walls) else "",
         "most_loaded_pa_s": of_walls.max() if len(of_walls) else np.nan,
-        "roof_impulse_pa_s": roof["positive_impulse_pa_s"].mean() if len(roof) else np.nan,
+        "roof_impulse_pa_s": _mean_load(roof, "impulse_pa_s"),
     }
 
 
@@ -294,10 +273,9 @@ def gauge_table(run: "GasRun") -> "pd.DataFrame":
     gauges = run.gauges
     if gauges is None:
         return table_of([], GAUGE_COLUMNS)
-    loads, to_come_pa_s = load_values(gauges), run.gauges_to_come_pa_s
+    loads = load_values(gauges)
     centres = np.array(run.grid.origin_m) + run.grid.cell_m * (gauges.cells + 0.5)
     frame = pd.DataFrame({"name": [each.name for each in run.site.gauges], **loads})
     frame[["x_m", "y_m", "z_m"]] = centres
-    frame["to_come_pa_s"] = to_come_pa_s
-    frame["complete"] = is_complete(loads["positive_impulse_pa_s"], to_come_pa_s)
+    frame["known"] = run.gauges_known
     return frame[[column.name for column in GAUGE_COLUMNS]]

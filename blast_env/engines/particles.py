@@ -385,6 +385,7 @@ class BlastResult:
                     peak_weight=each.weight,
                     in_range=scaled.in_range,
                     notes=scaled.notes,
+                    building=self.blast.scenario.building_names[each.name],
                 )
                 for each in structures
                 for scaled in [self.impulse(each.name, law)]

@@ -93,7 +93,7 @@ def simulate(
         charge: The charge, instead of one drawn from the scenario.
         progress: Called from time to time with the share of the time limit that has passed.
         cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
-        until: What a blast of gas dynamics waits for: `"structures"` that are protected, all
+        until: Loads that a blast of gas dynamics waits for: `"structures"` that are protected, all
             `"walls"`, or the `"gauges"`; or how many seconds it lasts. Structures unless given.
         cells: Whether cells of gas dynamics grow with the blast: `"uniform"` unless given,
             `"coarse"` or `"fine"`; for large sites, see `GasSettings`.

@@ -242,9 +242,7 @@ class UnfoldingGas(Unfolding):
     @property
     def impulse(self) -> float:
         """Impulse on the protected structures so far, by weight, Pa s."""
-        table = self._so_far().structures
-        counts = table["protected"] * table["weight"]
-        return float((counts * table["positive_impulse_pa_s"]).sum())
+        return self._so_far().loads().protected_impulse_pa_s
 
     def advance(self, until_s: float) -> dict[str, Any]:
         """Advance to a time, or the end; return the impulse so far."""
@@ -259,7 +257,7 @@ class UnfoldingGas(Unfolding):
         gauges = self.run.gauges
         return {
             "module_impulses": so_far.module_impulse_n_s,
-            "structure_impulses": so_far.structures["positive_impulse_pa_s"].to_numpy(np.float64),
+            "structure_impulses": so_far.structures["impulse_pa_s"].to_numpy(np.float64),
             "overpressure": plane[self._plan].T.astype(np.float32),
             "gauges": np.zeros(0)
             if gauges is None

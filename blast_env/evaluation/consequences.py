@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.bays import LOADED_BAY_COLUMNS, BayTail, UnjudgedWalls, bay_rows
+from blast_env.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
 from blast_env.engines.contract import Engine
 from blast_env.engines.gas_tables import means_by_wall
 from blast_env.engines.pieces import PIECE_COLUMNS
@@ -72,7 +72,7 @@ class BuildingResponse:
         charge: The charge where it went off.
         on_cells: What became of its bays by the histories on the cells, which clip peaks.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
-        tails: How much is still to come to its bays, by name, where that is known.
+        known: Whether the loads on its bays are known, by name, where that was recorded.
         stepped: Whether a wall of it is a staircase of modules, as an oblique one is.
     """
 
@@ -80,7 +80,7 @@ class BuildingResponse:
     charge: Charge
     on_cells: FacadeResponse
     peak_factor: float = 1.0
-    tails: Mapping[str, BayTail] = field(default_factory=dict)
+    known: Mapping[str, bool] = field(default_factory=dict)
     stepped: bool = False
 
     @cached_property
@@ -182,7 +182,7 @@ class Consequences:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What there is to say of a verdict: walls that it does not cover, and of its loads."""
+        """Remarks on a verdict: walls that it does not cover, oblique ones, loads not captured."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
         notes = [f"{each.building}: {each.words}" for each in self.unjudged]
         notes += [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
@@ -194,17 +194,17 @@ class Consequences:
             f"was checked for, e.g. {own[0]}"
             for building, own in reasons.items()
         ]
-        late = [not each.complete for each in self._tails]
-        if any(late):
+        known = self._known
+        if not all(known):
             notes.append(
-                f"{sum(late)} of {len(late)} bays of all charges are not complete: more than 2 % of"
-                " their impulse may still come"
+                f"{known.count(False)} of {len(known)} bays of all charges: impulse not yet"
+                " captured at the end of the run"
             )
         return tuple(notes)
 
     @property
-    def _tails(self) -> list[BayTail]:
-        return [tail for each in self.responses for tail in each.tails.values()]
+    def _known(self) -> list[bool]:
+        return [is_known for each in self.responses for is_known in each.known.values()]
 
     @property
     def is_flagged(self) -> bool:
@@ -213,7 +213,7 @@ class Consequences:
             any(building in self.buildings for building, _ in self.unchecked)
             or bool(self.unjudged)
             or any(each.stepped for each in self.responses)
-            or not all(each.complete for each in self._tails)
+            or not all(self._known)
         )
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
@@ -329,8 +329,6 @@ CASE_COLUMNS: Final = (
 )
 """What stands before the columns of bays and of pieces in a table of several charges."""
 
-_NO_TAIL: Final = BayTail()
-
 
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
     """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`.
@@ -339,7 +337,7 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
         found: What charges do, by the words for the layout.
     """
     rows = [
-        _case(name, each.charge) | row | each.tails.get(str(row["bay"]), _NO_TAIL)._asdict()
+        _case(name, each.charge) | row | {"known": each.known.get(str(row["bay"]), False)}
         for name, judged in found.items()
         for each in judged.responses
         for row in bay_rows(each.facade)
@@ -423,8 +421,8 @@ def consequences_of(
     responses: list[BuildingResponse] = []
     if result.bay_loads is not None and result.bay_loads.bays:
         factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)
-        tails = result.bay_loads.tails(result.run)
-        responses = by_building(scenario, result.bay_loads.response, charge, factor, tails)
+        known = result.bay_loads.known(result.run)
+        responses = by_building(scenario, result.bay_loads.response, charge, factor, known)
     return Consequences(
         tuple(responses),
         tuple(neighbours_of(scenario, result, charge)),
@@ -449,7 +447,7 @@ def verdict_word(passes: bool, flagged: bool) -> str:
 def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
     """Yield each building whose loads are to be distrusted, and why.
 
-    They are outside what the engine or the response was checked for, or not complete.
+    They are outside what the engine or the response was checked for, or not captured.
     """
     from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
 
@@ -492,7 +490,7 @@ def by_building(
     facade: FacadeResponse,
     charge: Charge,
     peak_factor: float = 1.0,
-    tails: Mapping[str, BayTail] = MappingProxyType({}),
+    known: Mapping[str, bool] = MappingProxyType({}),
 ) -> list[BuildingResponse]:
     """Return what a blast does to each building with a facade.
 
@@ -501,7 +499,7 @@ def by_building(
         facade: What became of all bays of the site.
         charge: The charge where it went off.
         peak_factor: What its peaks would be multiplied by if cells did not clip them.
-        tails: How much is still to come to the bays, by name, where that is known.
+        known: Whether the loads on the bays are known, by name, where that was recorded.
     """
     names = scenario.building_names
     stepped = stepped_buildings(scenario.structures)
@@ -512,7 +510,7 @@ def by_building(
         part = respond(
             [facade.bays[index] for index in own.tolist()], facade.time_s, facade.pressure_pa[own]
         )
-        inside = {each.bay.name: tails[each.bay.name] for each in part.bays if tails}
+        inside = {each.bay.name: known[each.bay.name] for each in part.bays if known}
         is_stepped = building in stepped
         found.append(BuildingResponse(building, charge, part, peak_factor, inside, is_stepped))
     return found
@@ -548,9 +546,7 @@ def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> li
         own = walls[walls["structure"].isin([each.name for each in parts])]
         if not len(own):
             continue
-        impulses, peaks = (
-            means_by_wall(own, each) for each in ("positive_impulse_pa_s", "peak_pa")
-        )
+        impulses, peaks = (means_by_wall(own, each) for each in ("impulse_pa_s", "peak_pa"))
         wall = str(impulses.idxmax())
         peak = side_on_peak_pa(np.array([peaks[wall]]))
         impulse = side_on_impulse_pa_s(np.array([impulses[wall]]))

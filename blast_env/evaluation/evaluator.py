@@ -139,7 +139,7 @@ class BlastEvaluator:
         keys, layouts = [], []
         for layout, threat in pairs:
             layouts.append(tuple(check_layout(self.scenario, layout)))
-            keys.append(self._key(layout, threat))
+            keys.append(self.key(layout, threat))
             asked.setdefault(keys[-1], threat.charge)
         found = {key: loads for key in asked if (loads := self._known(key)) is not None}
         missing = {key: (self, charge) for key, charge in asked.items() if key not in found}
@@ -162,9 +162,10 @@ class BlastEvaluator:
         Raises:
             LayoutError: If the layout does not fit the build zone.
         """
-        self._keep(self._key(layout, threat), loads)
+        self._keep(self.key(layout, threat), loads)
 
-    def _key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
+    def key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
+        """Return the key of a blast: everything that its loads depend on."""
         cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))
         # Without noise there is nothing to draw: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
@@ -297,7 +298,7 @@ class Evaluators:
         numbers: dict[BlastKey, int] = {}
         for number, (scenario, layout, threat) in enumerate(asked):
             evaluator = self.of(scenario)
-            key = evaluator._key(layout, threat)
+            key = evaluator.key(layout, threat)
             if key not in missing and evaluator._known(key) is None:
                 missing[key], numbers[key] = (evaluator, threat.charge), number
         was_run = [False] * len(asked)

@@ -1,8 +1,8 @@
 """A layout against no barrier, in full: by structure, module and threat, as tables and as JSON."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -11,7 +11,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.engines import JUDGE, Engine, find_engine
-from blast_env.engines.contract import BlastLoads, StructureLoad
+from blast_env.engines.contract import BlastLoads, StructureLoad, on_buildings
 from blast_env.evaluation.cases import Case, Threat, draw_threats
 from blast_env.evaluation.comparison import (
     CHARGE_COLUMNS,
@@ -90,32 +90,6 @@ THREAT_COLUMNS: Final = (
     Column("stand_off_m", "m", "from the charge to the nearest protected wall, with the barrier"),
     Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
 )
-
-
-def _together(loads: Sequence[StructureLoad], names: Mapping[str, str]) -> list[StructureLoad]:
-    """Return the loads of a blast on buildings, by the building that each structure is part of."""
-    parts: dict[str, list[StructureLoad]] = {}
-    for load in loads:
-        parts.setdefault(names[load.name], []).append(load)
-    return [_of_building(name, own) for name, own in parts.items()]
-
-
-def _of_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
-    if len(parts) == 1:
-        return replace(parts[0], name=name)
-    counted = [each for each in parts if each.protected] or parts
-    weights = [each.weight for each in counted]
-    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
-    return replace(
-        counted[0],
-        name=name,
-        weight=sum(weights),
-        impulse_sim=sum(each.impulse_sim for each in parts),
-        transferred_impulse_sim=sum(each.transferred_impulse_sim for each in parts),
-        impulse_pa_s=float(np.average([each.impulse_pa_s for each in counted], weights=weights)),
-        peak_pa=max(peaks_pa, default=None),
-        in_range=all(each.in_range for each in counted),
-    )
 
 
 def _structure_row(
@@ -363,11 +337,10 @@ class LayoutEvaluation:
     def building_table(self) -> "pd.DataFrame":
         """One row a building, whose parts are one; the columns are those of `table`.
 
-        Impulses on parts are averaged by their weights, as rewards count them; the peak is the
-        largest.
+        Impulses are means over the area of protected parts, as rewards count them; the peak is
+        the largest.
         """
-        names = self.scenario.building_names
-        return self._by_name(lambda loads: _together(loads.structures, names))
+        return self._by_name(lambda loads: on_buildings(loads.structures))
 
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
         """Return a row for each of the loads that are made of those of a blast."""

@@ -109,7 +109,7 @@ class EndReason(StrEnum):
     OUT_OF_REACH = "no moving ball can reach a structure before the time limit"
     TIME_LIMIT = "the time limit was reached"
     TIME_ASKED = "the time that was asked for was reached"
-    LOADS_COMPLETE = "the loads on the structures are complete"
+    LOADS_KNOWN = "the loads that it waits for are known"
     EVENT_LIMIT = "the limit of collisions was reached before the end"
 
 

@@ -272,7 +272,7 @@ def _name_threats(axes: Axes, what: str, names: Sequence[str]) -> None:
 def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: BlastSite) -> None:
     """Draw the mean load on the modules of one building, without and with the barrier.
 
-    Of a building of several parts the impulse is the mean by their weights, as rewards count it.
+    Of a building of several parts the impulse is that of the building, as rewards count it.
     """
     table = evaluation.table.set_index("structure")
     protected = table[table.protected]
@@ -281,6 +281,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     counted = protected.weight * protected.unprotected_impulse_pa_s
     name = str(counted.groupby(owners).sum().idxmax())
     parts = protected[owners == name]
+    building = evaluation.building_table.set_index("structure").loc[name]
     modules = evaluation.module_table
     own = modules[modules.structure.isin(parts.index)]
     outlines = [each for each in scene.structures if each.name in parts.index]
@@ -294,7 +295,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
         draw_enlarged(axes, obstacles, scale, 0.4, features=site_features(evaluation.scenario))
-        pa_s = float(np.average(parts[column.replace("_sim", "_pa_s")], weights=parts.weight))
+        pa_s = building[column.replace("_sim", "_pa_s")]
         axes.set_title(
             f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",
             fontsize=11,

@@ -25,6 +25,7 @@ from blast_env.rendering.site_plan import (
     write_heading,
 )
 from blast_env.rendering.style import barrier_text, nice_ceiling, render_extra, unit_interval
+from blast_env.response.sdof import impulses
 from blast_env.scenario.sections import buildings_of
 from blast_env.units import MS_PER_S
 
@@ -35,7 +36,7 @@ with render_extra():
     from matplotlib.figure import Figure
 
 Quantity = Literal["impulse", "peak"]
-"""What is drawn: the impulse of all positive phases, or the largest overpressure."""
+"""The quantity of a picture: the peak specific impulse, or the largest overpressure."""
 
 PA_PER_KPA: Final = 1000.0
 MINUS: Final = "\N{MINUS SIGN}"
@@ -70,9 +71,9 @@ class Kind:
 
 KINDS: Final = {
     "impulse": Kind(
-        "impulse of all positive phases",
+        "peak specific impulse",
         "Pa·s",
-        "positive_impulse_pa_s",
+        "impulse_pa_s",
         1.0,
         "mean",
         lambda values: float(np.nanmean(values)),
@@ -187,7 +188,7 @@ def facades(
         structure: Name of the structure, or of a building: its parts are unfolded as one, and where
             one wall of it is behind another, the larger load is shown. The protected building with
             the largest impulse without it.
-        quantity: `"impulse"`, of all positive phases in Pa s, or `"peak"`, overpressure in kPa;
+        quantity: `"impulse"`, peak specific impulse in Pa s, or `"peak"`, overpressure in kPa;
             or how else one is drawn.
         beside: Another result with the same site and charge, drawn above on the same scale:
             without the barrier, or with another layout.
@@ -293,7 +294,7 @@ def _walled(result: GasResult, name: str | None) -> _Walled:
         if not len(table):
             raise BlastEnvError(f"{scenario.name} has no structure with walls")
         chosen = table[table["protected"]] if table["protected"].any() else table
-        worst = int(chosen["positive_impulse_pa_s"].to_numpy().argmax())
+        worst = int(chosen["impulse_pa_s"].to_numpy().argmax())
         name = str(chosen["building"].iloc[worst])
     found = {**known, **buildings}  # a building may have the name of a part
     if name not in found:
@@ -410,10 +411,10 @@ def gauge_history(
         words = barrier_text(each.blast.layout)
         _draw_wave(
             (upper, lower),
-            (time_s, overpressure, _positive_impulse(time_s, overpressure)),
+            (time_s, overpressure, impulses(time_s, overpressure)),
             (
                 f"{words}: peak {_figures(row['peak_pa'] / PA_PER_KPA)} kPa",
-                f"{words}: {_figures(row['positive_impulse_pa_s'])} Pa·s",
+                f"{words}: {_figures(row['impulse_pa_s'])} Pa·s",
             ),
             color=colour,
             linestyle="-" if of_result else "--",
@@ -438,10 +439,9 @@ def gauge_history(
         )
     upper.axhline(0.0, color=unit_interval(QUIET_INK), linewidth=0.8, zorder=1)
     upper.set_ylabel("overpressure (kPa)")
-    lower.set_ylabel("impulse of the positive phases (Pa·s)")
+    lower.set_ylabel("impulse up to then (Pa·s)")
     lower.set_xlabel("time since the detonation (ms)")
     lower.set_xlim(0.0, end_s * MS_PER_S)
-    lower.set_ylim(bottom=0.0)
     for axes in (upper, lower):
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
@@ -450,12 +450,6 @@ def gauge_history(
     at = ", ".join(f"{value:.2f}" for value in place)
     write_heading(figure, title, f"{subtitle}; gauge at ({at}) m")
     return figure
-
-
-def _positive_impulse(time_s: FloatArray, overpressure_pa: FloatArray) -> FloatArray:
-    """Return the impulse of all positive phases up to each time, as gauges add it up."""
-    parts = 0.5 * (overpressure_pa[1:] + overpressure_pa[:-1]) * np.diff(time_s)
-    return np.concatenate(([0.0], np.cumsum(np.maximum(parts, 0.0))))
 
 
 def _draw_wave(

@@ -92,7 +92,8 @@ def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
     distance_m = _distances_m(result.run.grid, opening)
     if quantity == "peak":
         return np.maximum(maps[0].peak_pa, opening.peak_pa(distance_m))
-    return maps[0].positive_impulse_pa_s + opening.positive_impulse_pa_s(distance_m)
+    net_pa_s, largest_pa_s = opening.impulses_pa_s(distance_m)
+    return np.maximum(largest_pa_s, net_pa_s + maps[0].impulse_pa_s)
 
 
 def _distances_m(grid: GasGrid, opening: Opening) -> FloatArray:
@@ -124,7 +125,7 @@ def ground_map(
 
     Args:
         result: A blast that was run with `ground_recorders`.
-        quantity: `"peak"`, overpressure in kPa, or `"impulse"`, of all positive phases in Pa s.
+        quantity: `"peak"`, overpressure in kPa, or `"impulse"`, peak specific impulse in Pa s.
         beside: Another result with the same site and charge, drawn to the left on the same scale:
             without the barrier, or with another layout.
         levels: Contour levels, which also set the scale, for comparisons of maps; see

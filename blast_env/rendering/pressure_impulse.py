@@ -12,6 +12,7 @@ from blast_env.response.buildings import LevelOfProtection, level_of_protection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.facade import FacadeResponse, FilledBay, level_by_glass
 from blast_env.response.glass import GlazingCondition, Pane, glazing_responses
+from blast_env.response.sdof import impulses
 from blast_env.response.walls import Panel, panel_responses
 from blast_env.units import PA_PER_KPA
 
@@ -129,7 +130,7 @@ def _draw(
             ends = np.array([each[index] for each in places])
             axes.plot(ends[:, 1], ends[:, 0], "-", color="0.25", linewidth=0.5)
     axes.set(xscale="log", yscale="log", xlim=(low[1], high[1]), ylim=(low[0], high[0]))
-    axes.set(xlabel="impulse of all positive phases (Pa s)", ylabel="peak of the mean (kPa)")
+    axes.set(xlabel="peak specific impulse (Pa s)", ylabel="peak of the mean (kPa)")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(number_on_axis))
         axis.set_minor_formatter("")
@@ -139,7 +140,7 @@ def _draw(
 def _loads(facade: FacadeResponse, members: Sequence[int]) -> FloatArray:
     """Return peak (kPa) and impulse (Pa s) of bays (bays, 2)."""
     pressure = facade.pressure_pa[list(members)]
-    impulse = np.trapezoid(np.maximum(pressure, 0.0), facade.time_s, axis=1)
+    impulse = impulses(facade.time_s, pressure).max(axis=1)
     peak = pressure.max(axis=1) / PA_PER_KPA
     points: FloatArray = np.maximum(np.column_stack([peak, impulse]), 1e-3)
     return points

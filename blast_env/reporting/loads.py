@@ -12,8 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.gas import NOT_COMPLETE, GasBlast, GasResult
-from blast_env.engines.gas_tables import mean_over_area, means_by_wall
+from blast_env.engines.contract import counted_parts
+from blast_env.engines.gas import NOT_KNOWN, GasBlast, GasResult
+from blast_env.engines.gas_tables import means_by_wall
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
@@ -179,29 +180,27 @@ class TargetLoad:
 
     Attributes:
         target: Its name.
-        impulse_pa_s: Impulse of all positive phases, mean over the walls.
-        first_impulse_pa_s: Impulse of the first positive phase, mean over the walls.
+        impulse_pa_s: Peak specific impulse, mean over the area of the walls.
         peak_pa: Largest overpressure on a face of a cell.
         counted: The peak to compare with limits.
         arrival_s: Arrival of the wave; NaN if none arrives.
         wall: The wall with the largest impulse.
-        wall_impulse_pa_s: Impulse of all positive phases on it, mean.
+        wall_impulse_pa_s: Impulse on it, mean.
         duration_s: Duration of the first positive phase of the mean overpressure on it; NaN if no
             wave arrives or the run ends before.
-        complete: Whether at most 2 % of these impulses is still to come.
+        known: Whether these impulses were known when the run ended.
         flagged: Whether there is a note on them.
     """
 
     target: str
     impulse_pa_s: float
-    first_impulse_pa_s: float
     peak_pa: float
     counted: CountedPeak
     arrival_s: float
     wall: WallName
     wall_impulse_pa_s: float
     duration_s: float
-    complete: bool
+    known: bool
     flagged: bool
 
 
@@ -227,7 +226,7 @@ class MeasuredBlast:
         for target in self.targets:
             counting = [
                 (faces["structure"] == each.name) & faces["face"].isin(each.faces)
-                for each in target.structures
+                for each in counted_parts(target.structures)
             ]
             walls = faces[np.logical_or.reduce(counting)]
             if len(walls):
@@ -236,42 +235,46 @@ class MeasuredBlast:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes on loads outside the checked range of the engine, and on incomplete loads.
+        """Notes on loads outside the checked range of the engine, and on loads not captured.
 
-        The checked range counts for protected buildings alone, completeness for all.
+        The checked range counts for protected buildings alone, capture for all.
         """
         names = (name for each in self.targets if each.protected for name in each.names)
         notes = [note for name in names for note in self.result.impulse(name).notes]
-        late = [name for name, load in self.loads.items() if not load.complete]
-        notes += [f"{name}: {NOT_COMPLETE}" for name in late]
+        late = [name for name, load in self.loads.items() if not load.known]
+        notes += [f"{name}: {NOT_KNOWN}" for name in late]
         notes += self.result.stepped_notes
         return tuple(dict.fromkeys(notes))
 
     def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
-        by_wall = means_by_wall(walls, "positive_impulse_pa_s")
+        by_wall = means_by_wall(walls, "impulse_pa_s")
+        building = next(
+            each
+            for each in self.result.buildings.to_dict("records")
+            if each["building"] == target.name
+        )
         wall = next(each for each in WALLS if each == by_wall.idxmax())
         arrivals = walls["arrival_s"].to_numpy()
-        complete = self._is_complete(target, wall)
+        known = self._is_known(target, wall)
         in_range = all(self.result.impulse(name).in_range for name in target.names)
         return TargetLoad(
             target=target.name,
-            impulse_pa_s=mean_over_area(walls, "positive_impulse_pa_s"),
-            first_impulse_pa_s=float(walls["first_impulse_pa_s"].mean()),
+            impulse_pa_s=float(building["impulse_pa_s"]),
             peak_pa=float(walls["peak_pa"].max()),
             counted=counted_peak(self.result.run.site, self.result.run.grid.cell_m, walls),
             arrival_s=float(np.nanmin(arrivals)) if np.isfinite(arrivals).any() else float("nan"),
             wall=wall,
             wall_impulse_pa_s=float(by_wall.max()),
             duration_s=self._duration_s(target.name, wall),
-            complete=complete,
-            flagged=not (complete and in_range),
+            known=known,
+            flagged=not (known and in_range),
         )
 
-    def _is_complete(self, target: ReportedBuilding, wall: WallName) -> bool:
+    def _is_known(self, target: ReportedBuilding, wall: WallName) -> bool:
         buildings, walls = self.result.buildings, self.result.walls
-        on_building = buildings.loc[buildings["building"] == target.name, "complete"]
+        on_building = buildings.loc[buildings["building"] == target.name, "known"]
         on_wall = walls["structure"].isin(target.names) & (walls["face"] == wall) & walls["counts"]
-        return bool(on_building.all() and walls.loc[on_wall, "complete"].all())
+        return bool(on_building.all() and walls.loc[on_wall, "known"].all())
 
     def _duration_s(self, target: str, wall: WallName) -> float:
         pressure = self.histories.of(target, wall)

@@ -293,6 +293,13 @@ def peak_factor(cell_m: float, tnt_kg: float) -> float:
     return 1.0 + _CELLS_OF_HALF_A_PEAK * cell_m / cbrt(tnt_kg)
 
 
+def slowest_period_s(bays: Sequence[FilledBay]) -> float:
+    """Return the longest natural period of what stands in bays, s; 0 without any."""
+    panes = (_pane(each.glazing).system for each in bays if each.glazing is not None)
+    panels = (_panel(each.wall, each.bay.height_m).system for each in bays if each.wall is not None)
+    return max((each.period_s for each in (*panes, *panels)), default=0.0)
+
+
 def sharpened(
     time_s: FloatArray, pressure_pa: FloatArray, factor: float
 ) -> tuple[FloatArray, FloatArray]:

@@ -18,6 +18,8 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
+from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.settings import CELLS
 from blast_env.physics.scene import Charge
 from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
@@ -27,14 +29,12 @@ from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
+from studies.gas.definition import both_loads
+from studies.gas.ending import Ending, ending, layouts, sites
 from studies.gas.growing import OFF_COLUMNS, cell_choice, engine_with
 from studies.gas.judgement import Judgement
 from studies.gas.judgement import judge as judgement
 from studies.gas.loads import (
-    BARRIER_M,
-    BUILDING_M,
-    Ending,
-    ending,
     impulse_until,
     load_from_radius,
     with_heights,
@@ -44,17 +44,12 @@ from studies.gas.oblique import oblique_loads
 from studies.gas.reference import free_field, wide_wall
 from studies.gas.refinement import refined_blast
 from studies.gas.sources import source_ratios, trade_off_figure
-from studies.gas.waiting import waiting
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
 """With which cells a charge is held against Kingery and Bulmash, by its mass in kg."""
 PEAK_CHARGE_KG: Final = 100.0
 PEAK_DISTANCE_M: Final = 12.5
 YARD: Final = "yard"
-_WITH_HEIGHTS: Final = (
-    *("visitor_entrance", "control_room", "school_and_clinic", "hotel_forecourt"),
-    "shopping_street",
-)
 
 Cell = Annotated[float, typer.Option(help="Side of a cell, m.")]
 Processes = Annotated[int, typer.Option(min=1)]
@@ -133,37 +128,6 @@ def kingery_bulmash(
 
 
 @app.command()
-def borders(
-    scenario: str = "courtyard",
-    places: Annotated[
-        str, typer.Option(help="MARGIN/BORDER in m, separated by commas.")
-    ] = "2/0,2/12,2/24,2/48,8/48",
-    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.2,
-    all_layouts: Annotated[bool, typer.Option(help="Also the wall near the building.")] = False,
-    cell: Cell = 0.5,
-) -> None:
-    """Print how loads depend on where the open borders at the sides and above are.
-
-    The margin is where cells begin to grow, the border where they end. With everything as high as
-    the air, and with real heights; the others are compared with the last of the places.
-    """
-    rows = []
-    with user_errors():
-        wanted = [_numbers(place.replace("/", ",")) for place in places.split(",")]
-        loaded = load_scenario(scenario)
-        for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded))):
-            for name, layout in list(_rule_layouts(site).items())[: None if all_layouts else 2]:
-                engines = [
-                    GasEngine(cell_m=cell, margin_m=margin_m, border_m=border_m)
-                    for margin_m, border_m in wanted
-                ]
-                loads = [impulse_until(GasBlast(site, layout, engine=e), until) for e in engines]
-                rows.append((heights, name, *_against_last(loads)))
-    headers = (f"{margin_m:g} m + {border_m:g} m" for margin_m, border_m in wanted)
-    print_line(markdown_table(("heights", "layout", *headers), rows))
-
-
-@app.command()
 def air_height(
     scenario: str = "courtyard",
     heights_m: Annotated[
@@ -236,9 +200,6 @@ def settling(
     print_line(markdown_table(("layout", *(f"{1e3 * time_s:g} ms" for time_s in wanted)), rows))
 
 
-_HEIGHTS: Final = f"building {BUILDING_M:g} m, wall {BARRIER_M:g} m"
-
-
 def _against_last(loads: list[float]) -> list[str]:
     """Return loads in Pa s, with how far they are from the last one."""
     return [f"{load:.1f} ({100.0 * (load / loads[-1] - 1.0):+.2f} %)" for load in loads]
@@ -261,73 +222,80 @@ def _random_layouts(scenario: Scenario, count: int) -> dict[str, Layout]:
 
 @app.command("ending")
 def endings(
-    scenario: str = "courtyard",
-    until: Annotated[float, typer.Option(help="When loads are looked at again, s.")] = 0.2,
-    random_layouts: Annotated[int, typer.Option(min=0)] = 2,
-    cell: Cell = 0.5,
+    generated: Annotated[
+        int, typer.Option(min=0, help="Generated sites of each family, beside the bundled ones.")
+    ] = 17,
+    times: Annotated[float, typer.Option(min=1.0, help="Length of the longer runs.")] = 4.0,
     processes: Processes = 1,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Print what the end of a run cuts off: the impulse then and later, with several layouts."""
+    """Print the loads that runs miss: against runs several times as long, two layouts a site."""
     with user_errors(), running_on(cluster):
-        loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
-        layouts = _rule_layouts(loaded) | _random_layouts(loaded, random_layouts)
         jobs = {
-            (heights, name): GasBlast(site, layout, engine=engine)
-            for heights, site in (("endless", loaded), (_HEIGHTS, with_heights(loaded)))
-            for name, layout in layouts.items()
+            (title, name): GasBlast(site, layout, engine=engine)
+            for title, site, engine in sites(generated)
+            for name, layout in layouts(site).items()
         }
         with progress_bar("blasts") as progress:
-            run = partial(ending, later_s=until)
+            run = partial(ending, times=times)
             found = run_all(run, list(jobs.values()), processes, progress)
-    headers = ("heights", "layout", "end (ms)", "impulse (Pa s)", f"at {until:g} s", "cut off")
+    headers = ("site", "layout", "end (ms)", "CPU (s)", "largest share missed of a wall")
     rows = [(*job, *_ending_row(each)) for job, each in zip(jobs, found, strict=True)]
-    print_line(markdown_table(headers, rows))
-    print_line("ended because: " + ", ".join(sorted({str(each.reason) for each in found})))
+    print_line(markdown_table((*headers, "of all protected", "level", "later"), rows))
+    limited = sum(each.reason is not EndReason.LOADS_KNOWN for each in found)
+    print_line(
+        f"{len(found)} blasts: at most {max(100.0 * each.missed for each in found):.2f} % of a wall"
+        f" and {max(100.0 * each.missed_of_all for each in found):.2f} % of a site; {limited}"
+        f" ended by the limit; {sum(len(set(each.levels)) > 1 for each in found)} levels differ"
+    )
 
 
 def _ending_row(found: Ending) -> tuple[str, ...]:
     return (
         f"{MS_PER_S * found.time_s:.0f}",
-        f"{found.impulse_pa_s:.1f}",
-        f"{found.later_pa_s:.1f}",
-        f"{100.0 * found.cut_off:.2f} %",
+        f"{found.cpu_s:.1f}",
+        f"{100.0 * found.missed:.2f} %",
+        f"{100.0 * found.missed_of_all:.2f} %",
+        *("-" if level is None else str(level) for level in found.levels),
     )
 
 
 @app.command()
-def until(
-    scenario: Annotated[
-        list[str] | None, typer.Option(help="Scenarios, those with heights unless given.")
-    ] = None,
-    cell: Cell = 0.5,
+def definition(
+    scenario: str = "visitor_entrance",
+    sizes: Annotated[str, typer.Option(help="Sides of cells in m, or coarse, fine.")] = "0.5,0.25",
+    until: Annotated[float, typer.Option(help="Length of the long runs, s.")] = 0.18,
 ) -> None:
-    """Print how long a run is that waits for structures, walls or gauges, and what came later.
+    """Print the reductions of walls by the sum of all positive phases and by the load.
 
-    Without a barrier. Of the walls and gauges that a table calls complete: what came until twice
-    the time.
+    The load is the peak specific impulse. Charge, rules and random layout are those of seed 0.
     """
     rows = []
     with user_errors():
-        for name in scenario or _WITH_HEIGHTS:
-            blast = GasBlast(load_scenario(name), engine=GasEngine(cell_m=cell))
-            for waited_for in ("structures", "walls", "gauges"):
-                if waited_for == "gauges" and not blast.site.gauges:
+        site = load_scenario(scenario)
+        for size in sizes.split(","):
+            engine = GasEngine.with_cells(size if size in CELLS else float(size))
+            bare = both_loads(site, (), engine, until)
+            placed = _rule_layouts(site) | _random_layouts(site, 1)
+            for name, layout in placed.items():
+                if not layout:
                     continue
-                found = waiting(blast, waited_for)
+                found = both_loads(site, layout, engine, until)
                 rows.append(
                     (
+                        size,
                         name,
-                        waited_for,
-                        f"{MS_PER_S * found.time_s:.0f}",
-                        f"{found.cpu_s:.1f}",
-                        f"{found.told.sum()} of {len(found.told)}",
-                        str(found.missed),
-                        f"{100.0 * found.worst:.1f} %",
+                        f"{100.0 * (1.0 - found.positive_pa_s / bare.positive_pa_s):.1f} %",
+                        f"{100.0 * (1.0 - found.impulse_pa_s / bare.impulse_pa_s):.1f} %",
+                        f"{MS_PER_S * found.reached_s:.0f}",
+                        f"{MS_PER_S * found.last_s:.0f}",
+                        f"{MS_PER_S * found.end_s:.0f}",
                     )
                 )
-    headers = ("scenario", "until", "end (ms)", "CPU time (s)", "complete", "more than 2 % came")
-    print_line(markdown_table((*headers, "of these at most"), rows))
+    headers = ("cells", "layout", "sum of positive phases", "peak specific impulse")
+    print_line(
+        markdown_table((*headers, "reached after (ms)", "last face (ms)", "run ends (ms)"), rows)
+    )
 
 
 @app.command()
@@ -373,11 +341,11 @@ def oblique(
 def refinement(
     scenario: str = "car_park",
     thresholds: Annotated[
-        str, typer.Option(help="Jump of the pressure over the largest overpressure of a block.")
-    ] = "0.05,0.1,0.2,0.4",
+        str, typer.Option(help="Jump of the pressure over the lower of two neighbours.")
+    ] = "0.02,0.05,0.1,0.2",
     every: Annotated[float, typer.Option(help="When blocks are counted, s.")] = 0.01,
 ) -> None:
-    """Print what perfect refinement in blocks of 8 x 8 x 8 cells would cost, without overhead.
+    """Print what perfect refinement in blocks of 4 x 4 x 4 cells would cost, without overhead.
 
     Blocks at protected walls are always refined, once the blast has reached them.
     """
@@ -529,7 +497,7 @@ def corners(
         str, typer.Option(help="Heights of the block, m; empty: as high as wide.")
     ] = "",
 ) -> None:
-    """Print what gets round one and two corners of a block: first waves over the free field's."""
+    """Print the impulse behind one and two corners of a block, over the free field's."""
     rows = []
     with user_errors():
         wanted: list[float | None] = [*_numbers(heights)] or [None]
@@ -547,12 +515,10 @@ def corners(
                             "-" if band is None else _within(gauges, band),
                             f"{waves.mean(region):.2f}",
                             f"{gauges.min():.2f} to {gauges.max():.2f}",
-                            f"{waves.mean(region, all_phases=True):.2f}",
-                            f"{100.0 * waves.unfinished:.0f} %",
                         )
                     )
-    headers = ("block (m high)", "cell (m)", "gauges", "experiments", "within", "first wave")
-    print_line(markdown_table((*headers, "gauge by gauge", "all phases", "unfinished"), rows))
+    headers = ("block (m high)", "cell (m)", "gauges", "experiments", "within", "impulse")
+    print_line(markdown_table((*headers, "gauge by gauge"), rows))
 
 
 def _within(gauges: FloatArray, band: ExperimentalBand) -> str:

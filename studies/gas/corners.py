@@ -165,29 +165,22 @@ class CornerWaves:
         geometry: The block.
         height_m: Its height.
         cell_m: Side of a cell.
-        coefficient: First positive impulse over the free field's at the same path length, those
-            of a side first, then half of the back (gauges,).
-        all_phases: Impulse of all positive phases over the same free field's (gauges,).
-        unfinished: Share of the gauges' faces whose first positive phase was not over.
+        coefficient: Impulse over the free field's at the same path length, those of a side first,
+            then half of the back (gauges,).
     """
 
     geometry: BlockGeometry
     height_m: float
     cell_m: float
     coefficient: FloatArray
-    all_phases: FloatArray
-    unfinished: float
 
     def gauges_of(self, region: Region) -> FloatArray:
         """Return the coefficients of the gauges of a region."""
         return self.coefficient[region_weight(region, self.geometry) > 0.0]
 
-    def mean(self, region: Region, *, all_phases: bool = False) -> float:
+    def mean(self, region: Region) -> float:
         """Return the mean coefficient of a region's modules."""
-        weight = region_weight(region, self.geometry)
-        return float(
-            np.average(self.all_phases if all_phases else self.coefficient, weights=weight)
-        )
+        return float(np.average(self.coefficient, weights=region_weight(region, self.geometry)))
 
 
 def corner_waves(
@@ -215,34 +208,18 @@ def corner_waves(
     log_free = np.interp(
         np.log(geometry.gauge_path_m),
         np.log(paths_m[order]),
-        np.log(free.first_impulse_pa_s[order]),
+        np.log(free.impulse_pa_s[order]),
     )
-    first, every, over = (
-        _gauge_means(result, values, geometry)
-        for values in (
-            result.run.loads.first_impulse_pa_s,
-            result.run.loads.positive_impulse_pa_s,
-            result.run.loads.first_is_over.astype(np.float64),
-        )
-    )
-    free_pa_s = np.exp(log_free)
-    return CornerWaves(
-        geometry,
-        height_m,
-        cell_m,
-        first / free_pa_s,
-        every / free_pa_s,
-        1.0 - float(over.mean()),
-    )
+    impulse_pa_s = _gauge_means(result, geometry)
+    return CornerWaves(geometry, height_m, cell_m, impulse_pa_s / np.exp(log_free))
 
 
-def _gauge_means(result: GasResult, values: FloatArray, geometry: BlockGeometry) -> FloatArray:
-    """Return the means of face values over the gauges, symmetric ones together (gauges,)."""
+def _gauge_means(result: GasResult, geometry: BlockGeometry) -> FloatArray:
+    """Return the mean impulses at the gauges, symmetric ones together (gauges,)."""
     side = geometry.side_modules
-    faces = result.faces.assign(value=values)
-    low = faces[faces["z_m"] < MODULE_SIDE_M]
-    sides = low[low["face"].isin(["south", "north"])].groupby("column")["value"].mean()
+    low = result.faces[result.faces["z_m"] < MODULE_SIDE_M]
+    sides = low[low["face"].isin(["south", "north"])].groupby("column")["impulse_pa_s"].mean()
     back = low[low["face"] == "east"]
     row = back["row"].to_numpy()
-    backs = back["value"].groupby(np.minimum(row, side - 1 - row)).mean()
+    backs = back["impulse_pa_s"].groupby(np.minimum(row, side - 1 - row)).mean()
     return np.concatenate((sides.to_numpy(), backs.to_numpy()))

@@ -13,7 +13,7 @@ from blast_env.physics.gas.settings import CELLS
 from blast_env.scenario import Scenario
 from studies.gas.loads import protected_impulse_pa_s
 
-OFF_COLUMNS: Final = ("positive_impulse_pa_s", "peak_pa")
+OFF_COLUMNS: Final = ("impulse_pa_s", "peak_pa")
 _SMALL_LOAD: Final = 0.05
 
 
@@ -40,7 +40,7 @@ class CellChoice:
 
         Those count that have at least a twentieth of the largest impulse.
         """
-        impulse = other.walls["positive_impulse_pa_s"]
+        impulse = other.walls["impulse_pa_s"]
         counting = np.asarray(impulse > _SMALL_LOAD * impulse.max())
         off = 100.0 * (self.walls[column] / other.walls[column] - 1.0)[counting].abs()
         return float(off.mean()), float(off.max())

@@ -3,22 +3,19 @@
 By when the run ends and where the grid takes over; on sites with real heights and on a small yard.
 """
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import EndReason
 from blast_env.physics.gas.solver import GasSolver
 from blast_env.physics.gas.source import set_charge
 from blast_env.scenario import Scenario
 
 
 def protected_impulse_pa_s(result: GasResult) -> float:
-    """Return the impulse of all positive phases on the protected structures, by weight."""
-    table = result.structures
-    of = table[table["protected"]]
-    return float((of["weight"] * of["positive_impulse_pa_s"]).sum() / of["weight"].sum())
+    """Return the impulse on the protected buildings, as a mean by weight."""
+    loads = result.loads()
+    return loads.protected_impulse_pa_s / sum(each.weight for each in loads.protected)
 
 
 def impulse_until(blast: GasBlast, until_s: float) -> float:
@@ -107,36 +104,3 @@ def load_from_radius(blast: GasBlast, radius_m: float, until_s: float) -> float:
     set_charge(run.solver, run.charge, radius_m)
     run.solver.advance(until_s)
     return protected_impulse_pa_s(GasResult(blast, run))
-
-
-@dataclass(frozen=True)
-class Ending:
-    """The load on the protected structures at the end of a run and later.
-
-    Attributes:
-        time_s: When the run ended.
-        reason: Why.
-        impulse_pa_s: Of all positive phases, then.
-        later_s: When it was looked at again.
-        later_pa_s: The impulse at that time.
-    """
-
-    time_s: float
-    reason: EndReason
-    impulse_pa_s: float
-    later_s: float
-    later_pa_s: float
-
-    @property
-    def cut_off(self) -> float:
-        """Share of the later impulse that was still missing at the end."""
-        return 1.0 - self.impulse_pa_s / self.later_pa_s
-
-
-def ending(blast: GasBlast, later_s: float = 0.2) -> Ending:
-    """Run a blast to its end, and its gas on until a later time."""
-    result = blast.run()
-    time_s, impulse = result.time_s, protected_impulse_pa_s(result)
-    result.run.solver.advance(later_s)
-    later = protected_impulse_pa_s(GasResult(blast, result.run))
-    return Ending(time_s, result.end_reason, impulse, result.time_s, later)

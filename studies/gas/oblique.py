@@ -79,7 +79,7 @@ class FacadeLoads:
     """Loads on a facade that is turned against the grid, before and after its own normal counts.
 
     Attributes:
-        impulse_pa_s: Mean over the faces of cells, all positive phases.
+        impulse_pa_s: Mean over the faces of cells.
         mean_peak_pa: Mean over them of the largest overpressure.
         largest_peak_pa: The largest overpressure on one of them.
         told_pa_s: Mean over its walls in the tables, along its own normal.
@@ -111,7 +111,7 @@ def oblique_loads(
     """
     result = GasBlast(turned_block(angle_deg), engine=GasEngine(cell_m=cell_m, until=until)).run()
     chosen = _facade(result.run, angle_deg)
-    impulse, peak = result.run.loads.positive_impulse_pa_s, result.run.loads.peak_pa
+    impulse, peak = result.run.loads.impulse_pa_s, result.run.loads.peak_pa
     told = result.on_walls[chosen]
     bays = result.bay_loads
     assert bays is not None
@@ -124,7 +124,7 @@ def oblique_loads(
         impulse_pa_s=float(impulse[chosen].mean()),
         mean_peak_pa=float(peak[chosen].mean()),
         largest_peak_pa=float(peak[chosen].max()),
-        told_pa_s=float(np.average(told["positive_impulse_pa_s"], weights=told["share"])),
+        told_pa_s=float(np.average(told["impulse_pa_s"], weights=told["share"])),
         told_peak_pa=float(peaks_pa.mean()),
         largest_told_pa=float(peaks_pa.max()),
         stepped_m=_deflection_m(bays.recorder.time_s, bays.recorder.history_pa[own]),

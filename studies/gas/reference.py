@@ -1,6 +1,6 @@
 """The gas engine's charge on the ground against Kingery and Bulmash.
 
-Impulses (first positive phase), arrival and peaks over the curves, in the free field at ground
+Peak specific impulses, arrival and peaks over the curves, in the free field at ground
 level and on a wide rigid wall. Arrival is the time of the steepest rise: a shock is some cells
 wide, and its middle counts.
 """
@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.calibration.references import Quantity, kingery_bulmash
+from blast_env.physics.gas.ending import is_known
 from blast_env.physics.gas.faces import exposed_faces
 from blast_env.physics.gas.grid import FaceKind, GasGrid
 from blast_env.physics.gas.probes import FaceLoads, Gauges
@@ -34,7 +35,7 @@ class Ratio:
 
     Attributes:
         z_m_kg: Scaled distance, m/kg^(1/3).
-        impulse: Of the first positive phase.
+        impulse: Peak specific impulse.
         arrival: Time of the steepest rise.
         peak: Largest overpressure.
     """
@@ -69,13 +70,15 @@ def wide_wall(
     charge = GasCharge(charge_kg, (0.0, 0.0, 0.0), explosive)
     solver = GasSolver(grid, faces=faces, recorders=[loads], with_fuel=True, burning=charge.burning)
     set_charge(solver, charge)
-    while solver.time_s < latest_s and not loads.first_is_over[nearest]:
+    while solver.time_s < latest_s:
         solver.step()
+        if is_known(loads.impulse_pa_s, loads.net_impulse_pa_s)[nearest]:
+            break
     return _over_reference(
         "reflected",
         distance_m,
         charge_kg,
-        float(loads.first_impulse_pa_s[nearest]),
+        float(loads.impulse_pa_s[nearest]),
         float(loads.steepest_s[nearest]),
         float(loads.peak_pa[nearest]),
     )
@@ -95,7 +98,7 @@ def free_field(
             "incident",
             cell_m * hypot(cell[0] + 0.5, 0.5, 0.5),
             charge_kg,
-            float(gauges.first_impulse_pa_s[k]),
+            float(gauges.impulse_pa_s[k]),
             float(gauges.steepest_s[k]),
             float(gauges.peak_pa[k]),
         )
@@ -119,8 +122,10 @@ def free_field_gauges(
     solver = GasSolver(grid, recorders=[gauges], with_fuel=True, burning=charge.burning)
     set_charge(solver, charge, _FREE_FIELD_START * unit)
     latest_s = _LATEST * _phase_end_s(farthest_m, charge_kg)
-    while solver.time_s < latest_s and not gauges.first_is_over.all():
+    while solver.time_s < latest_s:
         solver.step()
+        if is_known(gauges.impulse_pa_s, gauges.net_impulse_pa_s).all():
+            break
     return gauges
 
 

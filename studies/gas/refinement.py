@@ -12,12 +12,11 @@ from blast_env.physics.gas.engine import GasRun
 from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import build_site
 
-BLOCK: Final = 8
+BLOCK: Final = 4
 """Cells along the side of a block."""
 
 _STILL: Final = 0.001
-_SMALL: Final = 0.01
-"""Overpressures, of still air's, below which air counts as still, and jumps count for less."""
+"""Overpressure, of still air's, below which air counts as still."""
 
 _COARSER: Final = 1.0 / 16.0
 """Updates of a block of 1 m cells over those of 0.5 m: an eighth of the cells, half the steps."""
@@ -31,8 +30,8 @@ class Refinement:
     """What perfect refinement would move on, without any overhead.
 
     Attributes:
-        threshold: Where a block is refined: its largest jump of pressure from cell to cell over its
-            largest overpressure.
+        threshold: Where a block is refined: its largest jump of pressure from cell to cell over the
+            lower of the two pressures.
         share: Of the blocks that the blast has reached, the mean share that is refined.
         coarse: Updates with 0.5 m in these and 1 m elsewhere, over those of 0.5 m everywhere.
         fine: With 0.25 m in these and 1 m elsewhere, over the same.
@@ -74,9 +73,7 @@ def refined_blast(scenario: Scenario, thresholds: list[float], every_s: float) -
         run.advance(run.time_s + every_s)
         cpu_s += process_time() - began_s
         overpressure, jump = _waves(run)
-        local, steepest = _most(np.abs(overpressure)), _most(jump)
-        reached = local > _STILL
-        steep = steepest / np.maximum(local, _SMALL)
+        reached, steep = _most(np.abs(overpressure)) > _STILL, _most(jump)
         refined = [((steep > each) | walls) & reached for each in thresholds]
         rows.append([(run.steps - steps) * each.sum() for each in (reached, *refined)])
         steps = run.steps
@@ -90,9 +87,10 @@ def refined_blast(scenario: Scenario, thresholds: list[float], every_s: float) -
 
 
 def _waves(run: GasRun) -> tuple[FloatArray, FloatArray]:
-    """Return overpressure, and the largest jump to a neighbouring cell, of still air's (x, y, z).
+    """Return the overpressure, of still air's, and the largest relative jump (x, y, z).
 
-    Solids count as still air, and nothing jumps there.
+    A jump is the difference to a neighbouring cell over the lower pressure. Solids count as still
+    air, and nothing jumps there.
     """
     gas, air = run.solver, ~run.grid.solid
     layers = [gas.overpressure_in(2, layer) for layer in range(run.grid.shape[2])]
@@ -101,7 +99,8 @@ def _waves(run: GasRun) -> tuple[FloatArray, FloatArray]:
     for axis in range(3):
         low = tuple(slice(None, -1) if each == axis else slice(None) for each in range(3))
         high = tuple(slice(1, None) if each == axis else slice(None) for each in range(3))
-        step = np.abs(np.diff(overpressure, axis=axis)) * (air[low] & air[high])
+        lower = 1.0 + np.minimum(overpressure[low], overpressure[high])
+        step = np.abs(np.diff(overpressure, axis=axis)) / lower * (air[low] & air[high])
         jump[low] = np.maximum(jump[low], step)
         jump[high] = np.maximum(jump[high], step)
     return overpressure, jump

@@ -72,11 +72,8 @@ def _print(
             name,
             *(f"{1e-3 * value:.1f}" for value in (own.peak_pa[n], found.peak_pa[n])),
             f"{own.peak_pa[n] / found.peak_pa[n]:.2f}",
-            *(
-                f"{value:.1f}"
-                for value in (own.positive_impulse_pa_s[n], found.positive_impulse_pa_s[n])
-            ),
-            f"{own.positive_impulse_pa_s[n] / found.positive_impulse_pa_s[n]:.2f}",
+            *(f"{value:.1f}" for value in (own.impulse_pa_s[n], found.impulse_pa_s[n])),
+            f"{own.impulse_pa_s[n] / found.impulse_pa_s[n]:.2f}",
         )
         for n, name in enumerate(names)
     ]

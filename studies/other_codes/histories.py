@@ -9,6 +9,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import import_extra
+from blast_env.response.sdof import impulses
 from blast_env.units import MS_PER_S
 
 if TYPE_CHECKING:
@@ -40,10 +41,9 @@ class Histories:
         return np.asarray(self.overpressure_pa.max(axis=0))
 
     @cached_property
-    def positive_impulse_pa_s(self) -> FloatArray:
-        """Impulses of all positive phases (cells,)."""
-        positive = np.maximum(self.overpressure_pa, 0.0)
-        return np.asarray(np.trapezoid(positive, self.time_s, axis=0))
+    def impulse_pa_s(self) -> FloatArray:
+        """Peak specific impulses (cells,)."""
+        return np.asarray(impulses(self.time_s, self.overpressure_pa.T).max(axis=1))
 
 
 def histories_figure(

@@ -210,7 +210,9 @@ def _summary(folder: Path) -> Format:
 def _loads(folder: Path) -> Format:
     cache = DiskCache(folder / "cache")
     key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
-    load = StructureLoad("building", True, 1.0, 5.0, 2.0, 0.01, None, 0.0, True, ("a note",))
+    load = StructureLoad(
+        *("building", True, 1.0, 5.0, 2.0, 0.01, None, 0.0, True), ("a note",), "building"
+    )
     cache.add(key, BlastLoads((load,), np.arange(8.0)))
     (path,) = cache.folder.iterdir()
 

@@ -103,7 +103,9 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
 
 def test_cells_are_for_gas_alone(site: Path, tmp_path: Path) -> None:
     for command in (("train", "--run"), ("league", "--out")):
-        result = run(*command, tmp_path / "a", "--scenario", site, "--cell", 0.25)
+        result = run(
+            *command, tmp_path / "a", "--scenario", site, "--engine", "event", "--cell", 0.25
+        )
         assert result.exit_code == 2
         assert "engine 'event' has no cells" in " ".join(result.stderr.split())
         assert not (tmp_path / "a").exists()

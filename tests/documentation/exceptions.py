@@ -209,12 +209,14 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.gas corners": "--sizes 0.5",
     "python -m studies.gas handover": "--radii 3,6 --until 0.05",
     "python -m studies.gas settling": "--until 0.02",
-    "python -m studies.gas ending --until 0.25 --random-layouts 1": (
-        "--until 0.02 --random-layouts 0"
+    "python -m studies.gas definition --scenario visitor_entrance --sizes 0.5,0.25 --until 0.18": (
+        "--sizes 0.5"
     ),
-    "python -m studies.gas until": "--scenario visitor_entrance --cell 0.5",
+    "python -m studies.gas definition --scenario street_front --sizes coarse --until 1.3": (
+        "--scenario visitor_entrance --until 0.05"
+    ),
+    "python -m studies.gas ending": "--generated 0 --times 1.1",
     "python -m studies.gas oblique": "--angles 20 --until 0.02",
-    "python -m studies.gas borders --places 2/0,2/12,2/24,8/48": ("--places 2/0,2/12 --until 0.05"),
     "python -m studies.gas air-height": "--heights 9,12 --until 0.05",
     "python -m studies.gas cells --random-layouts 18 --finest 0.125": (
         "--sizes 0.5 --random-layouts 0 --finest 0.5"
@@ -478,6 +480,9 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m studies.blast_table out/street/blasts --scenario studies/school_street.toml"
     " --out FILE": "FILE is a placeholder; tests/studies/test_blast_table.py",
+    "python -m studies.blast_again docs/data/site_blasts.parquet --layouts 8": (
+        "80 sites; tests/studies/test_blast_again.py"
+    ),
     "python -m studies.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/studies/test_blast_table.py"
     ),

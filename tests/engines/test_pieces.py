@@ -11,7 +11,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.scenario import ScenarioError
 from tests.catalogue_sites import ITEMS, WALL, yard
 from tests.gas_sites import WALL as MODULES
-from tests.gas_sites import hut
+from tests.gas_sites import hut, net_on_modules
 
 
 def yard_with(**keys: Any) -> GasResult:
@@ -27,10 +27,10 @@ def result() -> GasResult:
 
 def test_the_push_is_what_the_two_sides_took(result: GasResult) -> None:
     """Over all time: west less east, by the faces of the modules of the piece."""
-    faces = result.modules
+    faces = net_on_modules(result)
     for name in result.pieces["piece"]:
         own = faces[faces["piece"] == name]
-        whole = own["positive_impulse_pa_s"] + own["negative_impulse_pa_s"]
+        whole = own["net_pa_s"]
         west, east = (whole[own["face"] == side].mean() for side in ("west", "east"))
         loads = result.piece_loads
         assert loads is not None

@@ -27,7 +27,8 @@ class ConstantEngine(Engine):
         """Return 100 Pa s on everything."""
         loads = [
             StructureLoad(
-                each.name, each.protected, each.weight, 0.0, 0.0, 100.0, None, 1.0, True, ()
+                *(each.name, each.protected, each.weight, 0.0, 0.0, 100.0, None, 1.0, True),
+                *((), each.name),
             )
             for each in scenario.structures
         ]

@@ -1,8 +1,8 @@
-"""What tables of consequences and reports say of loads of which more may come."""
+"""Tables of consequences and reports flag loads that are not known at the end of a run."""
 
 import pytest
 
-from blast_env.engines.gas import NOT_COMPLETE, GasBlast, GasEngine
+from blast_env.engines.gas import NOT_KNOWN, GasBlast, GasEngine
 from blast_env.evaluation.consequences import Consequences, bay_table, consequences
 from blast_env.physics.scene import Charge
 from blast_env.reporting.loads import measure, targets_of
@@ -17,29 +17,29 @@ def judged(engine: GasEngine) -> Consequences:
     return consequences(scenario, (), [Charge((2.0, 4.0), 5.0)], engine)
 
 
-def test_bays_say_that_more_may_come() -> None:
+def test_bays_that_are_cut_off_are_flagged() -> None:
     cut, whole = judged(CUT), judged(WHOLE)
     table = bay_table({"cut": cut, "whole": whole}).set_index("layout")
-    late = ~table["complete"].loc["cut"]
+    late = ~table["known"].loc["cut"]
     assert late.any()
-    assert table["complete"].loc["whole"].all()
+    assert table["known"].loc["whole"].all()
     assert cut.is_flagged
-    words = f"{late.sum()} of {len(late)} bays of all charges are not complete"
+    words = f"{late.sum()} of {len(late)} bays of all charges: impulse not yet captured"
     assert cut.notes[-1].startswith(words)
-    assert not any("complete" in note for note in whole.notes)
+    assert not any("captured" in note for note in whole.notes)
     (response,) = whole.responses
-    assert set(response.tails) == {each.bay.name for each in response.facade.bays}
+    assert set(response.known) == {each.bay.name for each in response.facade.bays}
 
 
-@pytest.mark.parametrize(("engine", "complete"), [(CUT, False), (WHOLE, True)])
-def test_reports_say_it_of_every_building(engine: GasEngine, complete: bool) -> None:
+@pytest.mark.parametrize(("engine", "known"), [(CUT, False), (WHOLE, True)])
+def test_reports_flag_every_building(engine: GasEngine, known: bool) -> None:
     scenario = hut()
     measured = measure(GasBlast(scenario, engine=engine), targets_of(scenario))
-    assert measured.loads["hut"].complete == complete
-    assert (f"hut: {NOT_COMPLETE}" in measured.notes) != complete
+    assert measured.loads["hut"].known == known
+    assert (f"hut: {NOT_KNOWN}" in measured.notes) != known
 
 
-@pytest.mark.parametrize(("until", "late"), [(0.012, ["front", "behind"]), ("gauges", [])])
-def test_a_blast_says_which_gauges_are_not_complete(until: str | float, late: list[str]) -> None:
+@pytest.mark.parametrize(("until", "late"), [(0.004, ["front", "behind"]), ("gauges", [])])
+def test_gauges_that_are_cut_off_are_flagged(until: str | float, late: list[str]) -> None:
     found = GasBlast(hut(), engine=GasEngine(border_m=0.0, until=until)).run()
-    assert found.gauge_notes == tuple(f"gauge {name}: {NOT_COMPLETE}" for name in late)
+    assert found.gauge_notes == tuple(f"gauge {name}: {NOT_KNOWN}" for name in late)

@@ -74,9 +74,9 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(found: Consequences) -
     below = LevelOfProtection.BELOW_STANDARDS
     assert found.verdict(below) == "PASSES (flagged)"
     assert replace(found, unchecked=()).is_flagged == any(
-        not each.complete for each in found.responses[0].tails.values()
+        not each for each in found.responses[0].known.values()
     )
-    bare = Consequences((replace(found.responses[0], tails={}),))
+    bare = Consequences((replace(found.responses[0], known={}),))
     assert bare.verdict(below) == "PASSES"
     assert bare.verdict(LevelOfProtection.HIGH) == "FAILS"
     assert replace(bare, unchecked=(("kiosk", "too near"),)).verdict(below) == "PASSES"

@@ -39,7 +39,9 @@ def key(seed: int) -> BlastKey:
 def loads(seed: int) -> BlastLoads:
     """Loads with numbers that need every bit."""
     notes = ("far", "b\n")
-    house = StructureLoad("haus ß", True, 2.0, 0.1 + 0.2, 1.0 / 3.0, 1e-300, 0.7, 2.0, False, notes)
+    house = StructureLoad(
+        "haus ß", True, 2.0, 0.1 + 0.2, 1.0 / 3.0, 1e-300, 0.7, 2.0, False, notes, "b"
+    )
     structures = (house, replace(house, name="b", notes=()))
     return BlastLoads(structures, np.array([0.0, float(seed), np.pi, 1e300]))
 
@@ -284,7 +286,7 @@ def test_loads_that_cannot_be_those_of_the_scenario_are_simulated_again(
     shared = LoadsCache(10)
     first = BlastEvaluator(COURTYARD, "event", cache=shared)
     good = first.loads(*PAIRS[0])
-    shared.add(first._key(*PAIRS[0]), wrong(good))
+    shared.add(first.key(*PAIRS[0]), wrong(good))
     again = BlastEvaluator(COURTYARD, "event", cache=shared)
     assert same(again.loads(*PAIRS[0]), good)
     assert again.blasts == 1

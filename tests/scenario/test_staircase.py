@@ -108,7 +108,7 @@ def test_tables_have_the_area_and_the_load_of_the_real_wall(turned: GasResult) -
     assert block["peak_pa"] < 0.85 * turned.faces["peak_pa"].max()
     assert turned.walls["peak_pa"].max() == block["peak_pa"]
     assert turned.loads().protected_peak_pa == block["peak_pa"]
-    told = turned.structures.set_index("structure")["positive_impulse_pa_s"]
+    told = turned.structures.set_index("structure")["impulse_pa_s"]
     assert turned.impulse("part_9").pa_s == pytest.approx(told["part_9"])
 
 
@@ -116,7 +116,7 @@ def test_momentum_along_the_normal_is_kept(turned: GasResult) -> None:
     oblique = turned.oblique
     assert oblique is not None
     own, share = oblique.members, oblique.share
-    raw = turned.run.loads.positive_impulse_pa_s
+    raw = turned.run.loads.impulse_pa_s
     assert 0.0 < share[own].min() < share[own].max() <= 1.0
     assert (share * raw)[own].sum() == pytest.approx(
         (share * oblique.along_normals(raw))[own].sum(), rel=1e-12
@@ -129,13 +129,13 @@ def test_means_are_over_the_area_of_the_real_walls(turned: GasResult) -> None:
     oblique = turned.oblique
     assert oblique is not None
     is_wall = turned.faces["face"].isin(WALLS).to_numpy()
-    raw = turned.run.loads.positive_impulse_pa_s
+    raw = turned.run.loads.impulse_pa_s
     momentum = 0.25 * (oblique.share * raw)[is_wall].sum()
     for table in (turned.structures, turned.walls[turned.walls["counts"]], turned.buildings):
-        load, area = table["positive_impulse_pa_s"], table["area_m2"]
+        load, area = table["impulse_pa_s"], table["area_m2"]
         assert (load * area).sum() == pytest.approx(momentum, rel=1e-12)
     loads = {each.name: each.impulse_pa_s for each in turned.loads().structures}
-    told = turned.structures.set_index("structure")["positive_impulse_pa_s"]
+    told = turned.structures.set_index("structure")["impulse_pa_s"]
     assert loads == pytest.approx(told.to_dict())
 
 

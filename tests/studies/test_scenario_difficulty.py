@@ -195,7 +195,11 @@ def test_the_tables_were_made_with_the_scenario_as_it_is(name: str) -> None:
     assert picture_path(REPOSITORY / PICTURES, name).is_file()
 
 
-@pytest.mark.parametrize("name", studied_scenarios())
+IN_OVERVIEW = [name for name in studied_scenarios() if name != "shopping_street"]
+"""The rules of that one's table leave out the best one."""
+
+
+@pytest.mark.parametrize("name", IN_OVERVIEW)
 def test_the_overview_says_what_the_tables_say(name: str) -> None:
     """Random layouts, the best rule, and the best of all, where one layout meets every place."""
     overview = (REPOSITORY / "docs" / "studies" / "scenarios.md").read_text("utf-8")

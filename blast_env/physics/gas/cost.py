@@ -1,17 +1,17 @@
 """What a blast by gas dynamics costs, told before it begins.
 
 A small model of the solver: the cells that the front has reached, if the charge is in the middle,
-the steps until the loads are complete, and how many cells a core moves on in a second.
+the steps until the loads are known, and how many cells a core moves on in a second.
 docs/howto/app.md holds it against blasts that were run.
 """
 
 from dataclasses import dataclass
-from math import cbrt, ceil, prod
+from math import cbrt, ceil, expm1, prod
 from typing import Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.settings import SOUND_M_S, WINDOW_S, GasSettings
-from blast_env.physics.gas.waves import watched_structures, waves_of
+from blast_env.physics.gas.ending import SOUND_M_S, corners_m, sound_s, watched_structures
+from blast_env.physics.gas.settings import GasSettings
 from blast_env.physics.scene import BlastSite
 
 MOST_BYTES: Final = 8 * 2**30
@@ -21,11 +21,12 @@ MOST_S: Final = 6 * 3600.0
 _STEP_S_PER_M: Final = (0.68e-3, 1.32e-3)
 """Time step over the side of a cell: as the sound in hot products allows it, and afterwards."""
 
-_AHEAD_M: Final = 14.0
-"""How far the front of 100 kg is ahead of sound that began with it, soon after."""
+_AHEAD_M: Final = 12.0
+_AHEAD_AFTER_S: Final = 0.01
+"""How far the front of 100 kg gets ahead of sound that began with it, and how soon."""
 
-_ECHOES: Final = 2.5
-"""How many pauses between late echoes a run lasts on."""
+_AFTER_S: Final = 0.01
+"""How long a run of 100 kg lasts on after sound has come to all that it waits for."""
 
 _PARTS: Final = 100
 """Of a run, in which what moves is counted."""
@@ -41,7 +42,7 @@ class CostGuess:
 
     Attributes:
         cells: The smallest cells that there are, those around the site included.
-        steps: Steps until the loads are complete.
+        steps: Steps until the loads are known.
         memory_bytes: Memory of the process.
         moved: Cells that are moved on, in all steps together.
     """
@@ -76,23 +77,24 @@ class CostGuess:
             )
 
 
-def cost_of_run(settings: GasSettings, site: BlastSite) -> CostGuess:
+def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0) -> CostGuess:
     """Return what a blast by gas dynamics costs, about; nothing is built for it.
 
     Args:
         settings: How it is run.
         site: What stands where.
+        response_s: How long the run goes on at least after the last load was reached.
     """
     scale = cbrt(site.charge.tnt_kg / 100.0)
-    waves = waves_of(site, watched_structures(site, settings.until))
-    end_s = waves.passed_s + WINDOW_S * scale + _ECHOES * waves.pause_s
+    watched = watched_structures(site, settings.until)
+    end_s = sound_s(site, corners_m(site, watched)) + max(_AFTER_S * scale, response_s)
     part_s, ahead_m = (settings.until_s or end_s) / _PARTS, _AHEAD_M * scale
     left_m, bottom_m, right_m, top_m = site.site_m
     sides_m = (right_m - left_m, top_m - bottom_m, site.air_height_m)
     steps, moved = 0.0, 0.0
     for part in range(_PARTS):
         now_s = (part + 0.5) * part_s
-        front_m = SOUND_M_S * now_s + ahead_m
+        front_m = SOUND_M_S * now_s - ahead_m * expm1(-now_s / (_AHEAD_AFTER_S * scale))
         cell_m = settings.smallest_m * 2.0 ** sum(front_m > run_m for run_m in settings.doubled_m)
         step_s = cell_m * _STEP_S_PER_M[now_s > settings.settled_s * scale]
         x, y, z = _cells_in(sides_m, cell_m, settings, margin=False)

@@ -3,7 +3,7 @@
 The site becomes a grid of cubes: structures, barrier and ground are solid. Around the site and
 above it cells grow outwards, to open borders far away. The charge expands with spherical symmetry
 until its front reaches the first structure or the build zone, then the solver takes over, until the
-loads on the structures are complete.
+loads on the structures are known.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,18 +19,19 @@ from blast_env.errors import BlastEnvError
 from blast_env.physics.engine import EndReason
 from blast_env.physics.gas.cost import cost_of_run
 from blast_env.physics.gas.doubling import DoublingSolver, shape_to_double
+from blast_env.physics.gas.ending import (
+    AREA,
+    corners_m,
+    is_known,
+    limit_s,
+    sound_s,
+    watched_structures,
+)
 from blast_env.physics.gas.faces import Faces, exposed_faces
 from blast_env.physics.gas.grid import GasGrid, layers_to
 from blast_env.physics.gas.opening import opening_of
 from blast_env.physics.gas.probes import FaceLoads, Gauges
-from blast_env.physics.gas.settings import (
-    CHECKED_CELLS,
-    FACE_NAMES,
-    WINDOW_S,
-    GasSettings,
-    is_complete,
-    still_to_come,
-)
+from blast_env.physics.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
 from blast_env.physics.gas.solver import Gas, GasSolver, Recorder, Settling
 from blast_env.physics.gas.source import (
     GasCharge,
@@ -39,15 +40,11 @@ from blast_env.physics.gas.source import (
     least_clearance_m,
     set_charge,
 )
-from blast_env.physics.gas.tail import Tail
-from blast_env.physics.gas.waves import corners_m, passed_after_s, watched_structures, waves_of
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
-_TIME_LIMIT_S: Final = 0.3  # for more windows after waves of 100 kg
-_MOST_ECHOES: Final = 5  # between facing walls, after that
 _HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
-_SMALL_LOAD: Final = 0.05  # of the largest impulse: what counts at least
+_LOOK_EVERY: Final = 4  # steps between two looks at the loads
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
 
@@ -83,7 +80,7 @@ class GasRun:
     Attributes:
         site: What stands where.
         settings: How it is run.
-        told: What it would cost, as guessed before it began.
+        cost: Estimate of its cost before it began.
         grid: The grid.
         solver: The solver.
         charge: The charge.
@@ -94,18 +91,24 @@ class GasRun:
         table: The faces on which loads are recorded.
         loads: The loads on them.
         gauges: The gauges, `None` without any.
-        tail: What came last on faces and gauges.
+        response_s: How long it goes on at least after the last load was reached, for facades to
+            peak and rebound.
+        limit_s: When it ends at the latest.
         end_reason: Why the run has ended; None while it has not.
         notes: Why the result is to be distrusted, a sentence each.
     """
 
     def __init__(
-        self, settings: GasSettings, site: BlastSite, recorders: Recorders = _none
+        self,
+        settings: GasSettings,
+        site: BlastSite,
+        recorders: Recorders = _none,
+        response_s: float = 0.0,
     ) -> None:
-        self.settings, self.site = settings, site
+        self.settings, self.site, self.response_s = settings, site, response_s
         watched = watched_structures(site, settings.until)
-        self.told = cost_of_run(settings, site)
-        self.told.check(settings)
+        self.cost = cost_of_run(settings, site, response_s)
+        self.cost.check(settings)
         self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
@@ -132,13 +135,12 @@ class GasRun:
             _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
         self.end_reason: EndReason | None = None
         self._groups = _groups(self.table, site, settings.until, watched)
-        gauges = [each.position_m for each in site.gauges]
-        places = [] if settings.until != "gauges" and watched else gauges
-        waves = waves_of(site, watched, places)
-        self._waves_s = waves.passed_s
-        self.tail = Tail(own, WINDOW_S * scale, waves.passed_s, waves.pause_s)
-        asked, most_s = settings.until_s, _TIME_LIMIT_S * scale + _MOST_ECHOES * waves.pause_s
-        self.limit_s = self._waves_s + most_s if asked is None else asked
+        self._watches_gauges = settings.until == "gauges" and self.gauges is not None
+        places_m = [each.position_m for each in site.gauges] if self._watches_gauges else []
+        self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
+        self._end_s: float | None = None
+        asked_s = settings.until_s
+        self.limit_s = limit_s(site, self._travel_s) + response_s if asked_s is None else asked_s
 
     @property
     def time_s(self) -> float:
@@ -167,54 +169,49 @@ class GasRun:
         """
         while self.end_reason is None and self.solver.time_s < until_s:
             self.solver.step()
-            looked = self.tail.look(self.solver.time_s)
             asked = self.settings.until_s is not None
             if self.solver.time_s >= self.limit_s:
                 self.end_reason = EndReason.TIME_ASKED if asked else EndReason.TIME_LIMIT
-            elif asked or not looked or self.solver.time_s < self._waves_s:
-                continue
-            elif self._is_complete():
-                self.end_reason = EndReason.LOADS_COMPLETE
+            elif not asked and self.solver.steps % _LOOK_EVERY == 0:
+                self._look()
 
-    def has_passed(self, index: int) -> bool:
-        """Return whether all waves of the charge have come to a structure, by its index."""
-        return self.solver.time_s >= passed_after_s(self.site, corners_m(self.site, [index]))
+    def has_come(self, index: int) -> bool:
+        """Return whether sound has come from the charge to all of a structure, by its index."""
+        return self.solver.time_s >= sound_s(self.site, corners_m(self.site, [index]))
 
-    def is_complete(self, faces: NDArray[np.int64], index: int) -> bool:
-        """Return whether the mean impulse on some faces of a structure is complete."""
-        return not len(faces) or (self.has_passed(index) and self._are_complete([faces]))
+    def is_known(self, index: int) -> bool:
+        """Return whether the loads on the walls of a structure that count are known."""
+        groups = _groups(self.table, self.site, self.settings.until, [index])
+        return not groups or (self.has_come(index) and self._are_known(groups))
 
     @property
-    def gauges_to_come_pa_s(self) -> FloatArray:
-        """About what is still to come at each gauge (n,); NaN if not all waves have come to it."""
+    def gauges_known(self) -> NDArray[np.bool_]:
+        """Whether the load of each gauge is known (n,)."""
         if self.gauges is None:
-            return np.empty(0)
-        passed_s = [passed_after_s(self.site, [each.position_m]) for each in self.site.gauges]
-        to_come = still_to_come(*self.tail.came_pa_s(1))
-        return np.where(self.solver.time_s >= np.array(passed_s), to_come, np.nan)
+            return np.empty(0, dtype=bool)
+        come_s = np.array([sound_s(self.site, [each.position_m]) for each in self.site.gauges])
+        known = is_known(self.gauges.impulse_pa_s, self.gauges.net_impulse_pa_s)
+        return known & (self.solver.time_s >= come_s)
 
-    def _are_complete(self, groups: Sequence[NDArray[np.int64]], least: float = 0.0) -> bool:
-        """Return whether mean impulses on groups of faces are complete.
+    def _look(self) -> None:
+        """End the run if its loads are known, and facades have had the time to respond to them."""
+        if self._end_s is None and self.solver.time_s >= self._travel_s:
+            gauges = not self._watches_gauges or bool(self.gauges_known.all())
+            if gauges and self._are_known(self._groups):
+                self._end_s = self._reached_s() + self.response_s
+        if self._end_s is not None and self.solver.time_s >= self._end_s:
+            self.end_reason = EndReason.LOADS_KNOWN
 
-        Args:
-            groups: The faces of each.
-            least: What counts at least, over the largest of them.
-        """
-        series = [self.loads.positive_impulse_pa_s, *self.tail.came_pa_s(0)]
-        now, last, before = (
-            np.array([values[members].mean() for members in groups]) for values in series
-        )
-        now = np.maximum(now, least * now.max(initial=0.0))
-        return bool(is_complete(now, still_to_come(last, before)).all())
+    def _reached_s(self) -> float:
+        """Return when the last of the known loads that the run waits for was reached."""
+        known = is_known(self.loads.impulse_pa_s, self.loads.net_impulse_pa_s)
+        reached_s = np.where(known, self.loads.impulse_time_s, 0.0)
+        return max((float(reached_s[faces].max()) for faces in self._groups), default=0.0)
 
-    def _is_complete(self) -> bool:
-        """Whether little is still to come of what the run waits for."""
-        least = _SMALL_LOAD if self.settings.until == "structures" else 0.0
-        complete = self._are_complete(self._groups, least)
-        if self.gauges is not None and self.settings.until == "gauges":
-            of_gauges = still_to_come(*self.tail.came_pa_s(1))
-            complete &= bool(is_complete(self.gauges.positive_impulse_pa_s, of_gauges).all())
-        return complete
+    def _are_known(self, walls: Sequence[NDArray[np.int64]]) -> bool:
+        """Return whether the loads on walls are known, from the faces of each."""
+        on_faces = is_known(self.loads.impulse_pa_s, self.loads.net_impulse_pa_s)
+        return all(on_faces[faces].mean() >= AREA for faces in walls)
 
     def _notes(self) -> tuple[str, ...]:
         """Return why the source was not checked for such a blast."""
@@ -326,23 +323,13 @@ def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
 def _groups(
     table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
 ) -> list[NDArray[np.int64]]:
-    """Return the faces whose mean impulses a run waits for: of structures, or of each wall."""
-    if until != "walls":
-        return [_faces_of(table, site, index) for index in watched]
-    walls = (
-        np.flatnonzero((table.structure == index) & (table.face == face))
+    """Return the faces of each wall whose load a run waits for: those that count, or all."""
+    groups = (
+        np.flatnonzero((table.structure == index) & (table.face == FACE_NAMES.index(name)))
         for index in watched
-        for face in range(len(FACE_NAMES))
+        for name in (FACE_NAMES if until == "walls" else site.structures[index].faces)
     )
-    return [members for members in walls if len(members)]
-
-
-def _faces_of(table: FaceTable, site: BlastSite, index: int) -> NDArray[np.int64]:
-    """Return the faces of the walls of a structure that count, of all if those are in others."""
-    own = table.structure == index
-    counting = [FACE_NAMES.index(name) for name in site.structures[index].faces]
-    chosen = own & np.isin(table.face, counting)
-    return np.flatnonzero(chosen if chosen.any() else own)
+    return [members for members in groups if len(members)]
 
 
 def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:

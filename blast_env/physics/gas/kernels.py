@@ -47,8 +47,8 @@ PITCH: Final = 160
 No multiple of 64, which the cache would not like.
 """
 
-_LIMIT: Final = 1.5
-"""Of generalised minmod: steepest slope in units of the smaller difference."""
+_LIMIT: Final = 2.0
+"""Steepest slope in units of the smaller difference (van Leer's monotonised central limiter)."""
 
 _LEAST_SHARE: Final = 0.1
 """Where reconstructed density or pressure is below this share of the cell's, the cell is taken as

@@ -55,11 +55,14 @@ class Opening:
         """Return the largest overpressures so far, 0 where the front has not been."""
         return self._over_distance(self.overpressure_pa.max(axis=0, initial=0.0), distance_m)
 
-    def positive_impulse_pa_s(self, distance_m: ArrayLike) -> Floats:
-        """Return the impulses of all positive phases so far."""
+    def impulses_pa_s(self, distance_m: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the running impulses at the end of the stage, and their largest values before."""
         step_s = np.diff(self.time_s, append=self.end_s)
-        positive = np.maximum(self.overpressure_pa, 0.0)
-        return self._over_distance(step_s @ positive, distance_m)
+        running = np.cumsum(step_s[:, np.newaxis] * self.overpressure_pa, axis=0)
+        return (
+            self._over_distance(running[-1], distance_m),
+            self._over_distance(running.max(axis=0, initial=0.0), distance_m),
+        )
 
     def _over_distance(self, values: Floats, distance_m: ArrayLike) -> Floats:
         return np.interp(np.asarray(distance_m), self.radius_m, values, right=0.0)

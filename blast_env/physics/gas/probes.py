@@ -1,7 +1,11 @@
 """What is recorded while the gas moves: loads on faces, gauges, maps of the ground, pictures.
 
-Overpressures become impulses step by step, in compiled code. Three impulses are kept, in Pa s: the
-sum of all positive phases, the first positive phase, and the sum of all negative phases (below 0).
+The load of a point is its **peak specific impulse**, Pa s: the largest value that the integral of
+the overpressure since the detonation reaches, suction included. For a single pulse it is the
+impulse of Kingery and Bulmash; for several pulses it is the largest value of the impulse history,
+which shock codes print. Later pulses count only where they push the history above what it was: the
+sum of all positive phases, which grows with every echo for as long as a run lasts, is no measure of
+what a wall has to take up. `positive_phases` has that sum and the first phase, from a history.
 
 On a wall, the pressure of a step is the momentum that the wall took from the gas in it: the flux
 that turned the gas round. No estimate from cells is exact in that sense; the pressure of the cell
@@ -11,7 +15,8 @@ pressure of its cell.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from math import isnan
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,11 +30,9 @@ ARRIVAL_PA: Final = 1000.0
 """Overpressure at which a wave has arrived, unless said otherwise."""
 
 # Columns of a table of loads.
-_ARRIVAL, _PEAK, _PEAK_TIME, _POSITIVE, _FIRST, _NEGATIVE = 0, 1, 2, 3, 4, 5
-_RISE, _RISE_TIME, _PHASE, _NOW = 6, 7, 8, 9
-_COLUMNS: Final = 10
-# Phases.
-_BEFORE, _IN_FIRST, _AFTER = 0.0, 1.0, 2.0
+_ARRIVAL, _PEAK, _PEAK_TIME, _NET, _IMPULSE, _IMPULSE_TIME = 0, 1, 2, 3, 4, 5
+_RISE, _RISE_TIME, _NOW = 6, 7, 8
+_COLUMNS: Final = 9
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -58,18 +61,13 @@ def _add_step(
             continue
         at = time_s - 0.5 * step_s if is_mean else time_s
         part = step_s * (now if is_mean else 0.5 * (before + now))
-        if load[_PHASE] == _BEFORE and now >= threshold:
-            load[_PHASE] = _IN_FIRST
+        if isnan(load[_ARRIVAL]) and now >= threshold:
             load[_ARRIVAL] = at - step_s * (now - threshold) / (now - before)
-        elif load[_PHASE] == _IN_FIRST and now <= 0.0:
-            load[_PHASE] = _AFTER
-        if part > 0.0:
-            load[_POSITIVE] += part
-            if load[_PHASE] != _AFTER:
-                load[_FIRST] += part
-        else:
-            load[_NEGATIVE] += part
-        if load[_PHASE] != _AFTER and (now - before) / step_s > load[_RISE]:
+        load[_NET] += part
+        if load[_NET] > load[_IMPULSE]:
+            load[_IMPULSE] = load[_NET]
+            load[_IMPULSE_TIME] = time_s
+        if (now - before) / step_s > load[_RISE]:
             load[_RISE] = (now - before) / step_s
             load[_RISE_TIME] = at - 0.5 * step_s
         if now > load[_PEAK]:
@@ -106,11 +104,11 @@ class LoadTable:
 
     @property
     def steepest_s(self) -> NDArray[np.float64]:
-        """Time of the steepest rise in the first phase, nan before arrival (n,).
+        """Time of the steepest rise, nan before arrival (n,).
 
         A shock is some cells wide, and its foot is ahead of it; its middle is where it belongs.
         """
-        arrived = self._loads[:, _PHASE] != _BEFORE
+        arrived = np.isfinite(self._loads[:, _ARRIVAL])
         return np.where(arrived, self._loads[:, _RISE_TIME], np.nan)
 
     @property
@@ -124,24 +122,19 @@ class LoadTable:
         return self._loads[:, _PEAK_TIME].copy()
 
     @property
-    def positive_impulse_pa_s(self) -> NDArray[np.float64]:
-        """Impulse of all positive phases (n,)."""
-        return self._loads[:, _POSITIVE].copy()
+    def impulse_pa_s(self) -> NDArray[np.float64]:
+        """Peak specific impulse so far (n,)."""
+        return self._loads[:, _IMPULSE].copy()
 
     @property
-    def first_impulse_pa_s(self) -> NDArray[np.float64]:
-        """Impulse of the first positive phase, which ends after arrival at 0 Pa (n,)."""
-        return self._loads[:, _FIRST].copy()
+    def impulse_time_s(self) -> NDArray[np.float64]:
+        """Time at which it was reached (n,)."""
+        return self._loads[:, _IMPULSE_TIME].copy()
 
     @property
-    def negative_impulse_pa_s(self) -> NDArray[np.float64]:
-        """Impulse of all negative phases, 0 or below (n,)."""
-        return self._loads[:, _NEGATIVE].copy()
-
-    @property
-    def first_is_over(self) -> NDArray[np.bool_]:
-        """Whether the first positive phase is over (n,)."""
-        return self._loads[:, _PHASE] == _AFTER
+    def net_impulse_pa_s(self) -> NDArray[np.float64]:
+        """Integral of the overpressure from the detonation to now (n,)."""
+        return self._loads[:, _NET].copy()
 
     @property
     def overpressure_pa(self) -> NDArray[np.float64]:
@@ -213,6 +206,60 @@ class PatchHistories:
         return np.array(self._history, dtype=np.float32).reshape(-1, len(self.faces)).T
 
 
+def peak_specific_impulse_pa_s(
+    overpressure_pa: NDArray[np.floating], step_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the peak specific impulses of histories, Pa s (n,).
+
+    Args:
+        overpressure_pa: Mean overpressures of the steps (n, steps).
+        step_s: Lengths of the steps (steps,).
+    """
+    return np.asarray(np.cumsum(overpressure_pa * step_s, axis=-1).max(axis=-1, initial=0.0))
+
+
+class Phases(NamedTuple):
+    """Impulses of the phases of a history, Pa s.
+
+    Attributes:
+        first_pa_s: Of the first positive phase.
+        positive_pa_s: Of all positive phases together.
+        negative_pa_s: Of all negative phases together, 0 or below.
+        first_end_s: End of the first positive phase; the last time if it is not over.
+    """
+
+    first_pa_s: float
+    positive_pa_s: float
+    negative_pa_s: float
+    first_end_s: float
+
+
+def positive_phases(
+    time_s: NDArray[np.float64],
+    overpressure_pa: NDArray[np.float64],
+    arrival_pa: float = ARRIVAL_PA,
+) -> Phases:
+    """Return the impulses of the phases of one history, for comparison with other work.
+
+    Args:
+        time_s: Times (steps,).
+        overpressure_pa: Overpressures at these times (steps,).
+        arrival_pa: Overpressure at which a wave has arrived.
+    """
+    parts = np.diff(time_s) * 0.5 * (overpressure_pa[1:] + overpressure_pa[:-1])
+    arrived = np.flatnonzero(overpressure_pa >= arrival_pa)
+    after = np.flatnonzero(overpressure_pa <= 0.0)
+    end = len(time_s) - 1
+    if len(arrived):
+        end = int(min(after[after > arrived[0]], default=end))
+    return Phases(
+        float(np.maximum(parts[:end], 0.0).sum()),
+        float(np.maximum(parts, 0.0).sum()),
+        float(np.minimum(parts, 0.0).sum()),
+        float(time_s[end]),
+    )
+
+
 class Gauges(LoadTable):
     """Recorder of the overpressure in cells of air, with its whole history.
 
@@ -266,7 +313,7 @@ class Gauges(LoadTable):
 
 
 class GroundMap:
-    """Recorder of the peak overpressure and the positive impulse in one layer of cells.
+    """Recorder of the peak overpressure and the peak specific impulse in one layer of cells.
 
     Args:
         grid: The grid.
@@ -280,13 +327,15 @@ class GroundMap:
         self._layer = layer
         self._solid = grid.solid[:, :, layer]
         self._peak = np.zeros(self._solid.shape, dtype=np.float32)
+        self._net = np.zeros(self._solid.shape, dtype=np.float32)
         self._impulse = np.zeros(self._solid.shape, dtype=np.float32)
 
     def record(self, solver: Gas, step_s: float) -> None:
         """Add a step."""
         over = solver.overpressure_in(2, self._layer).astype(np.float32)
         np.maximum(self._peak, over, out=self._peak)
-        self._impulse += np.float32(step_s) * np.maximum(over, np.float32(0.0))
+        self._net += np.float32(step_s) * over
+        np.maximum(self._impulse, self._net, out=self._impulse)
 
     @property
     def peak_pa(self) -> NDArray[np.float64]:
@@ -294,8 +343,8 @@ class GroundMap:
         return self._trimmed(self._peak)
 
     @property
-    def positive_impulse_pa_s(self) -> NDArray[np.float64]:
-        """Impulses of all positive phases, nan in solid cells (nx, ny)."""
+    def impulse_pa_s(self) -> NDArray[np.float64]:
+        """Peak specific impulses, nan in solid cells (nx, ny)."""
         return self._trimmed(self._impulse)
 
     def _trimmed(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -345,36 +394,3 @@ class Snapshots:
             plane = solver.overpressure_in(self.axis, self.layer)
             pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
             self.frames.append(Snapshot(solver.time_s, pressure))
-
-
-@dataclass(frozen=True)
-class GroupStatus:
-    """How far the load on a group of faces is.
-
-    Attributes:
-        positive_impulse_pa_s: Mean impulse of all positive phases so far.
-        overpressure_pa: Mean overpressure at the last step.
-        largest_overpressure_pa: Largest overpressure on a face at the last step.
-        arrived: Share of the faces that a wave has reached.
-        first_is_over: Share of the faces whose first positive phase is over.
-    """
-
-    positive_impulse_pa_s: float
-    overpressure_pa: float
-    largest_overpressure_pa: float
-    arrived: float
-    first_is_over: float
-
-
-def group_status(loads: LoadTable, members: NDArray[np.int64]) -> GroupStatus:
-    """Return how far the load on some of the points of a table is; for when a run may end.
-
-    `GasSolver.largest_overpressure_pa` says what may still come.
-    """
-    return GroupStatus(
-        positive_impulse_pa_s=float(loads.positive_impulse_pa_s[members].mean()),
-        overpressure_pa=float(loads.overpressure_pa[members].mean()),
-        largest_overpressure_pa=float(loads.overpressure_pa[members].max()),
-        arrived=float(np.isfinite(loads.arrival_s[members]).mean()),
-        first_is_over=float(loads.first_is_over[members].mean()),
-    )

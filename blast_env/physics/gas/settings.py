@@ -6,9 +6,6 @@ from math import floor, inf, isclose, log2, nan
 from types import MappingProxyType
 from typing import Final, Self, TypeAlias
 
-import numpy as np
-
-from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.physics.scene import WALLS
 from blast_env.units import MODULE_SIDE_M
@@ -23,9 +20,6 @@ CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
 """Where the source was checked, m/kg^(1/3) (docs/engineers/gas.md)."""
 CHECKED_CELLS: Final = 9.2
 """Least cells per cube root of the charge's mass in kg with which it was checked, times 1 m."""
-
-COMPLETE: Final = 0.02
-"""Share of an impulse that may still come where it counts as complete."""
 
 UNIFORM: Final = "uniform"
 
@@ -54,17 +48,6 @@ CELLS: Final = (UNIFORM, *_GROWING)
 Cells: TypeAlias = float | str
 """Side of cells in m, or "coarse" or "fine" for cells that grow."""
 
-SOUND_M_S: Final = 340.0
-# A charge sends more than one wave: its products swing between too wide and too narrow. All times
-# are those of 100 kg, and grow with the cube root of the mass. A run ends at one of few times that
-# are the same for all layouts, so that their loads can be compared.
-SWING_S: Final = 0.11
-"""After sound has come all over, in which the other waves follow."""
-WINDOW_S: Final = 0.03
-"""From one such time to the next."""
-
-_MOST_REST: Final = 4.0
-"""The sum of the series over what came last, at most: for a ratio of 0.8."""
 _WAITED_FOR: Final = ("structures", "walls", "gauges")
 _FARTHEST_M: Final = 10_000.0
 _LEAST_CELL_M: Final = 0.001
@@ -85,9 +68,10 @@ class GasSettings:
         settled_s: When the products of 100 kg are no more than hot gas, see `Settling`; grows with
             the cube root of the mass. Infinite where they never are.
         threads: Threads that share a blast; they change nothing but the time.
-        until: What a run waits for: the means over the walls that count of each protected structure
-            ("structures"), those of every wall and roof on the site ("walls"), or the protected
-            structures and every gauge ("gauges"); or how long it lasts in seconds, also as text.
+        until: Whose loads have to be known before a run ends: those of the walls that count of each
+            protected structure ("structures"), of every wall and roof on the site ("walls"), or of
+            the protected structures and every gauge ("gauges"); or how long it lasts in seconds,
+            also as text.
 
     Raises:
         BlastEnvError: If one of them is out of bounds.
@@ -161,19 +145,6 @@ class GasSettings:
     def until_s(self) -> float | None:
         """How long a run lasts; `None` where it waits for loads."""
         return None if isinstance(self.until, str) else self.until
-
-
-def still_to_come(last_pa_s: FloatArray | float, before_pa_s: FloatArray | float) -> FloatArray:
-    """Return about what is still to come after what came last and before that, Pa s (n,)."""
-    last = np.asarray(last_pa_s)
-    less = np.maximum(before_pa_s - last, last / _MOST_REST)
-    series = np.divide(last, less, out=np.ones(np.shape(less)), where=less > 0.0)
-    return np.asarray(last * np.maximum(series, 1.0))
-
-
-def is_complete(impulse_pa_s: FloatArray | float, to_come_pa_s: FloatArray | float) -> BoolArray:
-    """Return whether impulses are complete; not where NaN is still to come."""
-    return np.asarray(np.asarray(to_come_pa_s) <= COMPLETE * np.asarray(impulse_pa_s))
 
 
 def _seconds(until: object) -> float:

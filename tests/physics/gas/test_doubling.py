@@ -107,7 +107,7 @@ def test_a_shape_can_be_doubled(shape: tuple[int, int, int], skirt: int) -> None
 def test_threads_change_nothing() -> None:
     one, two = run(DOUBLED_S, 0.02), run(DOUBLED_S, 0.02, threads=3)
     assert one.gas.steps == two.gas.steps
-    assert (one.loads.positive_impulse_pa_s == two.loads.positive_impulse_pa_s).all()
+    assert (one.loads.impulse_pa_s == two.loads.impulse_pa_s).all()
     assert (one.gauges.history_pa == two.gauges.history_pa).all()
 
 
@@ -116,11 +116,11 @@ def test_loads_stay_near_those_of_the_smallest_cells() -> None:
     small, doubled = run((), 0.04), run(DOUBLED_S, 0.04)
     assert doubled.gas.cell_updates < 0.4 * small.gas.cell_updates
     for one, other in ((small.loads, doubled.loads), (small.gauges, doubled.gauges)):
-        wanted = one.positive_impulse_pa_s
-        off = np.abs(other.positive_impulse_pa_s - wanted).mean() / wanted.mean()
+        wanted = one.impulse_pa_s
+        off = np.abs(other.impulse_pa_s - wanted).mean() / wanted.mean()
         assert off < 0.12
         assert other.peak_pa.max() == pytest.approx(one.peak_pa.max(), rel=1e-12)
-    maps = small.ground.positive_impulse_pa_s, doubled.ground.positive_impulse_pa_s
+    maps = small.ground.impulse_pa_s, doubled.ground.impulse_pa_s
     assert (np.isnan(maps[0]) == np.isnan(maps[1])).all()
     assert np.nanmean(np.abs(maps[0] - maps[1])) < 0.12 * np.nanmean(maps[0])
 
@@ -129,17 +129,17 @@ def test_a_mirrored_site_has_the_mirrored_loads() -> None:
     """To rounding in single precision; the charge is in the middle of the site."""
     grid = site()
     turned = GasGrid(CELL_M, grid.solid[:, ::-1].copy(), skirt=6)
-    plain = run(DOUBLED_S, 0.02, grid).ground.positive_impulse_pa_s
-    other = run(DOUBLED_S, 0.02, turned).ground.positive_impulse_pa_s
+    plain = run(DOUBLED_S, 0.02, grid).ground.impulse_pa_s
+    other = run(DOUBLED_S, 0.02, turned).ground.impulse_pa_s
     assert other[:, ::-1] == pytest.approx(plain, rel=1e-3, abs=0.1, nan_ok=True)
 
 
 def test_a_blast_on_growing_cells_has_about_the_loads_of_uniform_ones() -> None:
-    """On a street of 36 m, against cells that are small to the end; for a part of the work."""
-    site = street(36.0)
+    """On a street of 60 m, against cells that are small to the end; for a part of the work."""
+    site = street(60.0)
     small, growing = (GasBlast(site, engine=GasEngine(cells=cells)).run() for cells in CELLS[:2])
     assert isinstance(growing.run.solver, DoublingSolver)
     assert growing.run.solver.current.grid.cell_m == 1.0
-    assert growing.run.solver.cell_updates < 0.7 * small.run.solver.cell_updates
+    assert growing.run.solver.cell_updates < 0.8 * small.run.solver.cell_updates
     for load, other in zip(small.loads().structures, growing.loads().structures, strict=True):
         assert other.impulse_pa_s == pytest.approx(load.impulse_pa_s, rel=0.05)

@@ -4,6 +4,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.faces import exposed_faces, ground_faces
@@ -15,36 +19,80 @@ from blast_env.physics.gas.probes import (
     LoadTable,
     PatchHistories,
     Snapshots,
-    group_status,
+    peak_specific_impulse_pa_s,
+    positive_phases,
 )
 from tests.physics.gas.flows import blast, street
 
+STEP_S = 1e-3
+HISTORY_PA = np.array([0.0, 50.0, 250.0, 400.0, 100.0, -50.0, -20.0, 30.0, 500.0, 0.0])
+"""Foot, first phase, negative phase, second phase."""
 
-def test_phases_of_a_history_by_hand() -> None:
-    """Foot, first phase, negative phase, second phase; steps of 1 ms."""
+
+def recorded(history_pa: NDArray[np.float64]) -> LoadTable:
+    """Return a table of two points: one with a history, and one in still air."""
     table = LoadTable(2, arrival_pa=100.0, is_mean=True)
-    history = [0.0, 50.0, 250.0, 400.0, 100.0, -50.0, -20.0, 30.0, 500.0, 0.0]
-    for k, value in enumerate(history):
-        table.add(np.array([value, 0.0]), (k + 1) * 1e-3, 1e-3)
-    assert table.positive_impulse_pa_s == pytest.approx([1.33, 0.0])
-    assert table.first_impulse_pa_s == pytest.approx([0.8, 0.0])
-    assert table.negative_impulse_pa_s == pytest.approx([-0.07, 0.0])
+    for k, value in enumerate(history_pa):
+        table.add(np.array([value, 0.0]), (k + 1) * STEP_S, STEP_S)
+    return table
+
+
+def test_loads_of_a_history_by_hand() -> None:
+    table = recorded(HISTORY_PA)
+    assert table.impulse_pa_s == pytest.approx([0.8 - 0.07 + 0.53, 0.0])
+    assert table.impulse_time_s[0] == pytest.approx(9e-3)
+    assert table.net_impulse_pa_s == pytest.approx([1.26, 0.0])
     assert table.peak_pa.tolist() == [500.0, 0.0]
     assert table.peak_time_s[0] == pytest.approx(8.5e-3)
     # From 50 to 250 Pa, between the middles of the steps.
     assert table.arrival_s == pytest.approx([1.75e-3, np.nan], nan_ok=True)
-    assert table.steepest_s == pytest.approx([2.0e-3, np.nan], nan_ok=True)
-    assert table.first_is_over.tolist() == [True, False]
-    status = group_status(table, np.array([0, 1]))
-    assert status.positive_impulse_pa_s == pytest.approx(0.665)
-    assert status.arrived == status.first_is_over == 0.5
+    assert table.steepest_s == pytest.approx([8.0e-3, np.nan], nan_ok=True)
+
+
+def test_a_later_pulse_counts_only_above_the_largest_value_so_far() -> None:
+    """An echo that does not make up for the suction before it adds nothing."""
+    echo = np.where(np.arange(len(HISTORY_PA)) == 8, 40.0, HISTORY_PA)
+    table = recorded(echo)
+    assert table.impulse_pa_s[0] == pytest.approx(0.8)
+    assert table.impulse_time_s[0] == pytest.approx(5e-3)
+    assert table.net_impulse_pa_s[0] == pytest.approx(0.8)
+
+
+@given(
+    arrays(np.float64, st.integers(1, 40), elements=st.floats(-1e5, 1e6)),
+    st.floats(1e-5, 1e-2),
+)
+def test_impulses_of_whole_histories_are_those_of_the_recorder(
+    history_pa: NDArray[np.float64], step_s: float
+) -> None:
+    """And no more than the sum of all positive phases, no less than what came in the end."""
+    table = LoadTable(1, is_mean=True)
+    for k, value in enumerate(history_pa):
+        table.add(np.array([value]), (k + 1) * step_s, step_s)
+    whole = peak_specific_impulse_pa_s(history_pa, np.full(len(history_pa), step_s))
+    scale = step_s * np.abs(history_pa).sum() + 1e-12
+    assert table.impulse_pa_s[0] == pytest.approx(whole, abs=1e-9 * scale)
+    assert table.net_impulse_pa_s[0] <= table.impulse_pa_s[0]
+    positive = step_s * np.maximum(history_pa, 0.0).sum()
+    assert table.impulse_pa_s[0] <= positive + 1e-9 * scale
+
+
+def test_phases_of_a_history_by_hand() -> None:
+    time_s = STEP_S * np.arange(1.0, len(HISTORY_PA) + 1.0)
+    found = positive_phases(time_s, HISTORY_PA, arrival_pa=100.0)
+    assert found.first_pa_s == pytest.approx(0.025 + 0.15 + 0.325 + 0.25 + 0.025)
+    assert found.first_end_s == pytest.approx(6e-3)
+    assert found.positive_pa_s - found.first_pa_s == pytest.approx(0.005 + 0.265 + 0.25)
+    assert found.negative_pa_s == pytest.approx(-0.035)
+    still = positive_phases(time_s, 0.0 * HISTORY_PA)
+    assert still == (0.0, 0.0, 0.0, time_s[-1])
 
 
 def test_values_at_the_ends_of_steps_are_joined_by_lines() -> None:
     table = LoadTable(1, arrival_pa=1.0, is_mean=False)
     for k, value in enumerate([0.0, 100.0, 50.0]):
         table.add(np.array([value]), (k + 1) * 1e-3, 1e-3)
-    assert table.positive_impulse_pa_s == pytest.approx([0.125])
+    assert table.impulse_pa_s == pytest.approx([0.125])
     assert table.arrival_s == pytest.approx([1e-3 + 1e-5])
 
 
@@ -88,7 +136,7 @@ def test_faces_are_loaded_from_their_own_side() -> None:
             solid, (centre[0], centre[1], centre[2]), setup=setup, faces={"z_low": FaceKind.OPEN}
         )
         solver.advance(0.01)
-        load = recorders[0].positive_impulse_pa_s
+        load = recorders[0].impulse_pa_s
         near = solver.faces.side == -1
         assert (load[near] > 0.0).all()
         assert (load[~near] == 0.0).all()
@@ -100,7 +148,7 @@ def test_faces_are_loaded_from_their_own_side() -> None:
 
 
 def test_patches_keep_the_mean_history_of_their_faces() -> None:
-    """Their positive impulse is the mean of the faces', and a patch without a face is refused."""
+    """Their running impulse is the mean of the faces', and a patch without a face is refused."""
     made: list[FaceLoads | PatchHistories] = []
 
     def setup(grid: GasGrid) -> dict[str, Any]:
@@ -116,7 +164,7 @@ def test_patches_keep_the_mean_history_of_their_faces() -> None:
     assert isinstance(patches, PatchHistories)
     assert patches.history_pa.shape == (2, solver.steps)
     assert (np.diff(patches.time_s) > 0.0).all()
-    whole = loads.positive_impulse_pa_s + loads.negative_impulse_pa_s
+    whole = loads.net_impulse_pa_s
     for side, history in enumerate(patches.history_pa):
         members = (solver.faces.axis != 2) & ((solver.faces.side > 0) == bool(side))
         assert history @ patches.step_s == pytest.approx(whole[members].mean(), rel=1e-5)
@@ -144,8 +192,8 @@ def test_gauges_keep_the_history() -> None:
     joined = np.concatenate((np.zeros((1, 2)), history))
     steps = np.diff(np.concatenate(([0.0], time_s)))
     means = 0.5 * (joined[1:] + joined[:-1])
-    positive = (np.maximum(means, 0.0) * steps[:, None]).sum(axis=0)
-    assert gauges.positive_impulse_pa_s == pytest.approx(positive, rel=1e-9)
+    expected = peak_specific_impulse_pa_s(means.T, steps)
+    assert gauges.impulse_pa_s == pytest.approx(expected, rel=1e-9)
     with pytest.raises(BlastEnvError, match="which is solid"):
         Gauges(solver.grid, [(12, 5, 0)])
     with pytest.raises(BlastEnvError, match="but the grid is"):
@@ -165,8 +213,8 @@ def test_maps_agree_with_gauges() -> None:
     gauges, ground = made
     for k, (x, y, _) in enumerate(cells):
         assert ground.peak_pa[x, y] == pytest.approx(gauges.peak_pa[k], rel=1e-5)
-        impulse = gauges.positive_impulse_pa_s[k]
-        assert ground.positive_impulse_pa_s[x, y] == pytest.approx(impulse, rel=0.02)
+        impulse = gauges.impulse_pa_s[k]
+        assert ground.impulse_pa_s[x, y] == pytest.approx(impulse, rel=0.02)
     assert np.isnan(ground.peak_pa[13, 5])
     with pytest.raises(BlastEnvError, match="0 to 9"):
         GroundMap(solver.grid, layer=10)

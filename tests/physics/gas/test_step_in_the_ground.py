@@ -35,12 +35,12 @@ def test_a_closed_box_with_a_step_loses_nothing() -> None:
     solver = blast(box, (9, 17, 3), setup=setup, precision="double")
     check_nothing_is_lost(solver)
     (load,), (faces,) = loads, walls
-    impulse = load.positive_impulse_pa_s + load.negative_impulse_pa_s
+    impulse = load.net_impulse_pa_s
     area_m2 = solver.grid.cell_m**2
     pushed = [
         -area_m2 * float((impulse * faces.side)[faces.axis == axis].sum()) for axis in range(3)
     ]
-    scale = area_m2 * float(load.positive_impulse_pa_s.sum())
+    scale = area_m2 * float(load.impulse_pa_s.sum())
     momentum = np.array(solver.totals().momentum_kg_m_s)
     assert np.array(pushed) / scale == pytest.approx(-momentum / scale, abs=1e-12)
 
@@ -67,21 +67,19 @@ def loads_on(
     run.advance(np.inf)
     own = run.table.structure == 0
     order = np.lexsort((*run.table.centre_m[own].T, run.table.face[own]))
-    loads = run.loads.positive_impulse_pa_s, run.loads.peak_pa
+    loads = run.loads.impulse_pa_s, run.loads.peak_pa
     return np.stack([each[own][order] for each in loads])
 
 
-def test_a_far_terrace_is_felt_when_its_echo_comes_and_not_before() -> None:
-    """Its edge is 18 m from the charge, and 12 m behind the hut: bit for bit until then."""
+def test_a_far_terrace_is_felt_by_nothing_that_counts() -> None:
+    """Its edge is 18 m from the charge, and 12 m behind the hut; its echo comes in the suction."""
     hut = solid("hut", 8.0, 7.0, 4, 4, height_m=2.5, protected=True)
     terrace = solid("terrace", 22.0, 0.0, 32, 16, height_m=1.0)
-    for until_s, is_felt in ((0.05, False), (0.1, True)):
-        flat, stepped = (
-            loads_on(hut, (4.0, 8.0, 0.0), *terraces, until_s=until_s)
-            for terraces in ((), (terrace,))
-        )
-        assert np.array_equal(flat, stepped) is not is_felt
-        assert flat[0].mean() > 150.0  # Pa s: the blast has passed
+    flat, stepped = (
+        loads_on(hut, (4.0, 8.0, 0.0), *terraces, until_s=0.1) for terraces in ((), (terrace,))
+    )
+    assert np.array_equal(flat, stepped)
+    assert flat[0].mean() > 150.0  # Pa s: the blast has passed
 
 
 def test_on_a_terrace_far_from_its_edge_it_is_as_on_the_ground() -> None:

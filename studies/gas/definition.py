@@ -1,0 +1,72 @@
+"""The peak specific impulse against the sum of all positive phases, on the same blasts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.geometry import Layout
+from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.solver import Gas, Recorder
+from blast_env.scenario import Scenario
+
+
+class PositivePhases:
+    """Recorder of the sum of all positive phases on the faces of the solver."""
+
+    def __init__(self) -> None:
+        self.impulse_pa_s: FloatArray = np.zeros(0)
+
+    def record(self, solver: Gas, step_s: float) -> None:
+        """Add a step."""
+        part = step_s * np.maximum(solver.wall_overpressure_pa(), 0.0)
+        self.impulse_pa_s = part if not len(self.impulse_pa_s) else self.impulse_pa_s + part
+
+
+@dataclass(frozen=True)
+class BothLoads:
+    """The loads of a blast on the protected structures by both definitions.
+
+    Attributes:
+        positive_pa_s: Sum of all positive phases until the end of a long run.
+        impulse_pa_s: Peak specific impulse.
+        reached_s: When that was reached, mean over the faces that count.
+        last_s: When it was reached on the last of them.
+        end_s: When a run ends that waits for it.
+    """
+
+    positive_pa_s: float
+    impulse_pa_s: float
+    reached_s: float
+    last_s: float
+    end_s: float
+
+
+def both_loads(scenario: Scenario, layout: Layout, engine: GasEngine, until_s: float) -> BothLoads:
+    """Run a blast for a time, and once more to its end."""
+    phases = PositivePhases()
+
+    def recorders(_: GasGrid) -> Sequence[Recorder]:
+        return (phases,)
+
+    long = GasBlast(scenario, layout, engine=replace(engine, until=until_s))
+    result: GasResult = long.run(recorders=recorders)
+    run = result.run
+    names = {each.name: each.faces for each in run.site.structures if each.protected}
+    counts = np.array(
+        [
+            name in names and face in names[name]
+            for name, face in zip(result.faces["structure"], result.faces["face"], strict=True)
+        ]
+    )
+    short = GasBlast(scenario, layout, engine=engine).run()
+    reached_s = run.loads.impulse_time_s[counts]
+    return BothLoads(
+        positive_pa_s=float(phases.impulse_pa_s[counts].mean()),
+        impulse_pa_s=float(run.loads.impulse_pa_s[counts].mean()),
+        reached_s=float(reached_s.mean()),
+        last_s=float(reached_s.max()),
+        end_s=short.time_s,
+    )

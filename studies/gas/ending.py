@@ -1,0 +1,118 @@
+"""Loads at the end of a run against those of a run several times as long."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import process_time
+from typing import Final
+
+import numpy as np
+from blast_agents.rules import random_layout
+
+from blast_env.arrays import FloatArray
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.geometry import Layout
+from blast_env.physics.engine import EndReason
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.facade import respond
+from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+from blast_env.sites import FAMILIES, generate_site
+
+_LARGE_M: Final = 50.0
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """The loads that a run waits for, at its end and later.
+
+    Attributes:
+        time_s: When the run ended.
+        cpu_s: CPU time of the run until then.
+        reason: Why it ended.
+        impulse_pa_s: Loads on the walls that count, at the end (walls,).
+        later_pa_s: The same at the end of the longer run (walls,).
+        on_buildings_pa_s: Load of the protected structures, at the end and later.
+        levels: Level of protection of the facades, at the end and later; `None` without any.
+    """
+
+    time_s: float
+    cpu_s: float
+    reason: EndReason
+    impulse_pa_s: FloatArray
+    later_pa_s: FloatArray
+    on_buildings_pa_s: tuple[float, float]
+    levels: tuple[LevelOfProtection | None, LevelOfProtection | None]
+
+    @property
+    def missed(self) -> float:
+        """Largest share of the load of a wall that came after the end."""
+        return float((1.0 - self.impulse_pa_s / self.later_pa_s).max(initial=0.0))
+
+    @property
+    def missed_of_all(self) -> float:
+        """Share of the load of the protected structures that came after the end."""
+        now, later = self.on_buildings_pa_s
+        return 1.0 - now / later
+
+
+def ending(blast: GasBlast, times: float = 4.0) -> Ending:
+    """Run a blast to its end, and its gas on until so many times as long."""
+    start = process_time()
+    result = blast.run()
+    cpu_s, time_s, reason = process_time() - start, result.time_s, result.end_reason
+    now = _Loads.of(result)
+    result.run.solver.advance(times * time_s)
+    later = _Loads.of(
+        GasResult(blast, result.run, result.bay_loads, result.piece_loads, result.oblique)
+    )
+    return Ending(
+        time_s,
+        cpu_s,
+        reason,
+        now.on_walls_pa_s,
+        later.on_walls_pa_s,
+        (now.on_buildings_pa_s, later.on_buildings_pa_s),
+        (now.level, later.level),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Loads:
+    """Loads so far: on the walls that count, on the protected buildings, and the level."""
+
+    on_walls_pa_s: FloatArray
+    on_buildings_pa_s: float
+    level: LevelOfProtection | None
+
+    @classmethod
+    def of(cls, result: GasResult) -> "_Loads":
+        walls = result.walls
+        protected = {each.name for each in result.blast.scenario.structures if each.protected}
+        chosen = walls[walls["counts"] & walls["structure"].isin(protected)]
+        bays = result.bay_loads
+        level = None
+        if bays is not None and bays.bays:
+            level = respond(bays.bays, *bays.histories).level_of_protection
+        impulse = chosen["impulse_pa_s"].to_numpy(dtype=np.float64)
+        return cls(impulse, result.loads().protected_impulse_pa_s, level)
+
+
+def sites(generated: int) -> Iterator[tuple[str, Scenario, GasEngine]]:
+    """Yield the bundled sites with something protected, then so many generated ones of each family.
+
+    Each has a title and an engine: cells grow where the site is large.
+    """
+    found = {name: load_scenario(name) for name in bundled_scenarios()}
+    for family, ranges in FAMILIES.items():
+        found |= {f"{family}/{seed}": generate_site(seed, ranges) for seed in range(generated)}
+    for title, site in found.items():
+        if any(each.protected for each in site.structures):
+            large = max(site.site.width_m, site.site.height_m) > _LARGE_M
+            yield title, site, GasEngine(cells="coarse" if large else "uniform")
+
+
+def layouts(site: Scenario) -> dict[str, Layout]:
+    """Return no barrier, and a random layout where something can be placed."""
+    found: dict[str, Layout] = {"none": ()}
+    if site.build_zone is not None:
+        found["random"] = random_layout(site, np.random.default_rng(0))
+    return found

@@ -1,0 +1,113 @@
+"""One building has one load: in tables, objective, evaluation, report, page and benchmark.
+
+The building has three protected parts, an oblique wall (a staircase of modules), and a wing that
+nobody protects. Its load is the mean of the peak specific impulse over the area of the walls that
+count of its protected parts.
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blast_env.app.blasts import building_loads, gas_loads
+from blast_env.app.records import BlastRecord, EngineRecord, LoadJudge
+from blast_env.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation import BlastEvaluator, Threat, evaluate_layout
+from blast_env.physics.scene import Charge
+from blast_env.reporting.loads import measure, targets_of
+from blast_env.scenario import Scenario
+from blast_env.scenario.staircase import stepped_buildings
+from tests.gas_sites import site_document
+
+CHARGE = Charge((2.0, 4.0), 5.0)
+ENGINE = GasEngine(border_m=0.0)
+STEPS = ((0, 0, 5, 2), (1, 2, 4, 2), (2, 4, 3, 2), (3, 6, 2, 2))
+"""Column, row, columns and rows of each part; the last one is the wing."""
+
+
+@pytest.fixture(scope="module")
+def hall() -> Scenario:
+    document = site_document()
+    keys: dict[str, Any] = {"kind": "ModularObstacle", "height_m": 2.0, "building": "hall"}
+    document["structures"] = [
+        {
+            **keys,
+            "name": f"part_{number}",
+            "corner_m": [6.0 + 0.5 * column, 1.0 + 0.5 * row],
+            "columns": columns,
+            "rows": rows,
+            "protected": number < 3,
+            "weight": 1.0 if number == 3 else (0.5, 0.25, 0.25)[number],
+        }
+        for number, (column, row, columns, rows) in enumerate(STEPS)
+    ]
+    return Scenario.from_document(document, "hall")
+
+
+@pytest.fixture(scope="module")
+def result(hall: Scenario) -> GasResult:
+    return GasBlast(hall, engine=ENGINE, charge=CHARGE).run()
+
+
+@pytest.fixture(scope="module")
+def load_pa_s(result: GasResult) -> float:
+    """The definition, from the faces of cells."""
+    faces = result.on_walls
+    walls = faces[
+        faces["structure"].isin(["part_0", "part_1", "part_2"])
+        & faces["face"].isin(["west", "east", "south", "north"])
+    ]
+    return float(np.average(walls["impulse_pa_s"], weights=walls["share"]))
+
+
+def test_the_parts_differ_and_have_an_oblique_wall(hall: Scenario, result: GasResult) -> None:
+    """Else a mean by weight, or with the wing, would be the same."""
+    assert stepped_buildings(hall.structures) == {"hall"}
+    loads = result.structures["impulse_pa_s"]
+    assert loads.max() > 1.1 * loads.min()
+    areas = result.structures["area_m2"].to_numpy()[:3]
+    assert not np.allclose(areas / areas.sum(), (0.5, 0.25, 0.25), atol=0.02)
+
+
+def test_tables_and_the_objective(result: GasResult, hall: Scenario, load_pa_s: float) -> None:
+    (row,) = result.buildings.to_dict("records")
+    assert row["impulse_pa_s"] == pytest.approx(load_pa_s)
+    loads = result.loads()
+    assert loads.protected_impulse_pa_s == pytest.approx(load_pa_s)  # weights add up to 1
+    assert loads.load(hall.objective) == pytest.approx(load_pa_s)
+
+
+def test_evaluation_and_benchmark(hall: Scenario, load_pa_s: float) -> None:
+    threat = Threat(CHARGE, 0)
+    found = evaluate_layout(hall, (), threats=[threat], engine=ENGINE)
+    (row,) = found.building_table.to_dict("records")
+    assert row["impulse_pa_s"] == pytest.approx(load_pa_s)
+    assert found.impulse_pa_s.value == pytest.approx(load_pa_s)
+    evaluator = BlastEvaluator(hall, ENGINE)
+    assert evaluator.loads((), threat).load(hall.objective) == pytest.approx(load_pa_s)
+
+
+def test_the_report(hall: Scenario, load_pa_s: float) -> None:
+    measured = measure(GasBlast(hall, engine=ENGINE, charge=CHARGE), targets_of(hall))
+    assert measured.loads["hall"].impulse_pa_s == pytest.approx(load_pa_s)
+
+
+def test_the_page(hall: Scenario, result: GasResult, load_pa_s: float) -> None:
+    together, *parts = gas_loads(result)
+    (building,) = building_loads(result)
+    assert together.impulse_pa_s == pytest.approx(load_pa_s)
+    assert building.impulse_pa_s == pytest.approx(load_pa_s)
+    record = BlastRecord(
+        key="",
+        threat="T1",
+        engine=EngineRecord(),
+        layout=(),
+        loads=(together, *parts),
+        unchecked=(),
+        seconds=0.0,
+        repeat={},
+    )
+    judge = LoadJudge(hall)
+    assert judge.together(record) == pytest.approx(load_pa_s)
+    assert judge.counted(record, parts) == pytest.approx(load_pa_s)
