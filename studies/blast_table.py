@@ -157,7 +157,7 @@ def main(
             if not folder.is_dir():
                 raise BlastEnvError(f"{folder}: is no folder of blasts")
             for key, loads in DiskCache(folder).items():
-                rows[json.dumps(key)] = [_row(names, key, each) for each in loads.structures]
+                rows[json.dumps(key)] = [load_row(names, key, each) for each in loads.structures]
         if not rows:
             raise BlastEnvError(f"no blasts in {', '.join(map(str, folders))}")
         table = table_of([row for own in rows.values() for row in own], COLUMNS)
@@ -178,7 +178,8 @@ def _sites_of(folder: Path) -> dict[str, str]:
     return {each.content_hash: each.name.replace("site_", SITE_NAME) for each in sites}
 
 
-def _row(names: dict[str, str], key: BlastKey, load: StructureLoad) -> dict[str, object]:
+def load_row(names: dict[str, str], key: BlastKey, load: StructureLoad) -> dict[str, object]:
+    """Return the row of a structure under a blast; `names` are those of scenarios, by hash."""
     x_m, y_m = key.charge.position_m
     return {
         "scenario": names.get(key.scenario_hash, ""),

@@ -1,0 +1,103 @@
+"""The blasts of tables once more, with the engine as it is now: `python -m studies.blast_again`.
+
+Loads in a table of `studies.blast_table` are those of the engine that ran them. This command reads
+sites, layouts and charges from tables and runs them again, each site in a process. Blasts are kept
+in a folder: broken off, the command goes on from there, and with more layouts a site it runs only
+those that are new.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pandas as pd
+import typer
+from blast_agents.surrogate.fitting import elements
+
+from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.engines import find_engine
+from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.files import make_folder
+from blast_env.geometry import Layout
+from blast_env.physics.scene import Charge
+from blast_env.provenance import versions
+from blast_env.recording.parquet import read_frame, write_table
+from blast_env.runner import run_all
+from blast_env.tables import table_of
+from studies.blast_table import COLUMNS, load_row, scenario_of
+
+
+class SiteBlasts(NamedTuple):
+    """The blasts of a site.
+
+    Attributes:
+        name: Name of the site in the table.
+        blasts: Layouts and charges.
+    """
+
+    name: str
+    blasts: tuple[tuple[Layout, Charge], ...]
+
+
+def asked_in(table: pd.DataFrame, layouts: int | None) -> list[SiteBlasts]:
+    """Return the blasts of a table by site, each once.
+
+    Args:
+        table: The table.
+        layouts: Most blasts of a site: those without a barrier first, then drawn ones; all unless
+            given.
+    """
+    found = []
+    for number, (name, rows) in enumerate(table.groupby("scenario", sort=False)):
+        blasts = list(dict.fromkeys(map(_blast, rows.to_dict("records"))))
+        order = np.random.default_rng(number).permutation(len(blasts))
+        drawn = sorted((blasts[each] for each in order), key=lambda blast: len(blast[0]) > 0)
+        found.append(SiteBlasts(str(name), tuple(drawn[:layouts])))
+    return found
+
+
+def _blast(row: dict[object, object]) -> tuple[Layout, Charge]:
+    place_m = float(str(row["charge_x_m"])), float(str(row["charge_y_m"]))
+    height_m, tnt_kg = float(str(row["charge_height_m"])), float(str(row["tnt_kg"]))
+    return elements(str(row["layout"])), Charge(place_m, tnt_kg, height_m=height_m)
+
+
+def run_site(asked: SiteBlasts, cells: str | None, folder: Path) -> list[dict[str, object]]:
+    """Run the blasts of a site that the folder does not have, and return the rows of all."""
+    site, engine = scenario_of(asked.name), find_engine("gas", cells=cells)
+    evaluator = BlastEvaluator(site, engine, cache=folder)
+    rows = []
+    for layout, charge in asked.blasts:
+        threat = Threat(charge, 0)
+        loads, key = evaluator.loads(layout, threat), evaluator.key(layout, threat)
+        rows += [load_row({key.scenario_hash: asked.name}, key, each) for each in loads.structures]
+    return rows
+
+
+def main(
+    tables: Annotated[list[Path], typer.Argument(help="Tables of blasts, .parquet.")],
+    out: Annotated[Path, typer.Option(help="Folder for the new tables.")] = Path("out/again"),
+    layouts: Annotated[
+        int | None, typer.Option(min=1, help="Most blasts of a site; all unless given.")
+    ] = None,
+    cells: Annotated[str | None, typer.Option(help="uniform, coarse or fine.")] = None,
+    processes: Annotated[int, typer.Option(min=1)] = 2,
+) -> None:
+    """Run the blasts of tables again; write a table of each under its own name."""
+    with user_errors():
+        make_folder(out)
+        run = partial(run_site, cells=cells, folder=out / "blasts")
+        for path in tables:
+            asked = asked_in(read_frame(path, [each.name for each in COLUMNS]), layouts)
+            with progress_bar(path.stem) as progress:
+                rows: Sequence[list[dict[str, object]]] = run_all(run, asked, processes, progress)
+            blasts = sum(len(each.blasts) for each in asked)
+            table = table_of([row for own in rows for row in own], COLUMNS)
+            write_table(table, COLUMNS, {"blasts": blasts, **versions()}, out / path.name)
+            print_line(f"{blasts:,} blasts on {len(asked):,} sites; wrote {out / path.name}")
+
+
+if __name__ == "__main__":
+    typer.run(main)
