@@ -1,6 +1,6 @@
 """Frames of overpressure in the air: in plan at a height, and in a vertical section.
 
-They begin at the detonation: until the grid takes a blast over, its spherical stage is drawn.
+They begin at the detonation, with the spherical stage of the blast before the grid takes over.
 """
 
 from bisect import bisect_left
@@ -63,8 +63,8 @@ with render_extra():
     from matplotlib.patches import PathPatch
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-_FINER: Final = 4  # pixels drawn along a cell
-_COLOURS: Final = "RdBu_r"  # lightness falls to both sides, and red and blue are safe
+_FINER: Final = 4  # pixels along a cell
+_COLOURS: Final = "RdBu_r"  # darker to both sides; red and blue suit any colour vision
 _LINEAR_SHARE: Final = 0.1  # of the scale
 _TICKS: Final = (1.0, 0.5, 0.2, 0.05)
 _CUT_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
@@ -77,8 +77,8 @@ class VerticalSection:
     """A vertical section: the plane x = `at_m` or y = `at_m`.
 
     Attributes:
-        axis: The axis that it is normal to.
-        at_m: Where; the layer of cells that holds it is drawn.
+        axis: The axis normal to it.
+        at_m: Its coordinate; pictures show the layer of cells around it.
     """
 
     axis: Literal["x", "y"]
@@ -95,12 +95,12 @@ class VerticalSection:
 
     @property
     def normal(self) -> int:
-        """Index of the axis that it is normal to."""
+        """Index of the axis normal to it."""
         return "xy".index(self.axis)
 
 
 def default_section(site: BlastSite) -> VerticalSection:
-    """Return the section through the charge that points to what is protected."""
+    """Return the section through the charge that is best aligned with the protected structures."""
     x_m, y_m = site.charge.position_m
     solids = [each for each in site.structures if each.cells is None]
     chosen = [each for each in solids if each.protected] or solids
@@ -113,10 +113,10 @@ def default_section(site: BlastSite) -> VerticalSection:
 
 
 class Plane(Protocol):
-    """Pictures of the overpressure in a plane of cells, as `Snapshots` has them.
+    """Pictures of the overpressure in a plane of cells, as in `Snapshots`.
 
     Attributes:
-        axis: Axis that the plane is normal to.
+        axis: Axis normal to the plane.
         layer: The layer of cells along it.
         frames: The pictures, by time.
     """
@@ -130,11 +130,11 @@ class Plane(Protocol):
 
 
 class PlaneNow:
-    """A plane of a blast that is on its way: its only picture is that of now.
+    """A plane of a blast in progress, with a single picture: that of the present state.
 
     Args:
         run: The blast.
-        axis: Axis that the plane is normal to.
+        axis: Axis normal to the plane.
         layer: The layer of cells along it.
     """
 
@@ -145,7 +145,7 @@ class PlaneNow:
 
     @property
     def frames(self) -> Sequence[Snapshot]:
-        """The picture of now."""
+        """The picture of the present state."""
         plane = self._solver.overpressure_in(self.axis, self.layer)
         pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
         return [Snapshot(self._solver.time_s, pressure)]
@@ -168,9 +168,9 @@ class PressureShot:
     planes: tuple[Plane, Plane]
 
     def at(self, time_s: float, plane: int) -> FloatArray | None:
-        """Return the overpressure in a plane at a time, Pa, along its two axes; nan in solids.
+        """Return the overpressure in a plane at a time, Pa, along its two axes; NaN in solids.
 
-        It is that of the nearest picture; None before the grid has taken over.
+        It is that of the nearest picture; None before the grid takes over.
         """
         frames = self.planes[plane].frames
         if time_s < self.opening.end_s or not frames:
@@ -182,16 +182,16 @@ class PressureShot:
         return frames[nearest].overpressure_pa.astype(np.float64)
 
     def layer_m(self, plane: int) -> float:
-        """Return where a plane is along the axis that it is normal to."""
+        """Return the coordinate of a plane along its normal axis, m."""
         snapshots = self.planes[plane]
         return float(self.result.run.grid.centres_m(snapshots.axis)[snapshots.layer])
 
     def distances_m(self, plane: int, finer: int) -> FloatArray:
-        """Return the distances of the parts of the cells in a plane from the charge.
+        """Return the distances of the parts of cells in a plane from the centre of the blast, m.
 
         Args:
-            plane: The plane.
-            finer: Into how many parts each side of a cell is cut.
+            plane: Index of the plane.
+            finer: Number of parts along each side of a cell.
         """
         grid, normal = self.result.run.grid, self.planes[plane].axis
         first, second = (
@@ -206,10 +206,10 @@ class PressureShot:
 
 
 class Smooth:
-    """Draws cells as pixels between whose centres values go over evenly, but never through walls.
+    """Interpolates cell values linearly to pixels, from air cells only.
 
     Args:
-        air: Which cells are air (nx, ny).
+        air: Mask of the air cells (nx, ny).
     """
 
     def __init__(self, air: NDArray[np.bool_]) -> None:
@@ -219,7 +219,7 @@ class Smooth:
         self._shares = np.maximum(self._spread(air.astype(np.float64)), 1e-12)
 
     def __call__(self, values: FloatArray) -> FloatArray:
-        """Return the pixels of some values (nx, ny), 0 in solids: (n nx, n ny)."""
+        """Return the pixels (n nx, n ny) of values (nx, ny), 0 in solids; n is 4."""
         known = np.where(self._air, values, 0.0)
         return np.where(self._inside, self._spread(known) / self._shares, 0.0)
 
@@ -254,13 +254,13 @@ _SHARE_OF_TITLES: Final = 0.74  # of the width; the clock has the rest
 
 
 class PressurePainter:
-    """Paints the moments of blasts beside each other, all on one colour scale.
+    """Paints moments of blasts side by side, all on one colour scale.
 
     Args:
         shots: The blasts, from left to right.
         full_kpa: Overpressure at the end of the scale.
         width_px: Width of the frames, even.
-        most_high_px: Most height of the frames, for panels that would be higher otherwise.
+        most_high_px: Largest height of the frames, to which panels shrink if need be.
 
     Attributes:
         sheet: The page; its moving parts show the last moment painted.
@@ -321,7 +321,7 @@ class PressurePainter:
 
     def colours(self, overpressure_kpa: FloatArray) -> Frame:
         """Return the colours of overpressures, uint8 (..., 4)."""
-        # As the scale does it; it takes much longer.
+        # The same as the scale, but much faster.
         share = np.arcsinh(overpressure_kpa * (1.0 / self.scale.linear_width)) * self._per_unit
         last = len(self._colours) - 1
         index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
@@ -330,7 +330,7 @@ class PressurePainter:
     def _arrange(
         self, width_px: int, most_high_px: float, legend_entries: int
     ) -> tuple[Sheet, list[list[Axes]], float]:
-        """Return the page, a plan above a section a blast, and where the colour bar ends."""
+        """Return the page, a plan and a section per blast, and the bottom of the colour bar, px."""
         count = len(self.shots)
         plan, section = self._site_m, self._section_m
         panel_px = (width_px - _LEFT_PX - _RIGHT_PX - (count - 1) * _GAP_PX) / count
@@ -435,7 +435,7 @@ class PressurePainter:
     def _add_solid(
         self, axes: Axes, parts: Sequence[Rectangle], outline: StructureOutline, *, is_cut: bool
     ) -> None:
-        """Draw what stands: filled where the plane cuts it, its outline where it is below."""
+        """Draw a solid: filled if the plane cuts it, its outline alone if not."""
         patch = PathPatch(outline_path(parts))
         if outline.cells is not None:
             patch.set(edgecolor=unit_interval(BARRIER), linewidth=0.8)
@@ -470,7 +470,7 @@ class PressurePainter:
 
 
 def _signed(value: float, position: int | None) -> str:  # noqa: ARG001
-    """Return the number at a tick that may be below 0."""
+    """Return the number at a tick, with a minus sign if negative."""
     return f"{value:g}".replace("-", MINUS)
 
 
@@ -481,7 +481,7 @@ def _on_ground(shot: PressureShot) -> tuple[Feature, ...]:
 
 
 def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
-    """Return what stands, the lowest first: parts of one thing together, and the first of them."""
+    """Return solids, the lowest first: the blocks of each, with the outline of the first part."""
     site, features = shot.result.run.site, structure_features(shot.result.blast.scenario.structures)
     whole = {each.name: each.part_of for each in features if each.part_of}
     found: dict[object, tuple[StructureOutline, list[Block]]] = {}
@@ -494,7 +494,7 @@ def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
 
 
 def _solids(site: BlastSite) -> list[Feature]:
-    """Return what stands, in the colours that a plane through it shows."""
+    """Return the solids as features, in their colours in a cut."""
     found = []
     for outline in site.structures:
         if outline.cells is not None:

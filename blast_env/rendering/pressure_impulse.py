@@ -1,4 +1,4 @@
-"""Pressure-impulse diagrams: how near each bay is to the next level, without and with a layout."""
+"""Pressure-impulse diagrams: the margin of each bay to the next level, for several layouts."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -28,28 +28,28 @@ _PEAKS: Final = 24
 _HALVINGS: Final = 8
 _MOST_PANELS: Final = 4
 _REACH: Final = 3.0
-_DECADES: Final = 100.0  # smaller loads are left of the picture
-_STATIC_S: Final = 0.5  # a load that lasts longer does no more to what is stiffer
+_DECADES: Final = 100.0  # largest ratio of loads; smaller ones are outside the picture
+_STATIC_S: Final = 0.5  # longer loads have no further effect on stiffer components
 _PANEL_IN: Final = (4.9, 4.2)
 _INK: Final = ("#0072B2", "#000000")
 
 Component = tuple[Glazing | Wall, float]
-"""A component, and the height of the storey that it stands in."""
+"""A component, and the height of its storey, m; 0 for glazing."""
 
 Members = tuple[list[int], ...]
-"""Of each row, the bays that a component stands in."""
+"""For each row, the indices of the bays of a component."""
 
 
 def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: str) -> Figure:
-    """Return a diagram a component, with a point a bay and row: its peak and its impulse.
+    """Return one diagram per component, with one point per bay and row: its peak and its impulse.
 
-    Regions are those of a triangular load, which falls from its peak at once. A bay's point is in
-    the diagram of what stands there in that row. The four components with most points are shown.
+    Regions are those of a triangular load without a rise time. The point of a bay is in the
+    diagram of its component in that row. The four components with most points are shown.
 
     Args:
-        rows: What a row is, in words, and the same bays each time: without a layout, and with. A
-            layout that hardens them puts other components there.
-        title: Above the picture.
+        rows: Name and facade response of each row, with the same bays: without a layout, and with
+            one. Hardening replaces the components of bays.
+        title: Title of the picture.
     """
     groups = _groups([facade.bays for _, facade in rows])[:_MOST_PANELS]
     columns = min(len(groups), 2)
@@ -83,7 +83,7 @@ def pressure_impulse_diagram(rows: Sequence[tuple[str, FacadeResponse]], title: 
 
 
 def _groups(rows: Sequence[Sequence[FilledBay]]) -> list[tuple[Component, Members]]:
-    """Return the components, each with the bays of each row that it stands in, most bays first."""
+    """Return the components, each with its bays in each row, those with most bays first."""
     found: list[tuple[Component, Members]] = []
     for row, bays in enumerate(rows):
         for index, each in enumerate(bays):
@@ -149,15 +149,15 @@ def _loads(facade: FacadeResponse, members: Sequence[int]) -> FloatArray:
 def level_bounds(
     component: Component, peak_pa: FloatArray, impulses_pa_s: tuple[float, float]
 ) -> dict[LevelOfProtection, FloatArray]:
-    """Return up to which impulse of a triangular load a component allows each level.
+    """Return the largest impulse of a triangular load for which a component keeps each level.
 
     Args:
         component: The component.
         peak_pa: Peaks of the loads (peaks,).
-        impulses_pa_s: Between which impulses; a bound outside them is the nearer one.
+        impulses_pa_s: Range of impulses; a bound outside it is replaced by the nearer end.
 
     Returns:
-        By level, the best first (peaks,); below standards there is no bound.
+        Bounds in Pa s (peaks,) by level, the best first; below standards there is none.
     """
     found: dict[LevelOfProtection, FloatArray] = {}
     chosen, storey_m = component

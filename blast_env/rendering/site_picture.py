@@ -1,4 +1,4 @@
-"""A site before any blast: its plan and its oblique view, side by side or each alone."""
+"""Pictures of a site without a blast: plan and oblique view, side by side or each alone."""
 
 from collections.abc import Sequence
 from math import cos, radians, sin
@@ -38,7 +38,7 @@ with render_extra():
     from matplotlib.patches import Patch
 
 SITE_VIEWS: Final = ("both", "plan", "oblique")
-"""What a picture of a site shows."""
+"""The choices of views for a picture of a site."""
 
 _PANEL_IN: Final = 5.4
 _WIDTHS_IN: Final = (4.6, 8.8)
@@ -53,17 +53,17 @@ def site_picture(
     view: str = "both",
     corner: str | None = None,
 ) -> Figure:
-    """Return a picture of a site and of what stands on it; no blast is run.
+    """Return a picture of a site with a layout; no blast is run.
 
-    It shows structures, barriers in a colour an item, where charges may go off, what vehicles
-    reach, and the conditions of the build zone; heights are to scale in the oblique view.
+    It shows structures, barriers in one colour per item, possible places of charges, the reach of
+    vehicles, and the conditions of the build zone; heights are to scale in the oblique view.
 
     Args:
         scenario: The scenario, or its bundled name or path.
-        layout: What stands on the build zone.
+        layout: The layout of the build zone.
         view: `"plan"`, `"oblique"`, or `"both"`.
-        corner: Over which corner one looks in the oblique view (`"southwest"`, ...); the one on
-            the side of the charges unless given.
+        corner: The corner nearest to the viewer in the oblique view (`"southwest"`, ...); by
+            default the one on the side of the charges.
 
     Raises:
         LayoutError: If the layout does not fit the build zone.
@@ -100,7 +100,7 @@ def site_picture(
 
 
 def _items_left(zone: BuildZone | None, placement: Placement) -> list[Artist]:
-    """Return the legend entries for the items of which nothing stands."""
+    """Return the legend entries for items without a placed piece."""
     if zone is None:
         return []
     words, standing = item_words(zone, placement.layout), item_words(zone, ())
@@ -112,7 +112,7 @@ def _items_left(zone: BuildZone | None, placement: Placement) -> list[Artist]:
 
 
 def _width_in(placement: Placement, view: str) -> float:
-    """Return how wide a panel is, so that the view fills the height of all panels."""
+    """Return the width of a panel whose view fills the common height of panels, inches."""
     site = placement.scenario.site
     width_m, height_m = site.width_m, site.height_m
     if view == "oblique":
@@ -162,14 +162,14 @@ def _draw_plan_scale(axes: Axes, scenario: Scenario) -> None:
 
 
 def _draw_directions(axes: Axes, scenario: Scenario, view: View) -> None:
-    """Draw how the axes of the plan run in the oblique view, and north where it is known."""
+    """Draw the directions of x and y in the oblique view, and north if it is known."""
     for label, x, y in (("x", 1.0, 0.0), ("y", 0.0, 1.0)):
         _draw_arrow(axes, view, label, (x, y), place=(0.09, 0.88))
     draw_north(axes, scenario, view)
 
 
 def draw_north(axes: Axes, scenario: Scenario, view: View) -> None:
-    """Draw an arrow to the north, or along the y axis of the drawing that a site comes from."""
+    """Draw an arrow to the north, or along the y axis of the drawing from which a site comes."""
     georeference = scenario.georeference
     if georeference is not None:
         turned = radians(georeference.rotation_deg)
@@ -184,7 +184,7 @@ def _draw_arrow(
     direction: tuple[float, float],
     place: tuple[float, float],
 ) -> None:
-    """Draw an arrow that stands for a direction on the ground, with its label at the tip."""
+    """Draw an arrow in a direction on the ground, with its label at the tip."""
     ends = view.places(np.array([(0.0, 0.0, 0.0), (*direction, 0.0)]))
     across, up = _ARROW_PT * (ends[1] - ends[0])
     axes.annotate(

@@ -1,4 +1,4 @@
-"""The plan of a site in matplotlib: features by their geometry and look, loads, names, headings."""
+"""The plan of a site in matplotlib: features, loads, names, legends and headings."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, Final, Protocol
@@ -49,14 +49,14 @@ Obstacle = ModularObstacle | StructureOutline
 
 
 class View(Protocol):
-    """How places on a site become places in a picture."""
+    """A projection from places on a site to positions in a picture."""
 
     def places(self, points_m: FloatArray) -> FloatArray:
-        """Return places in the picture (n, 2) of x, y and height (n, 3), m."""
+        """Return positions in the picture (n, 2) of x, y and height (n, 3), m."""
 
 
 class PlanView:
-    """The view from above: heights do not show."""
+    """The view from above, which ignores heights."""
 
     def places(self, points_m: FloatArray) -> FloatArray:
         """Return x and y (n, 2) of x, y and height (n, 3), m."""
@@ -67,9 +67,9 @@ PLAN: Final = PlanView()
 
 
 def load_colours() -> Colormap:
-    """Return the colours of `load_colour` as a colour map, white where there is no load.
+    """Return the colours of `LoadColours` as a colour map, white for missing loads.
 
-    Their lightness falls all the way, so that the order shows without any colour vision.
+    Their lightness decreases throughout, so that the order shows without colour vision.
     """
     colours = [unit_interval(colour) for colour in LoadColours()]
     colour_map = LinearSegmentedColormap.from_list("load", colours)
@@ -79,7 +79,7 @@ def load_colours() -> Colormap:
 def add_bar(
     figure: Figure, panels: Sequence[Axes], colours: ScalarMappable, label: str, **style: Any
 ) -> Colorbar:
-    """Add a colour bar beside panels; `style` is matplotlib's."""
+    """Add a colour bar beside panels; `style` is passed to matplotlib."""
     form = FuncFormatter(number_on_axis)
     bar = figure.colorbar(colours, ax=list(panels), format=form, **style)
     bar.set_label(label)
@@ -93,7 +93,7 @@ def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
 
 
 def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> Artist:
-    """Add the outline of a rectangle in metres; `style` is matplotlib's."""
+    """Add the outline of a rectangle in metres; `style` is passed to matplotlib."""
     patch = rectangle_patch(rectangle)
     patch.set(**({"fill": False} | style))
     return axes.add_patch(patch)
@@ -105,7 +105,7 @@ def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
 
 
 def draw_plan(axes: Axes, features: Sequence[Feature], margin: float = 0.03) -> None:
-    """Set up axes in metres with equal scales for a site, and draw what is on it."""
+    """Set up axes in metres with equal scales for a site, and draw its features."""
     (site_m,) = (each.bounds_m for each in features if each.kind is Kinds.SITE)
     reach = margin * max(site_m.right, site_m.top)
     axes.set_xlim(site_m.left - reach, site_m.right + reach)
@@ -122,11 +122,11 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
 
     Args:
         axes: The axes, in metres.
-        features: What is drawn, on the ground or, where it says so, above it.
-        view: How the picture shows the site.
+        features: The features to draw; points with a height are drawn above the ground.
+        view: The projection of the picture.
 
     Returns:
-        What was drawn, the lowest first.
+        The artists drawn, the lowest first.
     """
     drawn: list[Artist] = []
     areas: dict[tuple[FeatureKind, Look, object], list[Feature]] = {}
@@ -138,7 +138,7 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
         else:
             drawn += _sign(feature, _places(feature, view), view)
     for (kind, look, fill), alike in areas.items():
-        # One patch, so that neighbours have no seam.
+        # One patch, so that there is no seam between neighbours.
         patch = PathPatch(_path_of(outlines_of(alike), view))
         patch.set(**area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
@@ -158,7 +158,7 @@ def _at_height(places_m: Iterable[PointM], height_m: float = 0.0) -> FloatArray:
 
 
 def area_style(look: Look, fill: object) -> dict[str, Any]:
-    """Return matplotlib's style of areas of a look, with a colour of their own or none."""
+    """Return the matplotlib style of areas with a look and a fill, which may be None."""
     line = QUIET_INK if look.line is None else look.line
     style: dict[str, Any] = {
         "facecolor": (*unit_interval(fill), look.opacity) if isinstance(fill, tuple) else "none",
@@ -187,7 +187,7 @@ def _dashes(look: Look) -> tuple[float, Sequence[float]] | None:
 
 
 def _sign(feature: Feature, places: FloatArray, view: View) -> list[Artist]:
-    """Return the sign of a single place, on a stem where the view shows that it is raised."""
+    """Return the sign of a single point, on a stem if the view shows its height."""
     sign = Line2D(*places.T, **_sign_style(feature.kind))
     sign.set_zorder(Kinds.CHARGE.level)
     on_ground = view.places(np.array([(*feature.places_m[0], 0.0)]))
@@ -208,7 +208,7 @@ def _sign_style(kind: FeatureKind) -> dict[str, Any]:
 
 
 def legend_of(features: Iterable[Feature]) -> list[Artist]:
-    """Return a legend entry for everything that differs among features, what is on top first."""
+    """Return one legend entry per distinct feature, the topmost first."""
     shown = {(feature.title, min(len(feature.places_m), 3)): feature for feature in features}
     ordered = sorted(shown.values(), key=lambda feature: -feature.kind.level)
     return [_legend_entry(feature) for feature in ordered]
@@ -230,15 +230,15 @@ def _legend_entry(feature: Feature) -> Artist:
     return entry
 
 
-_LETTER_IN: Final = 0.075  # of a legend; its signs and gaps take as much as seven
+_LETTER_IN: Final = 0.075  # width of a letter in a legend; sign and gaps take that of seven
 
 
 def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
-    """Write a legend below a figure, in as many columns as fit; return its lines."""
+    """Write a legend below a figure, in as many columns as fit; return its number of lines."""
     longest = max(len(str(handle.get_label())) for handle in handles)
     columns = max(int(figure.get_figwidth() / (_LETTER_IN * (longest + 7))), 1)
     lines = -(-len(handles) // columns)
-    columns = -(-len(handles) // lines)  # no more than these lines need
+    columns = -(-len(handles) // lines)  # as few as these lines need
     figure.legend(
         handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
     )
@@ -246,7 +246,7 @@ def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
 
 
 def outline_path(rectangles: Sequence[Rectangle], view: View = PLAN) -> Path:
-    """Return the outline of rectangles that do not overlap, all together."""
+    """Return the common outline of rectangles that do not overlap."""
     return _path_of(outlines(rectangles), view)
 
 
@@ -259,12 +259,12 @@ def _path_of(rings: Iterable[Sequence[PointM]], view: View) -> Path:
 def draw_outlines(
     axes: Axes, obstacles: Iterable[Obstacle], features: Iterable[Feature] = ()
 ) -> list[Artist]:
-    """Draw the outlines of structures in the colours of their roles; a barrier has none.
+    """Draw the outlines of structures in the colours of their roles; barriers get none.
 
     Args:
         axes: The axes, in metres.
         obstacles: The structures and the barrier.
-        features: What is on the site: those of the structures say which are parts of one thing.
+        features: Features of the site, whose `part_of` joins the parts of a building.
     """
     whole = {each.name: each.part_of for each in features if each.part_of}
     alike: dict[tuple[str, bool], list[Rectangle]] = {}
@@ -288,17 +288,17 @@ def draw_loads(
     linewidth: float = 0.4,
     factor: float = 1.0,
 ) -> tuple[PolyCollection, LineCollection]:
-    """Draw the modules in the colours of their loads; one that was not hit stays white.
+    """Draw modules in the colours of their loads; those that were not hit are white.
 
     Args:
         axes: The axes.
         obstacle: The structure or barrier.
         scale: The colour scale.
-        linewidth: Of the modules' edges.
-        factor: From the impulses to the unit of the scale.
+        linewidth: Width of the modules' edges, points.
+        factor: Conversion from impulses to the unit of the scale.
 
     Returns:
-        The modules, and the crosses on those that are destroyed.
+        The modules, and the crosses on destroyed ones.
     """
     is_barrier = obstacle.cells is not None
     left, bottom, right, top = np.array([part.rectangle_m for part in obstacle.parts]).T
@@ -325,7 +325,7 @@ def draw_enlarged(
     factor: float = 1.0,
     features: Iterable[Feature] = (),
 ) -> None:
-    """Draw the loads on the modules of structures as large as axes are.
+    """Draw the loads on the modules of structures so that they fill the axes.
 
     See `draw_loads`, and for the features `draw_outlines`.
     """
@@ -342,7 +342,7 @@ def draw_enlarged(
 def show_loads(
     drawn: tuple[PolyCollection, LineCollection], obstacle: ModularObstacle, factor: float = 1.0
 ) -> None:
-    """Show the loads of now on what `draw_loads` has drawn."""
+    """Update the artists of `draw_loads` to the present loads."""
     modules, crosses = drawn
     impulse = [factor * part.impulse for part in obstacle.parts]
     modules.set_array(np.ma.masked_array(impulse, [part.hits == 0 for part in obstacle.parts]))
@@ -359,27 +359,27 @@ def show_loads(
 _GAP_PT: Final = 4.0
 _SIGN_PT: Final = 13.0
 _STAR_PT: Final = 15.0
-_FAR_PT: Final = 7.0  # from where on a name is joined to its own by a line
+_FAR_PT: Final = 7.0  # distance beyond which a line joins a name to its feature
 
 
 def write_names(
     axes: Axes, features: Sequence[Feature], view: View = PLAN, *, inside: bool = True
 ) -> list[Artist]:
-    """Write the labels of features inside or beside them, so that none covers anything.
+    """Write the labels of features inside or beside them, without overlap if possible.
 
-    To be called last: places are found in the figure as it is laid out then.
+    Call it last: positions depend on the final layout of the figure.
 
     Args:
         axes: The picture of the site.
-        features: What is on it, and with it everything that is not to be covered.
-        view: How the picture shows the site.
-        inside: Whether names may stand on what they belong to; not where it has colours to read.
+        features: Its features, which are labelled and not to be covered.
+        view: The projection of the picture.
+        inside: Whether labels may cover their features; not if these show loads by colour.
 
     Returns:
-        The names, and the lines that join them to their own.
+        The labels, and the lines that join them to their features.
     """
     figure = axes.get_figure(root=True)
-    labels = labels_of(features)[::-1]  # what is on top has the first choice
+    labels = labels_of(features)[::-1]  # the topmost has the first choice
     if figure is None or not labels:
         return []
     texts = [_text(axes, label.text, label.feature.kind) for label in labels]
@@ -421,7 +421,7 @@ def _text(axes: Axes, words: str, kind: FeatureKind) -> Text:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Put the axes where they are going to be drawn, which drawing would do too, and much more."""
+    """Position the axes as in drawing, without the cost of drawing."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
@@ -438,7 +438,7 @@ def _other_texts(axes: Axes, names: Sequence[Text]) -> list[Rectangle]:
 def _boxes(
     axes: Axes, feature: Feature, view: View, pixels_per_pt: float
 ) -> tuple[Rectangle, Rectangle]:
-    """Return the pixels that a feature takes, its roof or its sign, and the box around these."""
+    """Return the solid part of a feature, its roof or its sign, and its bounding box, pixels."""
     height_m = feature.properties.get("height_m", feature.above_ground_m)
     places = view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
     pixels = axes.transData.transform(places)
@@ -448,7 +448,7 @@ def _boxes(
         around = around.grown(_STAR_PT / 2.0 * pixels_per_pt)
     if len(feature.places_m) < 3 or view is PLAN:
         return around, around
-    # A slanted roof fills the middle of its box alone.
+    # A roof in the oblique view fills only the middle of its bounding box.
     width, height = (right - left) / 4.0, (top - bottom) / 4.0
     return Rectangle(left + width, bottom + height, right - width, top - height), around
 
@@ -457,8 +457,8 @@ _HEADING_SHARE: Final = 0.97  # of the width of a figure
 
 
 def write_heading(figure: Figure, title: str, subtitle: str) -> None:
-    """Write the title of a figure and a quiet line under it."""
-    # The empty lines make the layout keep room for the second text, which it does not see.
+    """Write the title of a figure and a subtitle."""
+    # The empty line reserves room for the subtitle, which the layout ignores.
     heading = figure.suptitle(f"{title}\n", fontsize=14, fontweight="bold", linespacing=1.5)
     share = heading.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
     heading.set_fontsize(14 / max(share, 1.0))

@@ -1,4 +1,4 @@
-"""Colours, fonts, and the extra that pictures need."""
+"""Colours, numbers and texts of pictures, and the import of their optional packages."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -23,9 +23,10 @@ def render_extra() -> Iterator[None]:
     """Import packages of the extra `render` in this block.
 
     Raises:
-        MissingExtraError: If one of them is not installed; the message says how to get it.
+        MissingExtraError: If one of them is not installed; the message has the command to install
+            it.
     """
-    # pygame greets on standard output, which belongs to the program that imports us.
+    # pygame prints a greeting to standard output, which belongs to the importing program.
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     with import_extra("render", "pictures and films"):
         yield
@@ -36,30 +37,30 @@ _NICE_STEPS: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
 def nice_numbers(lowest: float, highest: float) -> list[float]:
-    """Return the numbers between two positive bounds that have few digits."""
+    """Return the numbers of few digits between two positive bounds."""
     powers = range(floor(log10(lowest)), ceil(log10(highest)) + 1)
     numbers = {float(f"{step * 10.0**power:.3g}") for power in powers for step in _NICE_STEPS}
     return sorted(number for number in numbers if lowest <= number <= highest)
 
 
 def nice_ceiling(value: float) -> float:
-    """Return the smallest number of few digits that is at least a positive value."""
+    """Return a positive value rounded up to few digits."""
     return nice_numbers(value * (1.0 - 1e-9), 2.0 * value)[0]
 
 
 def nice_load(unit: LoadUnit, impulse: float) -> float:
-    """Return the least m|v| of few digits in a unit that is at least a positive one."""
+    """Return a positive impulse, simulation units, rounded up to few digits in a unit."""
     return nice_ceiling(unit.factor * impulse) / unit.factor
 
 
 def nice_floor(value: float) -> float:
-    """Return 1, 2 or 5 times a power of ten, as large as a positive value allows."""
+    """Return a positive value rounded down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** floor(log10(value))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))
 
 
 def short_number(value: float, digits: int = 2) -> str:
-    """Return a number with so many significant digits at most, and k for thousands."""
+    """Return a number with at most the given significant digits, and k, M or G as a suffix."""
     if value == 0.0:
         return "0"
     rounded = float(f"{value:.{digits}g}")
@@ -75,10 +76,10 @@ def number_on_axis(value: float, position: int | None) -> str:  # noqa: ARG001
 
 
 def free_flight_impulse(scene: Scene) -> float:
-    """Return a load that depends on the scene alone, of the size that a blast brings.
+    """Return a typical load per module from the scene alone, simulation units.
 
-    It is what a module at the place nearest to the charge would get from a fan that nothing
-    slows down. Structures alone count, not the barrier, so that all layouts have the same one.
+    It is the impulse of an undisturbed fan on a module at the point of the structures nearest to
+    the charge. The barrier does not count, so that all layouts have the same value.
     """
     balls = scene.balls
     explosive = balls.kind == CollisionType.ExplosionBall
@@ -95,12 +96,12 @@ def free_flight_impulse(scene: Scene) -> float:
 
 
 def count_of(noun: str, count: int) -> str:
-    """Return a count with its noun in the right number."""
+    """Return a count with its noun, singular or plural."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def barrier_text(layout: Sequence[Element]) -> str:
-    """Return what barrier there is, in words."""
+    """Return the barrier of a layout, in words."""
     return f"barrier of {layout_counts(layout)}" if layout else "no barrier"
 
 
@@ -117,21 +118,21 @@ def blast_title(blast: Blast) -> tuple[str, str]:
 
 
 def unit_interval(colour: Colour) -> tuple[float, float, float]:
-    """Return a colour with its parts between 0 and 1, as matplotlib wants them."""
+    """Return a colour with channels between 0 and 1, for matplotlib."""
     red, green, blue = (part / 255.0 for part in colour)
     return red, green, blue
 
 
-# The span ends at the earliest of these multiples of the time when that share of the impulse has
-# arrived: a single straggler must not squeeze the blast into the first tenth of a picture.
+# Pairs of a share of the impulse and a factor on its arrival time. The span ends at the earliest
+# product: a late single hit must not compress the blast into the first tenth of a picture.
 _ENDS = ((0.999, 1.1), (0.95, 2.0))
 
 
 def shown_until_s(result: BlastResult) -> float:
-    """Return the simulated time at which a film or a history ends.
+    """Return the simulated time at the end of a film or a history.
 
     It is a little after 99.9 % of the impulse on the protected structures has arrived (on all
-    structures, if none is protected or hit), but not later than twice the time that 95 % took.
+    structures, if none is protected or hit), but at the latest at twice the arrival time of 95 %.
     """
     table = result.collisions
     protected = [obstacle.name for obstacle in result.obstacles if obstacle.protected]

@@ -14,14 +14,14 @@ with render_extra():
     import pygame
 
 _SHARE_OF_SCREEN = 0.9
-_KEYS_HELD_MS = (300, 60)  # until a key that is held counts again, and then each time
+_KEYS_HELD_MS = (300, 60)  # delay before a held key repeats, and interval of repeats
 _LETTERS: Final = ("w", "a", "s", "d")
 _NAMED: Final = ("up", "down", "left", "right", "space", "tab", "return", "backspace", "escape")
 KEY_NUMBERS: Final[Mapping[str, int]] = MappingProxyType(
     {name: getattr(pygame, f"K_{name}") for name in _LETTERS}
     | {name: getattr(pygame, f"K_{name.upper()}") for name in _NAMED}
 )
-"""The keys that mean anything, with pygame's numbers."""
+"""The keys in use, with their numbers in pygame."""
 
 _KEY_NAMES: Final = {number: name for name, number in KEY_NUMBERS.items()}
 _BUTTON_NAMES: Final = {1: "left click", 3: "right click"}
@@ -29,11 +29,11 @@ _BUTTON_NAMES: Final = {1: "left click", 3: "right click"}
 
 @dataclass(frozen=True)
 class Input:
-    """One thing that a user did.
+    """One input of the user.
 
     Attributes:
         name: A key of `KEY_NUMBERS`, `"move"`, `"left click"` or `"right click"`.
-        place_px: Where the mouse was, as a pixel (x, y) of the frame; `None` for a key.
+        place_px: Position of the mouse, as a pixel (x, y) of the frame; `None` for a key.
     """
 
     name: str
@@ -41,14 +41,14 @@ class Input:
 
 
 class Window:
-    """Shows frames on the screen, at most so many a second.
+    """Shows frames on the screen, at a limited rate.
 
     The window opens with the first frame. When the user closes it, it stays closed, and the
-    program goes on as if frames were shown.
+    program continues without it.
 
     Args:
         title: Title of the window.
-        frames_per_s: Frames a second that `show` does not exceed.
+        frames_per_s: Most frames per second of `show`.
     """
 
     def __init__(self, title: str = "blast_env", frames_per_s: float = 25.0) -> None:
@@ -66,7 +66,7 @@ class Window:
         return self._closed
 
     def show(self, frame: Frame) -> bool:
-        """Show a frame, after a wait for its turn; return whether the window is still open.
+        """Show a frame, and wait to keep the frame rate; return whether the window is still open.
 
         Args:
             frame: uint8 (height, width, 3).
@@ -91,7 +91,7 @@ class Window:
         return not self._closed
 
     def inputs(self) -> list[Input]:
-        """Return what the user did before the last frame was shown, in its order."""
+        """Return the inputs collected by the last call of `show`, in their order."""
         return [done for event in self._events if (done := self._input(event)) is not None]
 
     def _input(self, event: pygame.event.Event) -> Input | None:
@@ -118,7 +118,7 @@ class Window:
         """Return the screen, opened or resized for frames of this size."""
         try:
             pygame.display.init()
-            # Without a screen SDL quietly falls back to a driver that shows nothing.
+            # Without a screen SDL silently falls back to a driver without output.
             if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
                 raise pygame.error("there is no screen")
             fitting = fit(size_px, pygame.display.get_desktop_sizes()[0])
@@ -134,7 +134,7 @@ class Window:
 
 
 def fit(size_px: tuple[int, int], screen_px: tuple[int, int]) -> tuple[int, int]:
-    """Return the size of the window: the frame's, or a smaller one that fits on the screen."""
+    """Return the size of the window: that of the frame, or smaller to fit the screen."""
     factors = (_SHARE_OF_SCREEN * on / of for on, of in zip(screen_px, size_px, strict=True))
     factor = min(1.0, *factors)
     return round(factor * size_px[0]), round(factor * size_px[1])
