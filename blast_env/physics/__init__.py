@@ -1,1 +1,1 @@
-"""The blast model: parameters, particles, structures, collisions and the engines that run it."""
+"""The blast model: parameters, particles, structures, collisions and engines."""

@@ -1,6 +1,6 @@
-"""What a run of the particle model offers: a scene goes in, what happened comes out.
+"""The interface of a run of the particle model, from a scene to its collisions.
 
-Above all the record of the collisions with modules (paper, section 2.8).
+The main result is the record of the collisions with modules (paper, section 2.8).
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ COLLISION_DTYPE = np.dtype(
         ("normal_x", np.float64),  # unit vector out of the module
         ("normal_y", np.float64),
         ("impulse", np.float64),  # m |v| before the collision, see `Scene.impulse_quantum`
-        ("transferred_impulse", np.float64),  # along the normal, what the solver really gave
+        ("transferred_impulse", np.float64),  # along the normal, as given by the solver
         ("earlier_collisions", np.int64),  # of this ball, with anything
         ("first_contact", np.bool_),  # of this module
     ]
@@ -37,7 +37,7 @@ CollisionArray = NDArray[np.void]
 
 
 class CollisionLog:
-    """Collisions in the order in which they happened."""
+    """Collisions in the order of time."""
 
     def __init__(self) -> None:
         self._arrays: list[CollisionArray] = []
@@ -93,7 +93,7 @@ def _floats(collisions: CollisionArray, column: str) -> NDArray[np.float64]:
 def incidence_angle_rad(collisions: CollisionArray) -> NDArray[np.float64]:
     """Return the angle of incidence (n,): 0 is head-on, pi/2 grazing.
 
-    The angle between the reversed velocity before the collision and the module's normal.
+    It is the angle between the reversed velocity before the collision and the module's normal.
     """
     columns = ("vx", "vy", "normal_x", "normal_y")
     vx, vy, normal_x, normal_y = (_floats(collisions, name) for name in columns)
@@ -104,7 +104,7 @@ def incidence_angle_rad(collisions: CollisionArray) -> NDArray[np.float64]:
 
 
 class EndReason(StrEnum):
-    """Why a run ended."""
+    """Reason for the end of a run."""
 
     OUT_OF_REACH = "no moving ball can reach a structure before the time limit"
     TIME_LIMIT = "the time limit was reached"
@@ -115,7 +115,7 @@ class EndReason(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class BallStates:
-    """The balls that are still there, simulation units.
+    """The remaining balls, in simulation units.
 
     Attributes:
         index: Index into the scene's balls (n,), ascending.
@@ -143,15 +143,15 @@ class BallStates:
 
 
 def can_reach(balls: BallStates, scene: Scene, within_s: float) -> bool:
-    """Return whether any moving ball can still act on a structure in the time that is left.
+    """Return whether any moving ball can still act on a structure in the remaining time.
 
-    Directions do not count, since a collision may change them, and speeds count double: a ball
-    that is hit leaves at most twice as fast as the one that hit it came.
+    Directions are ignored, since a collision may change them, and speeds are doubled, because a
+    ball at rest leaves a collision with at most twice the speed of the ball that hits it.
 
     Args:
-        balls: The balls that are still there.
-        scene: The scene; its barrier is no structure here.
-        within_s: The time left.
+        balls: The remaining balls.
+        scene: The scene; its barrier does not count as a structure.
+        within_s: The remaining time.
     """
     distance = np.full(len(balls), np.inf)
     for outline in scene.structures:
@@ -164,15 +164,15 @@ def can_reach(balls: BallStates, scene: Scene, within_s: float) -> bool:
 
 
 class BlastRun(Protocol):
-    """One blast on its way.
+    """One blast in progress.
 
     Attributes:
         scene: The initial state.
-        obstacles: The structures with the hits so far.
-        log: The collisions with modules so far.
-        time_s: Simulated time so far.
-        steps: Steps of the engine so far.
-        end_reason: Why the run has ended; None while it has not.
+        obstacles: The structures with their current hits.
+        log: The collisions with modules up to now.
+        time_s: Simulated time.
+        steps: Number of steps of the engine.
+        end_reason: Reason for the end of the run; `None` before it.
     """
 
     scene: Scene
@@ -183,10 +183,10 @@ class BlastRun(Protocol):
     end_reason: EndReason | None
 
     def advance(self, until_s: float) -> None:
-        """Go on until the simulated time is at least `until_s`, or the run has ended.
+        """Continue until the simulated time is at least `until_s`, or the run has ended.
 
-        How a run is cut into calls does not change it.
+        The division of a run into calls does not change its results.
         """
 
     def balls(self) -> BallStates:
-        """Return the balls that are still there."""
+        """Return the remaining balls."""

@@ -1,7 +1,7 @@
 """The parameters of the blast model (paper, sections 2.3 to 2.8), with units and bounds.
 
-Below them sets of parameters: presets, finer resolutions, other masses of charge. Every default is
-the `ballistic` preset's value.
+The module also has sets of parameters: presets, finer resolutions, other masses of charge. Every
+default is the value of the preset `ballistic`.
 """
 
 import json
@@ -40,9 +40,9 @@ class BallParameters(Parameters):
     Attributes:
         mass: Mass, simulation mass units.
         radius_units: Radius, simulation units (4 units are 1 m).
-        elasticity: Chipmunk multiplies the two elasticities of a contact: 0.8 on both is a
-            restitution of 0.64.
-        friction: Coulomb friction; multiplied over the two sides of a contact as well.
+        elasticity: Elasticity; the restitution of a contact is the product of both elasticities,
+            as in Chipmunk: 0.8 on both sides gives 0.64.
+        friction: Coulomb friction; that of a contact is the product of both sides as well.
         inertia_factor: Moment of inertia as a multiple of m r^2; 0.5 is a solid disc.
     """
 
@@ -58,20 +58,20 @@ class ExplosiveParameters(BallParameters):
 
     Attributes:
         ball_count: N, the number of balls at the angles 2 pi i / N.
-        speed_units_per_s: v0, the radial speed that every ball starts with.
+        speed_units_per_s: v0, the initial radial speed of every ball.
         offset_units: Distance of the ball centres from the charge's centre at the start.
-        fan_phase: `"random"` turns the whole fan by an angle drawn from the seed; `"fixed"` does
-            not turn it.
+        fan_phase: `"random"` rotates the whole fan by an angle drawn from the seed; `"fixed"` does
+            not rotate it.
         collide_within_charge: Whether balls of one charge collide with each other.
         thermal_share: Share of the kinetic energy that is random in direction at the start,
-            beside the radial part; 0 in the paper's model. Particle blast methods give their
-            detonation products such a part, for their pressure.
-        reference_tnt_kg: The TNT-equivalent mass that all parameters stand for.
-        charge_scaling: What follows for another charge (`charge_scaling.for_charge`). The
-            specific energy of TNT is a constant, so v0 stays. `"mass"`: the mass of the balls is
-            proportional to the charge's. `"hopkinson_cranz"`: the blast is the reference blast
-            enlarged by the cube root of the charge's mass, with balls of the same size; charge
-            mass in the plane, number of balls, losses in collisions and the time limit follow.
+            besides the radial part; 0 in the paper's model. Particle blast methods include such a
+            share for the pressure of the detonation products.
+        reference_tnt_kg: The TNT-equivalent mass to which all parameters refer.
+        charge_scaling: Scaling to other charges (`for_charge`). The specific energy of TNT is a
+            constant, so that v0 does not change. `"mass"`: the mass of the balls is proportional
+            to the charge's. `"hopkinson_cranz"`: the blast is the reference blast enlarged by the
+            cube root of the charge's mass, with balls of the same size, which determines the charge
+            mass in the plane, the number of balls, the losses in collisions and the time limit.
     """
 
     mass: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
@@ -91,12 +91,13 @@ class AirParameters(BallParameters):
     """The air: `AirBall`s on a square lattice (section 2.3).
 
     Attributes:
-        spacing_units: Distance between neighbours; 0 means no air at all.
-        jitter: How far a seed may move each ball off its lattice point, as a fraction of the
-            gap that keeps neighbours apart, (spacing - 2 radius) / 2; 0 is the bare lattice.
+        spacing_units: Distance between neighbours; 0 means no air.
+        jitter: Largest random displacement of a ball from its lattice point along each axis, as a
+            fraction of the largest one without overlap, (spacing - 2 radius) / 2; 0 is the bare
+            lattice.
         lattice_offset: `"random"` shifts the whole lattice by less than a spacing, drawn from the
-            seed; `"centred"` keeps it centred in the site. A lattice that lies the same way in
-            every blast leaves free lanes, always to the same modules.
+            seed; `"centred"` keeps it centred in the site. A fixed lattice leaves free lanes to the
+            same modules in every blast.
     """
 
     mass: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 0.79
@@ -108,17 +109,17 @@ class AirParameters(BallParameters):
 
 
 class ContactParameters(Parameters):
-    """What a collision does beside the rebound (section 2.4).
+    """Effects of a collision (section 2.4).
 
     Attributes:
         module_restitution: C_e, the restitution of a ball's contact with a `ModularPart`.
-        module_friction: Friction of a `ModularPart`, multiplied with the ball's.
+        module_friction: Friction of a `ModularPart`, multiplied by the ball's.
         module_shrink: Factor on radius and mass of an explosive ball that hits a module; the
-            paper's "scaled by 30 %" is read as reduced by 30 %.
+            paper's "scaled by 30 %" is interpreted as reduced by 30 %.
         air_shrink: Factor on radius and mass of an explosive ball that hits an air ball.
         minimum_radius_units: r_min; an explosive ball that shrinks below it is removed.
-        base_impulse: I_b, mass units times units per second, which any two balls get along the
-            normal of a new contact, equal and opposite.
+        base_impulse: I_b, mass units times units per second, equal and opposite on any two balls
+            along the normal of a new contact.
     """
 
     module_restitution: Fraction = 0.5
@@ -130,19 +131,19 @@ class ContactParameters(Parameters):
 
 
 class SteppingParameters(Parameters):
-    """How the motion is integrated and when it ends.
+    """Integration of the motion and its end.
 
     Attributes:
-        step_radii: Distance that the fastest ball may cover in one step, in radii of the
-            smallest ball (or half modules, if those are smaller).
-        longest_step_s: Bound of the time step, however slow the balls are.
+        step_radii: Largest distance of the fastest ball in one step, in radii of the smallest ball
+            (or half modules, if those are smaller).
+        longest_step_s: Upper bound of the time step.
         solver_iterations: Iterations of Chipmunk's contact solver.
-        time_limit_s: Simulated time after which the run ends in any case; that of the reference
-            charge, where `explosive.charge_scaling` is `"hopkinson_cranz"`.
-        contact_time_s: Event engine: collisions of a ball that follow each other within this time
-            are one contact, which loses energy only once. It stands for the time that a real
-            contact lasts, and keeps pressed balls from colliding infinitely often.
-        most_collisions: Event engine: collisions after which the run ends in any case.
+        time_limit_s: Simulated time at which the run ends at the latest; for the reference charge,
+            if `explosive.charge_scaling` is `"hopkinson_cranz"`.
+        contact_time_s: Event engine: successive collisions of a ball within this time are one
+            contact, which loses energy only once. It represents the duration of a real contact,
+            and prevents infinitely many collisions of balls pressed together.
+        most_collisions: Event engine: number of collisions at which the run ends at the latest.
     """
 
     step_radii: Annotated[StrictFloat, Field(ge=0.01, le=0.5)] = 0.5
@@ -168,11 +169,11 @@ ENGINE_SETTINGS: Final[Mapping[str, frozenset[str]]] = MappingProxyType(
         "event": frozenset({"contact_time_s", "most_collisions"}),
     }
 )
-"""Settings in `SteppingParameters` that one engine alone heeds."""
+"""Settings in `SteppingParameters` used by one engine only."""
 
 
 def parameters_digest(parameters: SimulationParameters, engine: str) -> str:
-    """Return the SHA-256 of all parameters that an engine heeds; a calibration is bound to it."""
+    """Return the SHA-256 of all parameters used by an engine, to which calibrations are bound."""
     content = parameters.model_dump(mode="json")
     for name, settings in ENGINE_SETTINGS.items():
         if name != engine:
@@ -187,7 +188,7 @@ def with_overrides(
     """Return `parameters` with some values replaced.
 
     Args:
-        parameters: The parameters to start from.
+        parameters: The original parameters.
         overrides: Nested like `SimulationParameters`: `{"air": {"spacing_units": 3.0}}`.
 
     Raises:
@@ -205,20 +206,19 @@ def with_overrides(
 def with_resolution(parameters: SimulationParameters, factor: float) -> SimulationParameters:
     """Return parameters for the same air and the same charge, with balls 1 / `factor` the size.
 
-    What a layout feels stays: the mass of the air per area, its packing fraction, the mass and
-    the energy of the charge. What happens per collision is softened, because a way of the same
-    length meets `factor` times as many: the loss of energy (1 - restitution), the shrinking of
-    explosive balls at air, and the base impulse. Sizes in metres do not change: a module stays
-    0.5 m and a charge stays where it is.
+    The properties that determine the loads are unchanged: mass of the air per area, packing
+    fraction, mass and energy of the charge. Effects per collision are reduced, because a path of
+    the same length has `factor` times as many collisions: the loss (1 - restitution), the shrinking
+    of explosive balls at air, and the base impulse. Sizes and positions in metres do not change.
 
     Args:
-        parameters: What to start from.
+        parameters: The original parameters.
         factor: Above 1 for finer balls; the number of air balls grows with its square, the time
             of a blast with about its cube.
 
     Raises:
-        BlastEnvError: If balls so large would lose more in a collision than there is.
-        pydantic.ValidationError: If another value gets out of bounds.
+        BlastEnvError: If the loss per collision of such large balls would exceed 1.
+        pydantic.ValidationError: If another value is out of bounds.
     """
     air, explosive, contact = parameters.air, parameters.explosive, parameters.contact
     count = round(explosive.ball_count * factor)
@@ -247,10 +247,10 @@ def with_resolution(parameters: SimulationParameters, factor: float) -> Simulati
 
 
 def softened_elasticity(of_kind: BallParameters, factor: float) -> float:
-    """Return the elasticity with which two balls of a kind lose 1 / `factor` as much.
+    """Return the elasticity that reduces the loss of two balls of a kind to 1 / `factor`.
 
     Raises:
-        BlastEnvError: If they would lose more than there is: then `factor` is too small.
+        BlastEnvError: If the loss would exceed 1, because `factor` is too small.
     """
     loss = 1.0 - of_kind.elasticity**2
     if loss > factor:
@@ -263,12 +263,12 @@ def softened_elasticity(of_kind: BallParameters, factor: float) -> float:
 
 
 def softened_air_shrink(contact: ContactParameters, factor: float) -> float:
-    """Return the shrinking of which `factor` times as many make the same."""
+    """Return the shrink factor that has the same effect in `factor` times as many collisions."""
     return float(contact.air_shrink ** (1.0 / factor))
 
 
-# Dense, slightly dissipative air, in which a blast diffracts round walls. Found by a
-# search over distance law, shielding and cost, for balls of radius 1; the presets have finer ones.
+# Dense, slightly dissipative air, in which a blast diffracts around walls. Found by a search over
+# distance law, shielding and cost, for balls of radius 1; the presets have finer balls.
 _COLLISIONAL_AIR: Final = with_overrides(
     SimulationParameters(),
     {
@@ -287,12 +287,12 @@ _COLLISIONAL_AIR: Final = with_overrides(
 
 PRESETS: Final[Mapping[str, SimulationParameters]] = MappingProxyType(
     {
-        # Sparse air, as the paper's figures suggest: balls fly almost free between collisions.
+        # Sparse air, as the paper's figures suggest: balls fly almost freely between collisions.
         # v0, N, the radii, C_e and the 10 % and 30 % rules are the paper's or set beforehand;
-        # air spacing, air mass and elasticity come from `python -m studies.ballistic search`, and
-        # match the paper's UFC column and the shape of its own impulse-distance curve.
+        # air spacing, air mass and elasticity are from `python -m studies.ballistic search`, and
+        # match the paper's UFC column and the shape of its simulated impulse-distance curve.
         "ballistic": SimulationParameters(),
-        # Balls of 0.2 m radius: coarse, and affordable in training.
+        # Balls of 0.2 m radius: coarse, and fast enough for training.
         "collisional": with_resolution(_COLLISIONAL_AIR, 1.25),
         # The same air and charge with balls of half the size.
         "collisional_fine": with_resolution(_COLLISIONAL_AIR, 2.5),
@@ -307,7 +307,7 @@ def preset(name: str) -> SimulationParameters:
         name: One of `PRESETS`.
 
     Raises:
-        UnknownNameError: If there is no such preset; the message names the nearest one.
+        UnknownNameError: If there is no such preset; the message suggests the nearest one.
     """
     if name not in PRESETS:
         raise UnknownNameError("preset", name, PRESETS)
@@ -318,15 +318,15 @@ def for_charge(parameters: SimulationParameters, tnt_kg: float) -> SimulationPar
     """Return the parameters of a blast with a charge of a given mass.
 
     Args:
-        parameters: Parameters for `explosive.reference_tnt_kg`; `explosive.charge_scaling` says
-            how another charge follows from them.
+        parameters: Parameters for `explosive.reference_tnt_kg`, with the scaling to other charges
+            in `explosive.charge_scaling`.
         tnt_kg: TNT-equivalent mass of the charge.
 
     Returns:
         The parameters for `tnt_kg`, which is their `reference_tnt_kg`.
 
     Raises:
-        BlastEnvError: If a parameter gets out of bounds, because the charge is too small or too
+        BlastEnvError: If a parameter is out of bounds, because the charge is too small or too
             large for such balls.
     """
     ratio = tnt_kg / parameters.explosive.reference_tnt_kg
@@ -351,18 +351,18 @@ def _reason(error: ValidationError | BlastEnvError) -> str:
 
 
 def _with_mass(parameters: SimulationParameters, ratio: float) -> SimulationParameters:
-    """Return the same fan of balls with other masses."""
+    """Return the parameters with the mass of the charge's balls multiplied by `ratio`."""
     return with_overrides(parameters, {"explosive": {"mass": parameters.explosive.mass * ratio}})
 
 
 def _hopkinson_cranz(parameters: SimulationParameters, ratio: float) -> SimulationParameters:
-    """Return the reference blast enlarged geometrically, with balls as small as before.
+    """Return the reference blast enlarged geometrically, with balls of the same size.
 
-    Enlarged by the cube root of `ratio`: lengths and times grow with it, speeds and densities
-    stay, and so the mass of the charge in the plane grows with its square. The balls do not grow:
-    in comparison with the blast they are finer, as in `resolution.with_resolution`, and what they
-    lose in a collision is less. Nor does the circle on which the charge's balls start, which is no
-    larger than a few of them.
+    The scale is the cube root of `ratio`: lengths and times grow with it, speeds and densities do
+    not change, and the mass of the charge in the plane therefore grows with its square. The balls
+    keep their size: relative to the blast they are finer, as in `with_resolution`, so that they
+    lose less in a collision. The circle on which the charge's balls start also keeps its size,
+    which is no more than a few radii.
     """
     scale = ratio ** (1.0 / 3.0)
     air, explosive, contact = parameters.air, parameters.explosive, parameters.contact

@@ -14,7 +14,7 @@ from blast_env.physics.parameters import AirParameters, BallParameters, Explosiv
 
 
 class CollisionType(IntEnum):
-    """The paper's four kinds of objects (section 2.4), by its names."""
+    """The paper's four kinds of objects (section 2.4), with its names."""
 
     ExplosionBall = 1
     AirBall = 2
@@ -80,13 +80,13 @@ def explosion_fan(
 ) -> Balls:
     """Return the charge: N `ExplosionBall`s at the angles 2 pi i / N (section 2.3).
 
-    With a thermal share their velocities have a normally distributed part beside the radial one;
-    the kinetic energy is the same on average.
+    With a thermal share, the velocities have a normally distributed part besides the radial one;
+    the mean kinetic energy is the same.
 
     Args:
         parameters: The explosive's parameters, for this charge.
         centre: The charge's centre, units.
-        rng: Draws the phase of the fan and the random part of the velocities.
+        rng: Generator for the phase of the fan and the random part of the velocities.
     """
     drawn = rng.random()
     phase = drawn if parameters.fan_phase == "random" else 0.0
@@ -118,16 +118,16 @@ def air_lattice(
     Args:
         parameters: The air's parameters.
         site: The simulated area, units.
-        obstacles: Rectangles that hold no air, units.
+        obstacles: Rectangles without air, units.
         charge_centre: The charge's centre, units.
-        charge_radius: Radius of the disc that the charge fills, units.
-        rng: Draws the offset of the lattice and the jitter.
+        charge_radius: Radius of the charge's disc, units.
+        rng: Generator for the offset of the lattice and the jitter.
     """
     if parameters.spacing_units == 0.0:
         empty = np.empty((0, 2))
         return Balls.of_one_kind(CollisionType.AirBall, parameters, empty, empty)
     spacing, radius = parameters.spacing_units, parameters.radius_units
-    # Drawn in any case, so that a centred lattice does not shift the stream of the jitter.
+    # Always drawn, so that a centred lattice does not shift the random stream of the jitter.
     drawn_x, drawn_y = rng.random(2)
     if parameters.lattice_offset == "centred":
         drawn_x = _centring_share(site.right - site.left, spacing)
@@ -162,7 +162,7 @@ def distance_to_rectangle(position: FloatArray, rectangle: Rectangle) -> FloatAr
 
 
 def lattice_capacity(parameters: AirParameters, site: Rectangle) -> int:
-    """Return the number of air balls on an empty site, which no scene on it exceeds."""
+    """Return the number of air balls on an empty site, the maximum for all its scenes."""
     if parameters.spacing_units == 0.0:
         return 0
     return prod(

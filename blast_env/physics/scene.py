@@ -1,4 +1,4 @@
-"""A scene: everything that an engine needs to run one blast, as plain arrays."""
+"""Scenes: all input of an engine for one blast, as plain arrays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from blast_env.physics.structure import ModularObstacle, module_name
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M, in_units
 
 WallName = Literal["west", "east", "south", "north"]
-"""A wall of a structure, by the side that it looks to: west is towards smaller x."""
+"""A wall of a structure, by the side that it faces: west is towards smaller x."""
 
 WALLS: Final[tuple[WallName, ...]] = ("west", "east", "south", "north")
 
@@ -24,13 +24,13 @@ OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
     "south": (0.0, -1.0),
     "north": (0.0, 1.0),
 }
-"""Where each wall looks."""
+"""Outward normal of each wall."""
 
 
 class Charge(NamedTuple):
-    """One charge: where it is in plan, its TNT-equivalent mass, and the height of its centre.
+    """One charge: its position in plan, its TNT-equivalent mass, and the height of its centre.
 
-    The particle engines know no height; for gas dynamics 0 is a charge that lies on the ground.
+    The particle engines ignore the height; for gas dynamics, 0 is a charge on the ground.
     """
 
     position_m: tuple[float, float]
@@ -39,7 +39,7 @@ class Charge(NamedTuple):
 
 
 class Gauge(NamedTuple):
-    """A place in the air whose overpressure is recorded: x, y, and height above the ground."""
+    """A place in the air at which the overpressure is recorded: x, y, height above the ground."""
 
     name: str
     position_m: tuple[float, float, float]
@@ -47,15 +47,15 @@ class Gauge(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BlastSite:
-    """What stands where when a charge goes off: what every engine needs.
+    """The site, charge and structures of a blast, common to all engines.
 
     Attributes:
         site_m: The simulated area.
         charge: The charge.
-        structures: The structures and, when there is one, the barrier; see `obstacles`.
-        gauges: Virtual gauges; the particle engines have none.
-        air_height_m: Height of the simulated air; the particle engines know none.
-        build_zone: The whole build zone, as if full of modules, whatever the layout; `None`
+        structures: The structures and, if there is one, the barrier; see `obstacles`.
+        gauges: Virtual gauges; the particle engines ignore them.
+        air_height_m: Height of the simulated air; the particle engines ignore it.
+        build_zone: The whole build zone as if full of modules, independent of the layout; `None`
             without one. For gas dynamics only.
     """
 
@@ -67,13 +67,13 @@ class BlastSite:
     build_zone: "StructureOutline | None" = None
 
     def obstacles(self) -> tuple[ModularObstacle, ...]:
-        """Return fresh obstacles without any hit, in the order of `structures`."""
+        """Return new obstacles without hits, in the order of `structures`."""
         return tuple(outline.build() for outline in self.structures)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene(BlastSite):
-    """The initial state of one blast of particles; what moves is in simulation units.
+    """The initial state of one blast of particles; the balls are in simulation units.
 
     Attributes:
         balls: All balls; air first, then the charge.
@@ -97,16 +97,16 @@ class Scene(BlastSite):
     def impulse_quantum(self) -> float:
         """The power of two, simulation units, of which every recorded impulse is a multiple.
 
-        About 2^-36 of the largest momentum at the start, which is far below what matters. Sums of
-        recorded impulses are then exact, up to 2^17 such momenta, in any order and however they
-        are cut into parts: the rewards of an episode add up to the impulse of the blast.
+        It is about 2^-36 of the largest initial momentum, which is negligible. Sums of recorded
+        impulses, up to 2^17 such momenta, are then exact in any order and partition: the rewards
+        of an episode add up to the impulse of the blast.
         """
         momentum = self.balls.mass * np.hypot(*self.balls.velocity.T)
         return float(2.0 ** (np.ceil(np.log2(momentum.max())) - 36))
 
     @property
     def largest_exact_impulse(self) -> float:
-        """Up to here sums of recorded impulses are exact, simulation units."""
+        """Bound below which sums of recorded impulses are exact, simulation units."""
         return self.impulse_quantum * 2.0**53
 
     def round_impulse(self, impulse: float) -> float:
@@ -115,13 +115,13 @@ class Scene(BlastSite):
 
 
 class Block(NamedTuple):
-    """What stands as one: a structure, a piece of a barrier, or a single module.
+    """A single solid: a structure, a piece of a barrier, or a module.
 
     Attributes:
-        name: Its name; empty for a single module.
+        name: Its name; empty for a module.
         rectangle_m: Its plan.
-        height_m: Height of its top; `None` is as high as the air.
-        base_m: Where it begins above the ground.
+        height_m: Height of its top; `None` for as high as the air.
+        base_m: Height of its base above the ground.
     """
 
     name: str
@@ -132,12 +132,12 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class StructureOutline:
-    """What a structure is before any blast, in metres; attributes as in `ModularObstacle`.
+    """A structure before any blast, in metres; attributes as in `ModularObstacle`.
 
-    Six more are for gas dynamics: `height_m`, of its top, `None` for as high as the air; `base_m`,
-    where it begins above the ground; `heights_m` and `bases_m`, the same of single cells, in the
-    order of `cells`, where they differ; `faces`, the walls whose load counts; and `is_lasting`,
-    whether it stands with every layout.
+    Six more are for gas dynamics: `height_m`, the height of its top, `None` for as high as the air;
+    `base_m`, the height of its base above the ground; `heights_m` and `bases_m`, the same for
+    single cells, in the order of `cells`, if they differ; `faces`, the walls whose load counts; and
+    `is_lasting`, whether it is present in every layout.
     """
 
     kind: type[ModularObstacle]
@@ -172,7 +172,7 @@ class StructureOutline:
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The whole structure; of a barrier its pieces, or its modules where it has none."""
+        """The whole structure; the pieces of a barrier, or its modules if it has no pieces."""
         if self.cells is None:
             return (Block(self.name, self.rectangle_m, self.height_m, self.base_m),)
         count = len(self.cells)
@@ -192,7 +192,7 @@ class StructureOutline:
         )
 
     def _around_m(self, cells: Sequence[Cell]) -> Rectangle:
-        """Return the rectangle that cells fill."""
+        """Return the bounding rectangle of cells."""
         rows, columns = zip(*cells, strict=True)
         side, (left, bottom) = MODULE_SIDE_M, self.corner_m
         return Rectangle(
@@ -203,7 +203,7 @@ class StructureOutline:
         )
 
     def build(self) -> ModularObstacle:
-        """Return the obstacle with all its parts unloaded."""
+        """Return the obstacle with unloaded parts."""
         return self.kind(
             name=self.name,
             corner=in_units(self.corner_m),

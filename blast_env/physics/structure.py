@@ -1,4 +1,4 @@
-"""Structures of square modules, and the surface that they show to balls."""
+"""Structures of square modules, and the surface that balls can reach."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,17 +13,17 @@ from blast_env.physics.particles import CollisionType
 from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 _HALF: Final = MODULE_SIDE_UNITS / 2.0
-_BEYOND: Final = 1e-6  # how far past an edge we look, units
+_BEYOND: Final = 1e-6  # distance beyond an edge at which modules are looked up, units
 
 
 @dataclass(frozen=True, eq=False)
 class WallSurface:
-    """What of a set of modules can be reached.
+    """The accessible surface of a set of modules.
 
     Attributes:
-        free_faces: Whether nothing stands flush on the face (m, 4); the faces are left, right,
-            lower, upper.
-        covered_corners: Whether the wall goes on past the corner (m, 4); the corners are lower
+        free_faces: Whether no module adjoins the face (m, 4); the faces are left, right, lower,
+            upper.
+        covered_corners: Whether the wall continues beyond the corner (m, 4); the corners are lower
             left, lower right, upper left, upper right.
     """
 
@@ -40,7 +40,7 @@ def wall_surface(centres: FloatArray) -> WallSurface:
     """Find the exposed modules and the covered corners.
 
     Args:
-        centres: Centres of the modules that stand, units (m, 2).
+        centres: Centres of the intact modules, units (m, 2).
     """
     lattices = tuple(_lattices(centres))
     free = np.ones((len(centres), 4), dtype=np.bool_)
@@ -65,7 +65,7 @@ class _Lattice:
         members: Indices of the modules (k,).
         origin: Lower left corner of the occupancy's first cell, units (2,).
         cells: Column and row of each of them in the occupancy (2, k).
-        occupied: Occupancy (columns, rows), with empty cells all around.
+        occupied: Occupancy (columns, rows), with a border of empty cells.
     """
 
     members: NDArray[np.int64]
@@ -74,7 +74,7 @@ class _Lattice:
     occupied: BoolArray
 
     def free_faces(self) -> BoolArray:
-        """Return whether no module of this lattice stands flush on the faces (k, 4)."""
+        """Return whether no module of this lattice adjoins the faces (k, 4)."""
         column, row = self.cells
         solid = self.occupied
         beside = solid[column - 1, row], solid[column + 1, row]
@@ -90,12 +90,12 @@ class _Lattice:
 
 
 def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
-    """Group the modules by the lattice that they stand on."""
+    """Group the modules by lattice."""
     if not len(centres):
         return
-    # The digits below a billionth of a unit are rounding of the metres in a scenario file.
+    # Digits below 1e-9 units are rounding of the metres in a scenario file.
     offsets = np.round(np.mod(centres, MODULE_SIDE_UNITS), 9) % MODULE_SIDE_UNITS
-    for offset in np.unique(offsets @ (1.0, 1.0j)):  # much faster than unique rows
+    for offset in np.unique(offsets @ (1.0, 1.0j)):  # much faster than by rows
         members = np.flatnonzero((offsets == (offset.real, offset.imag)).all(axis=1))
         own = centres[members]
         origin = own.min(axis=0) - (_HALF + MODULE_SIDE_UNITS)
@@ -108,11 +108,11 @@ def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
 Colour = tuple[int, int, int]
 
 BARRIER_NAME: Final = "barrier"
-"""Name of the structure that the modules of a layout form."""
+"""Name of the structure formed by the modules of a layout."""
 
 
 class LoadColours(NamedTuple):
-    """The colours between which a module's colour moves as its load grows."""
+    """Colours of a module at no, half and full load, for interpolation."""
 
     unloaded: Colour = (236, 226, 198)
     half: Colour = (240, 128, 48)
@@ -129,18 +129,18 @@ class ModularPart:
     """The basic building element: a static square of 2 units (section 2.7).
 
     Attributes:
-        structure: Name of the structure that it is part of.
+        structure: Name of its structure.
         row: Row in the structure's grid, upwards.
         column: Column in the structure's grid.
-        x: Centre, units.
-        y: Centre, units.
-        capacity: Impulse, simulation units, that it bears before it is removed; None: any.
-        piece: Name of the piece of a barrier that it is part of; empty if it is of none.
-        hits: Collisions so far.
+        x: Coordinate x of the centre, units.
+        y: Coordinate y of the centre, units.
+        capacity: Impulse above which it is removed, simulation units; `None` for no limit.
+        piece: Name of its barrier piece; empty for none.
+        hits: Number of collisions.
         impulse: Sum of m |v| of these collisions (section 2.8), simulation units.
-        transferred_impulse: Sum of the momentum that the contacts really transferred along
-            their normals, simulation units.
-        first_hit_s: Time of the first collision; None before it.
+        transferred_impulse: Sum of the momentum actually transferred along the normals of the
+            contacts, simulation units.
+        first_hit_s: Time of the first collision; `None` before it.
     """
 
     collision_type = CollisionType.ModularPart
@@ -159,7 +159,7 @@ class ModularPart:
 
     @property
     def module_id(self) -> str:
-        """Identifier made from the position of the centre in metres, unique on a site."""
+        """Identifier by the position of the centre in metres, unique on a site."""
         return module_name(*self.centre_m)
 
     @property
@@ -180,16 +180,16 @@ class ModularPart:
 
     @property
     def destroyed(self) -> bool:
-        """Whether the accumulated impulse has passed the capacity."""
+        """Whether the accumulated impulse exceeds the capacity."""
         return self.capacity is not None and self.impulse > self.capacity
 
     def register(self, time_s: float, impulse: float, transferred_impulse: float) -> None:
         """Count one collision.
 
         Args:
-            time_s: When it happened.
+            time_s: Its time.
             impulse: Its m |v|, simulation units.
-            transferred_impulse: The momentum that it transferred, simulation units.
+            transferred_impulse: Its transferred momentum, simulation units.
         """
         if self.first_hit_s is None:
             self.first_hit_s = time_s
@@ -198,10 +198,10 @@ class ModularPart:
         self.transferred_impulse += transferred_impulse
 
     def colour(self, full_impulse: float) -> Colour:
-        """Return the colour that shows the load.
+        """Return the colour of the load.
 
         Args:
-            full_impulse: The impulse that has the last colour, simulation units.
+            full_impulse: The impulse of full load, simulation units.
         """
         return load_colour(self.impulse / full_impulse if full_impulse > 0.0 else 0.0)
 
@@ -217,10 +217,10 @@ class ModularObstacle:
         columns: Columns of the grid.
         protected: Whether its load counts.
         weight: Its weight among the protected structures.
-        cells: The (row, column) that hold a module; None: all.
-        capacity: Capacity of each module; None: modules never fail.
-        pieces: Names of the pieces that the modules are part of, in the order of `cells`; None:
-            of none.
+        cells: The (row, column) of the cells with a module; `None` for all.
+        capacity: Capacity of each module; `None` for no limit.
+        pieces: Names of the modules' barrier pieces, in the order of `cells`; `None` for none.
+        parts: The modules.
     """
 
     name: str
@@ -252,7 +252,7 @@ class ModularObstacle:
 
     @property
     def kind(self) -> str:
-        """The class's name, as in scenario files."""
+        """Name of the class, as in scenario files."""
         return type(self).__name__
 
     @property
@@ -284,7 +284,7 @@ class ModularObstacle:
 
     @property
     def transferred_impulse(self) -> float:
-        """Sum of the momentum really transferred to the modules, simulation units."""
+        """Sum of the momentum actually transferred to the modules, simulation units."""
         return float(sum(part.transferred_impulse for part in self.parts))
 
     def _used_cells(self) -> Iterator[tuple[int, int]]:

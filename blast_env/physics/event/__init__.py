@@ -1,1 +1,1 @@
-"""The event-driven engine: hard discs without a time step, compiled with Numba."""
+"""The event-driven engine: hard discs without time steps, compiled with Numba."""

@@ -1,4 +1,4 @@
-"""What a collision does to balls and modules."""
+"""Effects of collisions on balls and modules."""
 
 from math import sqrt
 from typing import Final
@@ -11,23 +11,23 @@ from blast_env.physics.event.state import CORNER, FACE_X, Record, RecordArray
 from blast_env.units import MODULE_SIDE_UNITS
 
 _WEDGED: Final = 16
-"""Collisions with modules alone within one contact after which a ball sticks between them.
+"""Collisions with modules only, within one contact, after which a ball sticks between them.
 
-Balls of the size of a gap between modules are caught in its mouth, where collisions without loss
-would go on for up to millions of times.
+Balls of the size of a gap between modules are caught at its mouth, where collisions without loss
+could continue for millions of times.
 """
 
 _PRESSED: Final = 128
-"""Collisions of any kind within one contact after which balls stick, to each other and to modules.
+"""Collisions of any kind within one contact after which balls stick to each other and to modules.
 
-A light ball between a heavy one and a wall needs about pi times the root of their mass ratio until
-it has turned the heavy one back. Balls that are caught by others that are caught never get away.
+A light ball between a heavy one and a wall needs about pi times the root of their mass ratio
+collisions to reverse the heavy one. Balls caught by other caught balls never escape.
 """
 
 
 @njit(error_model="numpy")
 def move_to(ball: Record, time_s: float) -> None:
-    """Bring the position of a ball up to a time."""
+    """Advance the position of a ball to a time."""
     passed = time_s - ball.since_s
     ball.x += ball.vx * passed
     ball.y += ball.vy * passed
@@ -36,10 +36,11 @@ def move_to(ball: Record, time_s: float) -> None:
 
 @njit(error_model="numpy")
 def follows_at_once(ball: Record, time_s: float, rules: Record) -> bool:
-    """Whether a ball's last collision is so short ago that both are one contact, and count them.
+    """Return whether a ball's last collision was within the contact time; count such collisions.
 
-    Then it loses no energy: otherwise balls that are pressed together would collide infinitely
-    often in a finite time (inelastic collapse; the rule is Luding and McNamara's TC model).
+    Collisions within one contact lose no energy: otherwise balls pressed together would collide
+    infinitely often in a finite time (inelastic collapse; the rule is Luding and McNamara's TC
+    model).
     """
     at_once = ball.collisions > 0 and time_s - ball.since_s < rules.contact_time_s
     ball.presses = ball.presses + 1 if at_once else 0
@@ -48,10 +49,10 @@ def follows_at_once(ball: Record, time_s: float, rules: Record) -> bool:
 
 @njit(error_model="numpy")
 def _rest_if_slow(ball: Record, rules: Record) -> None:
-    """Bring a ball to rest that is all but at rest.
+    """Bring a ball to rest if it is slower than the rest speed.
 
-    What is left of a motion that fades between balls and modules in touch would go on until the
-    smallest numbers there are, and beyond them without end.
+    Otherwise a motion that decays between touching balls and modules would continue down to the
+    smallest floating-point numbers, without end.
     """
     if ball.vx * ball.vx + ball.vy * ball.vy < rules.rest_speed * rules.rest_speed:
         ball.vx, ball.vy = 0.0, 0.0
@@ -69,7 +70,7 @@ def _stay_together(one: Record, other: Record) -> None:
 
 @njit(error_model="numpy")
 def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> None:
-    """Let two balls collide: restitution, friction, the base impulse, and shrinking."""
+    """Collide two balls: restitution, friction, base impulse and shrinking."""
     explosive = one.explosive + other.explosive
     restitution = rules.restitution[explosive]
     one_at_once = follows_at_once(one, time_s, rules)
@@ -111,9 +112,9 @@ def collide_balls(one: Record, other: Record, time_s: float, rules: Record) -> N
 
 @njit(error_model="numpy")
 def _friction(one: Record, other: Record, slip: float, rules: Record, most: float) -> float:
-    """Return the tangential impulse on the second of two balls, and change their spins.
+    """Return the tangential impulse on the second of two balls, and update their spins.
 
-    It stops the slip of the surfaces, as far as Coulomb's law lets it.
+    The impulse stops the slip of the surfaces within the limit of Coulomb's law.
     """
     slip -= one.spin * one.radius + other.spin * other.radius
     inertia = rules.inertia_factor[one.explosive] * one.mass
@@ -134,7 +135,7 @@ def shrink(ball: Record, factor: float) -> None:
 
 @njit(error_model="numpy")
 def contact_normal(ball: Record, surface: Record) -> tuple[float, float]:
-    """Return the outward normal where a ball touches a surface."""
+    """Return the outward normal at the contact of a ball with a surface."""
     if surface.kind == CORNER:
         nx, ny = ball.x - surface.a, ball.y - surface.b
         distance = sqrt(nx * nx + ny * ny)
@@ -144,7 +145,7 @@ def contact_normal(ball: Record, surface: Record) -> tuple[float, float]:
 
 @njit(error_model="numpy")
 def touched_module(ball: Record, surface: Record, modules: NDArray[np.int32]) -> int:
-    """Return the module that a ball touches on a surface."""
+    """Return the module of a surface that a ball touches."""
     place = 0
     if surface.kind != CORNER:
         along = ball.y if surface.kind == FACE_X else ball.x
@@ -162,16 +163,16 @@ def collide_with_module(
     rules: Record,
     row: NDArray[np.float64],
 ) -> int:
-    """Let a ball rebound from a module: C_e, friction, the load, the record, and shrinking.
+    """Collide a ball with a module: C_e, friction, load, record and shrinking.
 
     Args:
         ball: The ball.
         surface: The face or corner that it touches.
         modules: The modules of the surfaces.
         loads: The loads of the modules.
-        time_s: When.
+        time_s: Time of the collision.
         rules: The rules.
-        row: Receives the record of the collision but the number of the ball.
+        row: Row for the record of the collision, filled except for the number of the ball.
 
     Returns:
         The module.
@@ -183,7 +184,7 @@ def collide_with_module(
     nx, ny = contact_normal(ball, surface)
     along = ball.vy * nx - ball.vx * ny
     transferred = -(1.0 + restitution) * ball.mass * (ball.vx * nx + ball.vy * ny)
-    # The transferred impulse stands for a collision at the normal speed that gives it at C_e.
+    # The recorded normal speed is the one that gives the transferred impulse with C_e.
     counted = transferred / ((1.0 + rules.module_restitution) * ball.mass)
     counted_along = along if is_new else 0.0
     speed = sqrt(counted * counted + counted_along * counted_along)
@@ -214,7 +215,7 @@ def collide_with_module(
 
 @njit(error_model="numpy")
 def _module_restitution(ball: Record, time_s: float, rules: Record) -> float:
-    """Return the restitution of a ball at a module, and count how often it rattles."""
+    """Return the restitution of a ball at a module, and count its repeated collisions."""
     if not follows_at_once(ball, time_s, rules):
         ball.rattles = 0
         return rules.module_restitution
@@ -224,7 +225,7 @@ def _module_restitution(ball: Record, time_s: float, rules: Record) -> float:
 
 @njit(error_model="numpy")
 def _module_friction(ball: Record, normal: float, along: float, rules: Record) -> float:
-    """Return the tangential impulse on a ball at a module, and change its spin."""
+    """Return the tangential impulse on a ball at a module, and update its spin."""
     most = rules.module_friction[ball.explosive] * normal
     if most <= 0.0:
         return 0.0

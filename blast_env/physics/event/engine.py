@@ -1,6 +1,6 @@
-"""The event-driven engine: the paper's model with hard discs and without a time step.
+"""The event-driven engine: the paper's model with hard discs and without time steps.
 
-First the loop that goes from collision to collision, in compiled code; then the run around it.
+It consists of a compiled loop from collision to collision, and the run that calls it.
 """
 
 import logging
@@ -41,7 +41,7 @@ from blast_env.physics.event.state import (
 )
 from blast_env.physics.scene import Scene
 
-# Why the loop came back.
+# Reasons why the loop returns.
 UNTIL: Final = 0
 RECORD_FULL: Final = 1
 OUT_OF_REACH: Final = 2
@@ -51,10 +51,10 @@ PAUSED: Final = 5
 _COLLISIONS_BETWEEN_CHECKS: Final = 512
 
 _EVENTS_PER_CALL: Final = 10_000
-"""After which the loop comes back, so that Ctrl-C is heard: an event takes 1 to 10 us."""
+"""Events after which the loop returns, to respond to Ctrl-C: an event takes 1 to 10 us."""
 
 _NUMBER: Final[Any] = np.int64
-"""Of a ball, as in loops over them: for two kinds of integers most would be compiled twice."""
+"""Type of a ball's number, as in loops over them: a second integer type would compile twice."""
 
 
 @njit(error_model="numpy")
@@ -71,10 +71,10 @@ def run_until(
     record: NDArray[np.float64],
     until_s: float,
 ) -> int:
-    """Go on until a time, or until something is to be done outside.
+    """Continue until a time, or until the caller has to act.
 
     Returns:
-        One of the constants above.
+        The reason, one of the constants above.
     """
     if progress.stage == NEW:
         _begin(balls, cells, heap, surfaces, rules)
@@ -97,7 +97,7 @@ def run_until(
         if progress.records == len(record):
             return RECORD_FULL
         if heap[0].ball == 0 or heap[1].time_s == inf:
-            return OUT_OF_REACH  # nothing will ever happen again
+            return OUT_OF_REACH  # no further event
         if heap[1].time_s > until_s:
             return UNTIL
         ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
@@ -113,7 +113,7 @@ def run_until(
         progress.collisions += 1
         progress.time_s = time_s
         if partner >= 0:
-            one, other = min(ball, partner), max(ball, partner)  # whichever foresaw it
+            one, other = min(ball, partner), max(ball, partner)  # for a fixed order
             collide_balls(balls[one], balls[other], time_s, rules)
             _go_on(balls, cells, heap, surfaces, rules, ball)
             _go_on(balls, cells, heap, surfaces, rules, partner)
@@ -139,7 +139,7 @@ def _begin(
     surfaces: RecordArray,
     rules: Record,
 ) -> None:
-    """Put every ball into its cell, and look ahead for those that move."""
+    """Put every ball into its cell, and predict the next events of moving balls."""
     for ball in range(len(balls)):
         enter_cell(balls, cells, ball, cell_at(rules, balls[ball].x, balls[ball].y))
     for ball in range(len(balls)):
@@ -156,7 +156,7 @@ def _look_again(
     rules: Record,
     progress: Record,
 ) -> bool:
-    """Look ahead again for balls that move; return whether none is left."""
+    """Predict the next events of scheduled balls again; return whether all are done."""
     looked = 0
     for ball in range(progress.looked_again, len(balls)):
         if looked == _EVENTS_PER_CALL:
@@ -178,7 +178,7 @@ def _go_on(
     rules: Record,
     ball: int,
 ) -> None:
-    """Look ahead for a ball that has collided, or remove it if it has got too small."""
+    """Predict the next event of a ball after a collision, or remove it if it is too small."""
     if balls[ball].explosive and balls[ball].radius < rules.minimum_radius:
         _remove(balls, cells, heap, ball)
     else:
@@ -190,7 +190,7 @@ def _remove(balls: RecordArray, cells: RecordArray, heap: RecordArray, ball: int
     leave_cell(balls, cells, ball)
     unschedule(heap, balls, ball)
     balls[ball].alive = 0
-    balls[ball].collisions += 1  # so that nobody waits for it
+    balls[ball].collisions += 1  # invalidates events with it
 
 
 @njit(error_model="numpy")
@@ -201,9 +201,9 @@ def _can_reach(
     time_limit_s: float,
     time_s: float,
 ) -> bool:
-    """Whether a moving ball can still act on a structure; see `engine.can_reach`.
+    """Return whether a moving ball can still act on a structure; see `engine.can_reach`.
 
-    All that move are in the heap: air that nothing has touched yet takes no time here either.
+    All moving balls are in the heap, so that air at rest takes no time here.
     """
     for place in range(1, heap[0].ball + 1):
         ball = balls[heap[place].ball]
@@ -226,7 +226,7 @@ _FIRST_CALL: Final = Lock()
 
 
 class _CompilationNotice(event.Listener):
-    """Says that Numba compiles, which it does when it finds nothing on disk."""
+    """Logs that Numba compiles, which it does if its disk cache is empty."""
 
     def __init__(self) -> None:
         self.given = False
@@ -263,8 +263,8 @@ def _compiled(source_digest: int) -> Callable[..., int]:
         record: NDArray[np.float64],
         until_s: float,
     ) -> int:
-        # Numba's files are out of date when this file changes, but not when another one does. As
-        # a constant of this function the digest of all of them decides too.
+        # Numba's disk cache is invalidated by changes of this file only. As a constant of this
+        # function, the digest of all files invalidates it too.
         progress.source_digest = source_digest
         return run_until(
             balls,
@@ -288,10 +288,10 @@ _RUN: Final = _compiled(_source_digest())
 
 
 def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
-    """Go on until a time, or until something is to be done outside; see `run_until`.
+    """Continue until a time, or until the caller has to act; see `run_until`.
 
-    The first call in a new installation compiles, and says so through the logger `blast_env`.
-    Other threads run meanwhile, and Ctrl-C is heard within half a second.
+    The first call in a new installation compiles, with a warning of the logger `blast_env`. Other
+    threads can run meanwhile, and Ctrl-C takes effect within half a second.
     """
     answer = PAUSED
     while answer == PAUSED:
@@ -306,7 +306,7 @@ def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
 _RECORD_ROWS: Final = 4096
 
 MOST_RECORDS: Final = 20_000_000
-"""Hits on modules after which a run ends as at `most_collisions`: they take some 2 GB."""
+"""Hits on modules after which a run ends, as at `most_collisions`: they take some 2 GB."""
 
 _END_REASONS: Final = {
     OUT_OF_REACH: EndReason.OUT_OF_REACH,
@@ -315,7 +315,7 @@ _END_REASONS: Final = {
 
 
 class EventRun:
-    """One blast on its way; see `BlastRun` for the attributes. A step is a collision."""
+    """One blast in progress; see `BlastRun` for the attributes. A step is a collision."""
 
     def __init__(self, scene: Scene, cell_units: float | None = None) -> None:
         self.scene, self._cell_units = scene, cell_units
@@ -332,22 +332,22 @@ class EventRun:
     def __reduce__(
         self,
     ) -> tuple[Callable[..., "EventRun"], tuple[Scene, float | None, float]]:
-        """Pickle the scene and the time: parts of the state share memory, which a copy loses."""
+        """Pickle the scene and the time, because parts of the state share memory."""
         until_s = self.time_s if self.end_reason is None else np.inf
         return _run_again, (self.scene, self._cell_units, until_s)
 
     @property
     def crossings(self) -> int:
-        """Moves of balls from one cell to the next so far, which cost time as collisions do."""
+        """Number of moves of balls between cells, which take time as collisions do."""
         return int(self._world.progress["crossings"])
 
     @property
     def outdated(self) -> int:
-        """Collisions foreseen so far that did not happen, a partner having been hit before."""
+        """Number of predicted collisions that did not happen, because a partner was hit before."""
         return int(self._world.progress["outdated"])
 
     def advance(self, until_s: float) -> None:
-        """Go on until the simulated time is `until_s`, or the run has ended."""
+        """Continue until the simulated time is `until_s`, or the run has ended."""
         if self.end_reason is not None or self.time_s >= until_s:
             return
         limit_s = self.scene.parameters.stepping.time_limit_s
@@ -370,7 +370,7 @@ class EventRun:
         self._load_parts()
 
     def balls(self) -> BallStates:
-        """Return the balls that are still there."""
+        """Return the remaining balls."""
         balls = self._world.balls
         index = np.flatnonzero(balls["alive"])
         balls = balls[index]
@@ -387,7 +387,7 @@ class EventRun:
         )
 
     def _read_record(self) -> None:
-        """Move what the compiled loop recorded to the log."""
+        """Move the records of the compiled loop to the log."""
         rows = self._record[: self._world.progress["records"]]
         self._world.progress["records"] = 0
         self._recorded += len(rows)
@@ -396,7 +396,7 @@ class EventRun:
         collisions = np.empty(len(rows), dtype=COLLISION_DTYPE)
         for name, column in zip(RECORD_COLUMNS, rows.T, strict=True):
             collisions[name] = column
-        ball: Any = collisions["ball"]  # as what it is, it takes mypy seconds to index with
+        ball: Any = collisions["ball"]  # with its true type, mypy takes seconds to index with it
         collisions["kind"] = self.scene.balls.kind[ball]
         self.log.extend(collisions)
 
@@ -411,7 +411,7 @@ class EventRun:
 
 
 def _run_again(scene: Scene, cell_units: float | None, until_s: float) -> EventRun:
-    """Return a run of a scene up to a time that another run of it has come to."""
+    """Return a run of a scene up to the time of another run of it."""
     run = EventRun(scene, cell_units)
     run.advance(until_s)
     return run

@@ -1,4 +1,4 @@
-"""When a ball collides next, and with what; the queue of these events, in a heap."""
+"""Prediction of each ball's next collision, and the queue of these events in a heap."""
 
 from math import inf, sqrt
 from typing import Final
@@ -20,7 +20,7 @@ _MOST_BALLS: Final = 2**31
 
 @njit(error_model="numpy", inline="always")
 def schedule(heap: RecordArray, balls: RecordArray, ball: int, time_s: float) -> None:
-    """Put a ball into the heap, or move it to another time."""
+    """Insert a ball into the heap, or change its time."""
     place = heap[ball].place
     if place == 0:
         heap[0].ball += 1
@@ -33,7 +33,7 @@ def schedule(heap: RecordArray, balls: RecordArray, ball: int, time_s: float) ->
 
 @njit(error_model="numpy", inline="always")
 def unschedule(heap: RecordArray, balls: RecordArray, ball: int) -> None:
-    """Take a ball out of the heap, if it is in it."""
+    """Remove a ball from the heap, if present."""
     place = heap[ball].place
     if place == 0:
         return
@@ -51,7 +51,7 @@ def unschedule(heap: RecordArray, balls: RecordArray, ball: int) -> None:
 
 @njit(error_model="numpy", inline="always")
 def _is_before(balls: RecordArray, ball: int, time_s: float, entry: Record) -> bool:
-    """Whether what happens to a ball comes before an entry of the heap."""
+    """Return whether a ball's event at a time comes before an entry of the heap."""
     if time_s != entry.time_s:
         return time_s < entry.time_s
     return _rank(balls, ball) < _rank(balls, entry.ball)
@@ -59,7 +59,7 @@ def _is_before(balls: RecordArray, ball: int, time_s: float, entry: Record) -> b
 
 @njit(error_model="numpy")
 def _rank(balls: RecordArray, ball: int) -> int:
-    """Return the rank among what happens at the same time: moves, walls, pairs of balls."""
+    """Return the rank among simultaneous events: moves between cells, walls, pairs of balls."""
     partner = balls[ball].partner
     if balls[ball].contact_s > balls[ball].crossing_s:
         return ball - 2 * _MOST_BALLS
@@ -107,16 +107,16 @@ def _put(heap: RecordArray, place: int, ball: int, time_s: float) -> None:
 
 
 _GRAZING: Final = 1e-12
-"""Balls in touch that approach each other by less than this share of their speed do not collide.
+"""Share of their speed below which the approach of touching balls is no collision.
 
-Nor do they below `rest_speed`. Rounding decides whether such balls approach at all, and they could
-collide without end.
+The same holds for an approach below `rest_speed`. Rounding determines whether such balls approach
+at all, and they could collide without end.
 """
 
 
 @njit(error_model="numpy", inline="always")
 def balls_touch_s(one: Record, other: Record, rules: Record) -> float:
-    """Return when two balls touch; inf if never."""
+    """Return the time at which two balls touch; inf if never."""
     start = max(one.since_s, other.since_s)
     before, before_other = start - one.since_s, start - other.since_s
     x = (other.x + other.vx * before_other) - (one.x + one.vx * before)
@@ -127,7 +127,7 @@ def balls_touch_s(one: Record, other: Record, rules: Record) -> float:
 
 @njit(error_model="numpy", inline="always")
 def surface_touch_s(ball: Record, surface: Record, rules: Record) -> float:
-    """Return when a ball touches a face or a corner of a wall; inf if never."""
+    """Return the time at which a ball touches a face or a corner of a wall; inf if never."""
     if surface.kind == CORNER:
         to_x, to_y = surface.a - ball.x, surface.b - ball.y
         return ball.since_s + _until_distance(to_x, to_y, -ball.vx, -ball.vy, ball.radius, rules)
@@ -153,7 +153,7 @@ def surface_touch_s(ball: Record, surface: Record, rules: Record) -> float:
 
 @njit(error_model="numpy", inline="always")
 def border_touch_s(ball: Record, rules: Record) -> float:
-    """Return when the edge of a ball reaches the border of the site; inf if never."""
+    """Return the time at which the edge of a ball reaches the border of the site; inf if never."""
     wait = inf
     if ball.vx > 0.0:
         wait = (rules.right - ball.radius - ball.x) / ball.vx
@@ -170,7 +170,7 @@ def border_touch_s(ball: Record, rules: Record) -> float:
 def _until_distance(
     x: float, y: float, vx: float, vy: float, distance: float, rules: Record
 ) -> float:
-    """Return how long until the length of (x, y) + (vx, vy) t has fallen to a distance."""
+    """Return the time until the length of (x, y) + (vx, vy) t has decreased to a distance."""
     falling = x * vx + y * vy
     if falling >= 0.0:
         return inf
@@ -180,9 +180,9 @@ def _until_distance(
         slow = max(_GRAZING * _GRAZING * speed2, rules.rest_speed * rules.rest_speed)
         return inf if falling * falling < slow * distance * distance else 0.0
     discriminant = falling * falling - speed2 * excess
-    if discriminant <= 0.0:  # 0: it touches in passing, and nothing happens
+    if discriminant <= 0.0:  # at 0 they only graze each other
         return inf
-    # This form of the root does not cancel when the balls almost touch.
+    # This form of the root avoids cancellation when the balls almost touch.
     return excess / (sqrt(discriminant) - falling)
 
 
@@ -196,7 +196,7 @@ def cell_at(rules: Record, x: float, y: float) -> int:
 
 @njit(error_model="numpy")
 def enter_cell(balls: RecordArray, cells: RecordArray, ball: int, cell: int) -> None:
-    """Put a ball, which is in no list, at the head of its list of a cell."""
+    """Insert a ball that is in no list at the head of its list of a cell."""
     if balls[ball].explosive:
         follower = cells[cell].first_explosive
         cells[cell].first_explosive = ball
@@ -212,7 +212,7 @@ def enter_cell(balls: RecordArray, cells: RecordArray, ball: int, cell: int) -> 
 
 @njit(error_model="numpy")
 def leave_cell(balls: RecordArray, cells: RecordArray, ball: int) -> None:
-    """Take a ball out of the list that it is in."""
+    """Remove a ball from its list."""
     before, after = balls[ball].previous, balls[ball].following
     if before >= 0:
         balls[before].following = after
@@ -233,7 +233,7 @@ def look_ahead(
     rules: Record,
     ball: int,
 ) -> None:
-    """Find a ball's next event among all that it can touch, and schedule it."""
+    """Find a ball's next event among all objects within reach, and schedule it."""
     balls[ball].contact_s = border_touch_s(balls[ball], rules)
     balls[ball].partner = BORDER if balls[ball].contact_s < inf else NOBODY
     cell = balls[ball].cell
@@ -255,7 +255,7 @@ def cross(
     rules: Record,
     ball: int,
 ) -> None:
-    """Move a ball on to the next cell, and look at what has come into its neighbourhood."""
+    """Move a ball to the next cell, and check the objects new in its neighbourhood."""
     step = balls[ball].crossing
     leave_cell(balls, cells, ball)
     cell = balls[ball].cell + step
@@ -284,10 +284,9 @@ def _look_at_surfaces(
 
 @njit(error_model="numpy")
 def _wins_tie(surfaces: RecordArray, surface: int, partner: int) -> bool:
-    """Whether a surface goes before the partner that is touched at the same time.
+    """Return whether a surface takes precedence over a partner touched at the same time.
 
-    Neither the order in which they were found nor the numbers of the surfaces, which both depend
-    on the cells, may decide.
+    The order of checks and the numbers of the surfaces depend on the cells and must not decide.
     """
     if partner > FIRST_SURFACE:
         return partner >= 0
@@ -319,7 +318,7 @@ def _look_along_list(balls: RecordArray, rules: Record, ball: int, other: int) -
 
 @njit(error_model="numpy", inline="always")
 def _find_crossing(balls: RecordArray, cells: RecordArray, rules: Record, ball: int) -> None:
-    """Find when a ball's centre leaves its cell, and into which one."""
+    """Find the time at which a ball's centre leaves its cell, and the next cell."""
     here = cells[balls[ball].cell]
     side, wait, step = rules.cell_units, inf, 0
     vx, vy = balls[ball].vx, balls[ball].vy

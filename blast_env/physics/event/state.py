@@ -1,4 +1,4 @@
-"""The arrays that the compiled loop works on, and how a scene becomes them."""
+"""The arrays of the compiled loop, and their construction from a scene."""
 
 from math import floor, sqrt
 from typing import Any, Final, NamedTuple
@@ -31,10 +31,10 @@ FACE_Y: Final = 1
 CORNER: Final = 2
 
 
-# What the loop has to do before it goes on.
+# Stages: tasks of the loop before it continues.
 NEW: Final = 0  # put the balls into their cells
 RUNNING: Final = 1
-CHANGED: Final = 2  # look at the walls again
+CHANGED: Final = 2  # predict the events again, after a change of the walls
 
 BALL: Final = np.dtype(
     [
@@ -46,21 +46,21 @@ BALL: Final = np.dtype(
         ("radius", np.float64),
         ("mass", np.float64),
         ("following", np.int32),  # next ball in the list of the cell, -1 for none
-        ("collisions", np.int32),  # so far
-        # Up to here one cache line: what others need to know of the ball.
+        ("collisions", np.int32),  # number of collisions
+        # Up to here one cache line: the fields that other balls read.
         ("spin", np.float64),  # radians per second
         ("contact_s", np.float64),  # time of the next collision, inf for none
         ("crossing_s", np.float64),  # time at which the ball leaves its cell
         ("module_s", np.float64),  # time of the last collision with a module
         ("partner", np.int32),  # of the next collision: a ball, or one of the numbers above
-        # `collisions` of the partner when that was found: another number now means that the
+        # `collisions` of the partner at the prediction: a different number now means that the
         # partner was hit in between.
         ("partner_collisions", np.int32),
         ("cell", np.int32),
         ("crossing", np.int32),  # step to the number of the next cell
         ("previous", np.int32),  # ball before in that list, -1 for none
-        ("rattles", np.int32),  # collisions with modules alone so far within one contact
-        ("presses", np.int32),  # collisions of any kind so far within one contact
+        ("rattles", np.int32),  # successive collisions with modules only, within one contact
+        ("presses", np.int32),  # successive collisions of any kind, within one contact
         ("explosive", np.int16),  # 1 for a ball of the charge, 0 for air
         ("alive", np.int16),  # 1 while it is on the site
     ],
@@ -82,12 +82,12 @@ HEAP_ENTRY: Final = np.dtype(
     [
         ("time_s", np.float64),
         ("ball", np.int32),
-        # In the heap, of the ball that has this entry's number; 0 if it is not in it. Every move
-        # in the heap writes one: here they lie closer together than they would in `BALL`.
+        # Place in the heap of the ball with this entry's number; 0 if absent. Every move in the
+        # heap writes a place: here they lie closer together than they would in `BALL`.
         ("place", np.int32),
     ]
 )
-"""Entry 0 is no entry: its `ball` is the number of entries."""
+"""Entry 0 is not in the queue: its `ball` is the number of entries."""
 
 SURFACE: Final = np.dtype(
     [
@@ -146,11 +146,11 @@ PROGRESS: Final = np.dtype(
         ("time_s", np.float64),  # of the last collision
         ("collisions", np.int64),
         ("crossings", np.int64),  # of balls into other cells
-        ("outdated", np.int64),  # collisions that did not happen, their partner being hit before
-        ("next_check", np.int64),  # collisions at which to look whether a structure is in reach
+        ("outdated", np.int64),  # predicted collisions invalidated by a hit of the partner
+        ("next_check", np.int64),  # collisions at the next check whether a structure is in reach
         ("records", np.int64),  # rows written
         ("stage", np.int64),  # NEW, RUNNING or CHANGED
-        ("looked_again", np.int64),  # with CHANGED: balls that it is done with
+        ("looked_again", np.int64),  # with CHANGED: balls already predicted again
         ("source_digest", np.int64),  # of the compiled code
     ]
 )
@@ -169,21 +169,21 @@ RECORD_COLUMNS: Final = (
     "earlier_collisions",
     "first_contact",
 )
-"""Columns of the record that the compiled code writes; fields of `COLLISION_DTYPE`."""
+"""Columns of the record by the compiled code; fields of `COLLISION_DTYPE`."""
 
 _HALF: Final = MODULE_SIDE_UNITS / 2.0
 _TOLERANCE: Final = 1e-9  # units; faces overlap by it, so that rounding opens no gap
 
 _CORNERS: Final = _HALF * np.array([(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)])
-"""From the centre of a module, in the order of `WallSurface.covered_corners`."""
+"""Corners relative to the centre of a module, in the order of `WallSurface.covered_corners`."""
 
 
 class Walls(NamedTuple):
     """The surfaces of all walls.
 
     Attributes:
-        surfaces: Of `SURFACE` (k,).
-        modules: The modules of the surfaces, face by face, along it.
+        surfaces: Array of `SURFACE` (k,).
+        modules: The modules of the surfaces, in order along each face, then those of corners.
     """
 
     surfaces: RecordArray
@@ -191,11 +191,11 @@ class Walls(NamedTuple):
 
 
 def walls_of(centres: NDArray[np.float64], standing: NDArray[np.int64]) -> Walls:
-    """Return the surfaces of the modules that stand.
+    """Return the surfaces of the intact modules.
 
     Args:
         centres: Centres of all modules, units (m, 2).
-        standing: Indices of those that stand.
+        standing: Indices of the intact ones.
     """
     own = centres[standing]
     surface = wall_surface(own)
@@ -247,10 +247,10 @@ def spread_over_cells(
 def _joined_faces(
     centres: NDArray[np.float64], free_faces: NDArray[np.bool_]
 ) -> tuple[RecordArray, NDArray[np.int64]]:
-    """Join the free faces of modules (m, 4) that go on in each other.
+    """Join adjacent free faces of modules (m, 4) in one line.
 
     Returns:
-        The faces, whose modules are numbered from 0, and the modules, face by face, along it.
+        The faces, whose modules are numbered from 0, and the modules in order along each face.
     """
     face, member = np.nonzero(free_faces.T)
     is_x = face < 2
@@ -277,7 +277,7 @@ def _joined_faces(
 def _free_corners(
     centres: NDArray[np.float64], covered_corners: NDArray[np.bool_]
 ) -> tuple[RecordArray, NDArray[np.int64]]:
-    """Return the corners of modules where no wall goes on, and the modules that they belong to."""
+    """Return the corners of modules beyond which no wall continues, and their modules."""
     corner, member = np.nonzero(~covered_corners.T)
     corners = np.zeros(len(member), dtype=SURFACE)
     corners["kind"] = CORNER
@@ -298,27 +298,27 @@ def _boxes(surfaces: RecordArray) -> tuple[NDArray[np.float64], NDArray[np.float
 
 
 _CELL_SPACINGS: Final = 1.2
-"""Side of a cell in spacings of the air; measured to be about the fastest."""
+"""Side of a cell in spacings of the air, about the fastest by measurement."""
 
 _CELL_MARGIN: Final = 1e-6
 
 _REST_SHARE: Final = 1e-12
-"""Of the fastest ball's first speed: slower than that, within one contact, is at rest."""
+"""Rest speed within one contact, as a share of the fastest ball's initial speed."""
 
 
 class World(NamedTuple):
     """One blast as arrays, in the order in which the compiled loop takes them.
 
     Attributes:
-        balls: Of `BALL` (n,).
-        cells: The broad phase's grid, of `CELL`.
-        heap: The event queue, of `HEAP_ENTRY` (n + 1,).
-        surfaces: Of `SURFACE`, cell by cell.
+        balls: Balls, array of `BALL` (n,).
+        cells: Grid of the broad phase, array of `CELL`.
+        heap: Event queue, array of `HEAP_ENTRY` (n + 1,).
+        surfaces: Surfaces cell by cell, array of `SURFACE`.
         modules: Modules of the surfaces.
-        loads: Of `LOAD` (m,).
-        targets: Left, bottom, right and top of the structures (s, 4).
-        rules: Of `RULES`.
-        progress: Of `PROGRESS`.
+        loads: Loads of the modules, array of `LOAD` (m,).
+        targets: Left, bottom, right and top of the structures, units (s, 4).
+        rules: Constants of the run, a record of `RULES`.
+        progress: State of the loop, a record of `PROGRESS`.
     """
 
     balls: RecordArray
@@ -338,14 +338,14 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
     Args:
         scene: The scene.
         parts: Its modules.
-        cell_units: Side of a cell, which changes the speed and nothing else; at least the
-            diameter of the largest ball. By default what suits the scene.
+        cell_units: Side of a cell, at least the diameter of the largest ball; affects only the
+            time of computation. By default a side suitable for the scene.
 
     Raises:
         BlastEnvError: If the cells are too small to hold a ball, or a ball is off the site.
     """
     _check(scene, cell_units)
-    # A little more, so that balls in touch are in neighbouring cells whatever the rounding.
+    # A little more, so that touching balls are in neighbouring cells despite rounding.
     smallest = (1.0 + _CELL_MARGIN) * _largest_diameter(scene)
     rules = _rules(scene, max(smallest, cell_units or _cell_units(scene)))
     balls = _balls(scene.balls)
@@ -363,7 +363,7 @@ def world_of(scene: Scene, parts: list[ModularPart], cell_units: float | None = 
 
 
 def _check(scene: Scene, cell_units: float | None) -> None:
-    """Refuse what would make the compiled code miss collisions or leave its arrays."""
+    """Reject input with which the compiled code would miss collisions or leave its arrays."""
     diameter = _largest_diameter(scene)
     if cell_units is not None and not diameter <= cell_units < np.inf:
         raise BlastEnvError(
@@ -379,7 +379,7 @@ def _check(scene: Scene, cell_units: float | None) -> None:
 
 
 def with_walls(world: World, scene: Scene, parts: list[ModularPart]) -> World:
-    """Return a world with the walls that are left when some modules are destroyed."""
+    """Return a world with the walls of the modules that are not destroyed."""
     standing = np.flatnonzero(world.loads["impulse"] <= world.loads["capacity"])
     centres = np.array([(part.x, part.y) for part in parts], dtype=np.float64).reshape(-1, 2)
     walls = walls_of(centres, standing)
@@ -445,7 +445,7 @@ def _rules(scene: Scene, cell_units: float) -> Record:
 
 
 def _cell_units(scene: Scene) -> float:
-    """Return a good side of a cell: the spacing of the air, and not many more cells than balls."""
+    """Return the default side of a cell, by the spacing of the air and the number of balls."""
     width, height = scene.site.right - scene.site.left, scene.site.top - scene.site.bottom
     sparse = sqrt(width * height / (4.0 * len(scene.balls) + 1024.0))
     return max(sparse, _CELL_SPACINGS * scene.parameters.air.spacing_units)

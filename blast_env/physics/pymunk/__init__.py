@@ -1,1 +1,1 @@
-"""The reference engine, on pymunk."""
+"""The reference engine, with pymunk."""

@@ -1,4 +1,4 @@
-"""The reference engine: pymunk, step by step."""
+"""The reference engine: pymunk with time steps."""
 
 from collections.abc import Callable, Iterable
 from itertools import combinations_with_replacement
@@ -27,29 +27,29 @@ from blast_env.physics.pymunk.space import (
 from blast_env.physics.scene import Scene
 
 _TOO_FAST: Final = 2.0
-"""Speeds above the one that the step was made for, up to which the step is kept.
+"""Ratio of a speed to the design speed of the step up to which the step is kept.
 
-The step is at most half a radius and half a half module, so twice the speed still leaves the
-centre of a ball in the outer half of a module that it hits.
+The step is at most half a radius and half a half module, so that at twice the speed the centre of
+a ball is still in the outer half of a module that it hits.
 """
 
 _SLOW: Final = 0.5
-"""Below this share of the speed that the step was made for, the step is doubled."""
+"""Share of the design speed of the step below which the step is doubled."""
 
 
 class StepGuard:
-    """Halves the time step when a ball gets too fast for it, doubles it when all are slow.
+    """Halves the time step when a ball is too fast for it, doubles it when all are slow.
 
-    Speeds change by contacts only, so the contacts of each step give an upper bound of every
-    ball's speed; the true speeds are read only when a bound is too high.
+    Speeds change only by contacts, so that the contacts of each step give an upper bound of every
+    ball's speed; the true speeds are read only if a bound is too high.
 
-    Chipmunk carries the impulse of a lasting contact over to the next step in the ratio of the
-    time steps, and a contact that has bounced already would get a second push. When the step
-    changes, lasting contacts are therefore left out of one step, which makes Chipmunk forget that
-    impulse; they start anew in the step after.
+    Chipmunk transfers the impulse of a persistent contact to the next step in the ratio of the
+    time steps, and a contact that has already bounced would receive a second impulse. When the step
+    changes, persistent contacts are therefore left out of one step, which resets that impulse in
+    Chipmunk; they start again in the following step.
 
     Attributes:
-        time_step_s: The time step to make next.
+        time_step_s: The next time step.
     """
 
     def __init__(
@@ -65,16 +65,16 @@ class StepGuard:
 
     @property
     def _design_units_per_s(self) -> float:
-        """The speed that the present time step is made for."""
+        """Design speed of the present time step."""
         return self._step_length_units / self.time_step_s
 
     def watch(self, contacts: StepContacts, mass: NDArray[np.float64], kick: float) -> None:
-        """Take note of the contacts of a step.
+        """Update the bounds of speeds by the contacts of a step; halve the time step if needed.
 
         Args:
             contacts: The contacts.
             mass: Masses of all balls (n,).
-            kick: Base impulse that every new pair got as well.
+            kick: Base impulse on every new pair.
         """
         if self._steps_to_reset:
             self._go_on_resetting()
@@ -102,7 +102,7 @@ class StepGuard:
             self._change(2.0)
 
     def drops(self, arbiter: pymunk.Arbiter) -> bool:
-        """Whether this contact is to be left out of the present step."""
+        """Return whether a contact is left out of the present step."""
         return self._steps_to_reset == 2 and not arbiter.is_first_contact
 
     def _change(self, factor: float) -> None:
@@ -143,8 +143,8 @@ class _Touch(NamedTuple):
 class PymunkRun:
     """One blast in a pymunk space; see `BlastRun` for the attributes.
 
-    A ball that touches a module goes through a Python callback, because it is decided there how
-    the contact is solved. All other contacts are read in one batch after each step.
+    Contacts of balls with modules use a Python callback, which decides on their solution. All
+    other contacts are read in one batch after each step.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -174,16 +174,16 @@ class PymunkRun:
             )
 
     def __reduce__(self) -> tuple[Callable[[Scene, float], "PymunkRun"], tuple[Scene, float]]:
-        """Pickle the scene and the time: a space has no form in bytes, but runs again the same."""
+        """Pickle the scene and the time: a space cannot be pickled, but runs are reproducible."""
         return _run_again, (self.scene, self.time_s if self.end_reason is None else np.inf)
 
     @property
     def time_step_s(self) -> float:
-        """The time step of the next step."""
+        """The next time step."""
         return self._guard.time_step_s
 
     def advance(self, until_s: float) -> None:
-        """Go on until the simulated time is at least `until_s`, or the run has ended."""
+        """Continue until the simulated time is at least `until_s`, or the run has ended."""
         limit_s = self.scene.parameters.stepping.time_limit_s
         while self.end_reason is None and self.time_s < until_s:
             if self.time_s >= limit_s:
@@ -194,7 +194,7 @@ class PymunkRun:
                 self._step()
 
     def balls(self) -> BallStates:
-        """Return the balls that are still there."""
+        """Return the remaining balls."""
         position, velocity = self._reader.read_balls()
         index = np.flatnonzero(self._alive)
         return BallStates(
@@ -207,7 +207,7 @@ class PymunkRun:
         )
 
     def _is_out_of_reach(self, within_s: float) -> bool:
-        """Whether nothing can happen to a structure any more, looked at now and then."""
+        """Return whether no ball can reach a structure any more, checked only every few steps."""
         if self.steps < self._next_check:
             return False
         self._next_check = self.steps + _STEPS_BETWEEN_CHECKS
@@ -237,7 +237,7 @@ class PymunkRun:
     def _before_module_contact(
         self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any
     ) -> None:
-        """Decide whether and how a ball rebounds, before pymunk solves the contact."""
+        """Decide on a ball's rebound before pymunk solves the contact."""
         ball, module = arbiter.shapes
         assert isinstance(ball, BallShape)
         assert isinstance(module, ModuleShape)
@@ -270,7 +270,7 @@ class PymunkRun:
     def _push_out(
         self, arbiter: pymunk.Arbiter, faces: tuple[int, ...], centre: tuple[float, float]
     ) -> None:
-        """Let a ball leave a module through the first of the faces, unless pymunk means another."""
+        """Push a ball out through the first of the faces, unless pymunk has chosen one of them."""
         normal = -arbiter.normal
         if any(normal == OUTWARD[face] for face in faces):
             return
@@ -284,7 +284,7 @@ class PymunkRun:
         arbiter.contact_point_set = pymunk.ContactPointSet(-outward, (point,))
 
     def _record_touches(self, contacts: StepContacts) -> list[int]:
-        """Record what modules gave to balls in this step; return the balls that are new there."""
+        """Record the impulses of modules on balls in this step; return the balls in new contact."""
         if not self._touches:
             self._touching = frozenset()
             return []
@@ -311,10 +311,10 @@ class PymunkRun:
     def _record(self, touch: _Touch, to_module: float, transferred: float) -> bool:
         """Record a collision; return whether it destroyed the module.
 
-        A ball that others press on a module rattles between them faster than the time step can
-        follow. Each step in which the module gives it an impulse J counts as a collision with the
-        normal speed J / ((1 + C_e) m), which for a ball on its own is the speed before the
-        collision. Its tangential speed counts when the touch begins, not again while it lasts.
+        A ball pressed against a module by others collides more often than the time step resolves.
+        Each step in which the module exerts an impulse J on it counts as a collision at the normal
+        speed J / ((1 + C_e) m), which for a single ball is the speed before the collision. Its
+        tangential speed counts only at the beginning of the contact.
         """
         mass, normal = float(self._mass[touch.ball]), touch.outward_normal
         velocity = normal * (-to_module / ((1.0 + self._contact.module_restitution) * mass))
@@ -341,7 +341,7 @@ class PymunkRun:
         return part.destroyed and not was_destroyed
 
     def _remove_destroyed(self) -> None:
-        """Take destroyed modules out of the space; the ones behind them come into reach."""
+        """Remove destroyed modules from the space, and expose those behind them."""
         standing = [i for i, part in enumerate(self._built.parts) if not part.destroyed]
         self._built.expose(np.array(standing, dtype=np.int64))
         self._reader.learn_bodies()
@@ -361,7 +361,7 @@ class PymunkRun:
             self._shrink(ball, self._contact.air_shrink)
 
     def _apply_base_impulse(self, pairs: IntArray) -> None:
-        """Give both balls of each pair I_b along the line of their centres, apart."""
+        """Apply I_b to both balls of each pair along the line of their centres, outwards."""
         impulse = self._contact.base_impulse
         for one, other in pairs.tolist():
             a, b = self._built.ball_bodies[one], self._built.ball_bodies[other]
@@ -370,7 +370,7 @@ class PymunkRun:
             b.velocity += along * (impulse / b.mass)
 
     def _shrink(self, ball: int, factor: float) -> None:
-        """Scale a ball's radius and mass; remove it when it gets too small."""
+        """Scale a ball's radius and mass; remove it if it becomes too small."""
         if not self._alive[ball] or factor == 1.0:
             return
         self._mass[ball] *= factor
@@ -394,7 +394,7 @@ class PymunkRun:
 
 
 def _run_again(scene: Scene, until_s: float) -> PymunkRun:
-    """Return a run of a scene up to a time that another run of it has come to."""
+    """Return a run of a scene up to the time of another run of it."""
     run = PymunkRun(scene)
     run.advance(until_s)
     return run

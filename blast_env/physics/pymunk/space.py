@@ -1,8 +1,8 @@
-"""A scene as a pymunk space, the contacts that pymunk finds in it, and walls as a whole.
+"""A scene as a pymunk space, its contacts, and the treatment of walls as a whole.
 
-pymunk sees the modules one by one, and a module alone pushes a ball out through its nearest face.
-Of a wall that may be a joint, or the far side: balls got between the modules of a closed ring, and
-through, in its corners above all. So a wall decides from which side a ball came.
+pymunk treats modules individually, and pushes a ball out of a module through the nearest face. In a
+wall, that may be a joint or the far side: balls could pass between the modules of a closed ring,
+mostly at its corners. `WallSides` therefore determines the side from which a ball came.
 """
 
 from dataclasses import dataclass
@@ -21,20 +21,20 @@ from blast_env.physics.structure import Border, ModularObstacle, ModularPart, wa
 from blast_env.units import MODULE_SIDE_UNITS
 
 CHARGE_GROUP: Final = 1
-"""Shapes of one group do not collide with each other: the balls of a charge."""
+"""Group of the charge's balls; shapes of one group do not collide with each other."""
 
 _BORDER_THICKNESS_UNITS: Final = 4.0
 _HASH_CELLS: Final = 5000
 
 
 class BallShape(pymunk.Circle):
-    """A ball's circle that knows the ball's index in the scene."""
+    """A ball's circle with the ball's index in the scene."""
 
     index: int
 
 
 class ModuleShape(pymunk.Poly):
-    """A module's square that knows its index, and the faces and corners where the wall goes on."""
+    """A module's square with its index, its centre, its free faces and its covered corners."""
 
     index: int
     x: float
@@ -52,11 +52,11 @@ class PymunkSpace:
         ball_bodies: Bodies of the scene's balls, in their order.
         ball_shapes: Shapes of the scene's balls, in their order.
         parts: The modules of all obstacles, in order.
-        module_bodies: Bodies by module index; modules that no ball can reach have none.
+        module_bodies: Bodies by module index; modules out of reach of all balls have none.
         border_body: The body of the border lines.
-        time_step_s: The time step that suits the parameters.
-        longest_step_s: The longest time step that the parameters allow.
-        fastest_units_per_s: The speed that the time step was made for.
+        time_step_s: The initial time step.
+        longest_step_s: The longest time step by the parameters.
+        fastest_units_per_s: The design speed of the time step.
         module_friction: Friction of the modules.
     """
 
@@ -72,10 +72,10 @@ class PymunkSpace:
     module_friction: float
 
     def expose(self, standing: NDArray[np.int64]) -> list[int]:
-        """Bring the modules up to date with which of them stand.
+        """Update the modules in the space to the exposed ones of the intact modules.
 
         Args:
-            standing: Indices of the modules that stand.
+            standing: Indices of the intact modules.
 
         Returns:
             The indices of the modules that are new in the space.
@@ -118,22 +118,21 @@ class PymunkSpace:
 
 
 def build_space(scene: Scene, obstacles: tuple[ModularObstacle, ...]) -> PymunkSpace:
-    """Put a scene into a new space.
+    """Return a new space with a scene.
 
-    Always a new one: a space that was emptied and filled again does not repeat a run to the last
-    bit.
+    A reused space would not reproduce a run to the last bit.
 
     Args:
         scene: The scene.
-        obstacles: The scene's obstacles, which will hold the hits.
+        obstacles: The scene's obstacles, which collect the hits.
     """
     parameters = scene.parameters
     fastest = expected_fastest_units_per_s(scene.balls, parameters)
     longest_step_s = parameters.stepping.longest_step_s
     space = pymunk.Space()
     space.iterations = parameters.stepping.solver_iterations
-    # An arbiter that did not touch in this step is dropped at once, so that the arbiters of a
-    # step are its contacts.
+    # Arbiters without contact in a step are dropped at once, so that the arbiters of a step are
+    # its contacts.
     space.collision_persistence = 1
     space.use_spatial_hash(_hash_cell(scene.balls, parameters), _HASH_CELLS)
     built = PymunkSpace(
@@ -154,10 +153,10 @@ def build_space(scene: Scene, obstacles: tuple[ModularObstacle, ...]) -> PymunkS
 
 
 def expected_fastest_units_per_s(balls: Balls, parameters: SimulationParameters) -> float:
-    """Return the speed of the ball that should be the fastest one of the blast.
+    """Return the expected largest speed of a ball in the blast.
 
-    An explosive ball at the start, or an air ball that such a one has hit head-on, plus the base
-    impulse.
+    That of an explosive ball at the start, or of an air ball after a head-on collision with it,
+    plus the effect of the base impulse.
     """
     fastest = float(np.hypot(*balls.velocity.T).max())
     if (balls.kind == CollisionType.AirBall).any():
@@ -168,10 +167,10 @@ def expected_fastest_units_per_s(balls: Balls, parameters: SimulationParameters)
 
 
 def step_length_units(balls: Balls, parameters: SimulationParameters) -> float:
-    """Return how far the fastest ball may go in one step.
+    """Return the largest distance of the fastest ball in one step, units.
 
-    `step_radii` times the smallest radius, where half a module counts as a radius too, so that
-    the centre of a ball stays in the outer half of a module that it hits.
+    `step_radii` times the smallest radius or half a module, if that is smaller, so that the centre
+    of a ball stays in the outer half of a module that it hits.
     """
     smallest = min(float(balls.radius.min()), MODULE_SIDE_UNITS / 2.0)
     return parameters.stepping.step_radii * smallest
@@ -183,7 +182,7 @@ def _hash_cell(balls: Balls, parameters: SimulationParameters) -> float:
 
 
 def _add_border(space: pymunk.Space, scene: Scene) -> pymunk.Body:
-    """Add the four lines, thick outwards, so that their inner face is the border."""
+    """Add the four border lines, thickened outwards, so that their inner faces are the border."""
     body = pymunk.Body(body_type=pymunk.Body.STATIC)
     space.add(body)
     outer = Border(scene.site.grown(_BORDER_THICKNESS_UNITS))
@@ -252,10 +251,10 @@ class StepContacts:
     Attributes:
         ball_pairs: Balls that touch each other, the lower index first (k, 2).
         ball_first: Whether the contact is new in this step (k,).
-        ball_impulse: Impulse along the normal that the pair exchanged in this step (k,).
+        ball_impulse: Impulse along the normal between the pair in this step (k,).
         module_pairs: A ball and a module that touch each other (q, 2).
-        module_impulse: Impulse along the normal that the module gave in this step (q,).
-        leaving: Balls that touch the border, twice where they touch two lines (p,).
+        module_impulse: Impulse along the normal by the module in this step (q,).
+        leaving: Balls that touch the border, twice if they touch two lines (p,).
     """
 
     ball_pairs: IntArray
@@ -290,7 +289,7 @@ class ContactReader:
         self.learn_bodies()
 
     def learn_bodies(self) -> None:
-        """Learn the bodies' ids; needed again when a module got a body."""
+        """Read the bodies' ids; necessary again after a module was given a body."""
         built = self._built
         modules = sorted(built.module_bodies)
         bodies = [*built.ball_bodies, *(built.module_bodies[m] for m in modules), built.border_body]
@@ -302,7 +301,7 @@ class ContactReader:
         self._sorted_ids, self._index_of_sorted = ids[order], index[order]
 
     def read_balls(self) -> tuple[FloatArray, FloatArray]:
-        """Return position and velocity of the scene's balls (n, 2); NaN where one is gone."""
+        """Return position and velocity of the scene's balls (n, 2); NaN for removed ones."""
         buffer = self._body_buffer
         buffer.clear()
         pymunk.batch.get_space_bodies(self._built.space, _BODY_FIELDS, buffer)
@@ -312,7 +311,7 @@ class ContactReader:
         return state[: self._ball_count, :2], state[: self._ball_count, 2:]
 
     def read_contacts(self) -> StepContacts:
-        """Return the contacts of the step that was just made."""
+        """Return the contacts of the last step."""
         buffer = self._contact_buffer
         buffer.clear()
         pymunk.batch.get_space_arbiters(self._built.space, _CONTACT_FIELDS, buffer)
@@ -322,7 +321,7 @@ class ContactReader:
         floats = np.frombuffer(buffer.float_buf()).reshape(-1, 4)
         pair = self._index_of(integers[:, :2])
         pair.sort(axis=1)
-        # pymunk's order depends on memory addresses; ours must not. A rejected contact has no
+        # pymunk's order depends on memory addresses, hence the sort. A rejected contact has no
         # contact points.
         order = np.argsort(pair[:, 0] * (self._border + 1) + pair[:, 1], kind="stable")
         order = order[integers[order, 3] > 0]
@@ -353,12 +352,12 @@ Place = tuple[float, float]
 
 
 class Contact(NamedTuple):
-    """How a module meets a ball.
+    """The contact of a module with a ball.
 
     Attributes:
-        holds: Whether it does; else another module of the wall does.
-        faces: The faces that the ball may leave through, indices of `OUTWARD`, the best one first,
-            where that is not for pymunk to say; else none.
+        holds: Whether this module is in contact, rather than another one of the wall.
+        faces: The faces through which the ball may leave, indices of `OUTWARD`, the best one
+            first; empty if pymunk decides.
     """
 
     holds: bool
@@ -370,9 +369,9 @@ _ANOTHER_MODULE: Final = Contact(False)
 
 
 class WallSides:
-    """Remembers where balls that are inside a wall were before they got there.
+    """Stores the positions of balls inside a wall before they entered it.
 
-    For balls with their centre outside all walls it changes nothing.
+    It does not affect balls with their centre outside all walls.
     """
 
     def __init__(self) -> None:
@@ -384,13 +383,13 @@ class WallSides:
         self._last, self._now = self._now, {}
 
     def meet(self, ball: int, module: ModuleShape, centre: Place, before: Place) -> Contact:
-        """Return how a module meets a ball that pymunk finds in contact with it.
+        """Return the contact of a module with a ball that pymunk finds in contact with it.
 
         Args:
             ball: Index of the ball.
             module: The module.
-            centre: Where the centre of the ball is, from that of the module, units.
-            before: Where it was one step before, from the same, units.
+            centre: Centre of the ball relative to that of the module, units.
+            before: The same one step before, units.
         """
         (x, y), (beside, above) = centre, (abs(centre[0]) - HALF, abs(centre[1]) - HALF)
         known = self._last.get(ball)
@@ -414,19 +413,19 @@ class WallSides:
 
 
 def height_above(face: int, place: Place) -> float:
-    """Return how far a place is above a face, units; negative below it.
+    """Return the height of a place above a face, units; negative below it.
 
     Args:
         face: An index of `OUTWARD`.
-        place: From the centre of the module, units.
+        place: The place relative to the centre of the module, units.
     """
     return OUTWARD[face][0] * place[0] + OUTWARD[face][1] * place[1] - HALF
 
 
 def _faces_to(module: ModuleShape, place: Place) -> tuple[int, ...]:
-    """Return the faces that look to a place outside the wall, the highest first.
+    """Return the free faces towards a place outside the wall, the largest height above first.
 
-    Of those where the wall ends, if there is one; else one where it goes on, towards the place.
+    Without such a face, return the covered face with the largest height.
     """
     heights = [height_above(face, place) for face in range(4)]
     order = sorted(range(4), key=lambda face: -heights[face])
