@@ -1,4 +1,4 @@
-"""Layout files: a layout, the scenario that it is for, and where it came from."""
+"""Layout files: a layout, its scenario and its provenance."""
 
 import json
 import re
@@ -19,13 +19,13 @@ from blast_env.scenario.placement import check_layout
 from blast_env.values import path_of
 
 CELLS_VERSION: Final = 1
-"""The version of a file whose layout consists of cells; it need not say so."""
+"""Version of a file with a layout of cells; the default."""
 
 PIECES_VERSION: Final = 2
-"""The version of a file whose layout consists of pieces."""
+"""Version of a file with a layout of pieces."""
 
 MEASURES_VERSION: Final = 3
-"""The version of a file whose layout has measures beside pieces."""
+"""Version of a file with a layout of pieces and measures."""
 
 _LISTS: Final[Mapping[int, str]] = MappingProxyType(
     {CELLS_VERSION: "cells", PIECES_VERSION: "pieces", MEASURES_VERSION: "pieces"}
@@ -49,14 +49,14 @@ _HASH_DIGITS: Final = 12  # in messages
 
 @dataclass(frozen=True)
 class LayoutFile:
-    """What a layout file says.
+    """The content of a layout file.
 
     Attributes:
         layout: (row, column) of each module, or the pieces, in the order of the file.
-        scenario: Name of the scenario that the layout is for; None if the file does not say.
-        site_hash: Hash of its zone, catalogue and structures, 64 hexadecimal digits; None if the
-            file does not say.
-        provenance: How the layout was made: anything that JSON can hold (method, command, seed,
+        scenario: Name of the layout's scenario; `None` if the file has none.
+        site_hash: Hash of its zone, catalogue and structures, 64 hexadecimal digits; `None` if
+            the file has none.
+        provenance: Origin of the layout, in values that JSON can hold (method, command, seed,
             versions, blasts).
     """
 
@@ -69,10 +69,10 @@ class LayoutFile:
     def load(cls, path: str | Path) -> "LayoutFile":
         """Read a file: a list of cells, or a table with a list of cells or pieces.
 
-        Whether the layout fits a scenario is for `layout_for` to say.
+        Whether the layout fits a scenario is checked by `layout_for`.
 
         Raises:
-            LayoutError: If the file cannot be read or is anything else.
+            LayoutError: If the file cannot be read or has another form.
         """
         try:
             content = parse_json(read_text(path_of(path)))
@@ -91,8 +91,8 @@ class LayoutFile:
 
         Args:
             scenario: The scenario, or its bundled name or path.
-            layout: (row, column) of each module.
-            provenance: How the layout was made.
+            layout: (row, column) of each module, or pieces.
+            provenance: Origin of the layout.
 
         Raises:
             LayoutError: If the layout does not fit the scenario.
@@ -106,16 +106,16 @@ class LayoutFile:
         )
 
     def layout_for(self, scenario: AnyScenario) -> Layout:
-        """Return the layout, if it is one for this scenario.
+        """Return the layout after checking it for a scenario.
 
-        A file without a hash is taken for any scenario that its layout fits.
+        A file without a hash is accepted for any scenario that its layout fits.
 
         Args:
             scenario: The scenario, or its bundled name or path.
 
         Raises:
-            LayoutError: If the file is for another site or another state of it, or if
-                something is off the grid, not available, repeated or beyond the stock.
+            LayoutError: If the file is for another site or another state of it, or if an element
+                is off the grid, not available, repeated or beyond the stock.
         """
         found = find_scenario(scenario)
         if self.site_hash not in (None, found.site_hash):
@@ -149,7 +149,7 @@ class LayoutFile:
         return path_of(path)
 
     def _text(self, path: str | Path) -> str:
-        """Return the file as JSON, the cells on one line, or each piece on one."""
+        """Return the file as JSON, with all cells on one line, or one line per piece."""
         pieces = [each for each in standing(self.layout) if isinstance(each, Piece)]
         measures = {
             key: [each.item for each in self.layout if type(each) is kind]
@@ -174,7 +174,7 @@ class LayoutFile:
         return f"{{\n{layout}" + (f",{rest[1:]}" if given else "\n}")
 
     def _mismatch(self, scenario: Scenario) -> str:
-        """Say that the layout is for another scenario, and what can be done."""
+        """Return the message of a layout for another scenario, with a remedy."""
         hashes = (self.site_hash or "", scenario.site_hash)
         saved, asked = (f"hash {each[:_HASH_DIGITS]}" for each in hashes)
         name = "a scenario without a name" if self.scenario is None else repr(self.scenario)
@@ -191,16 +191,16 @@ class LayoutFile:
 def load_layout(path: str | Path, scenario: AnyScenario | None = None) -> Layout:
     """Return the layout of a layout file.
 
-    The file is `[[row, column], ...]`, or a table with `cells`, or `pieces` and the measures, and,
-    if it says so, the scenario that they are for and how they were made; see `LayoutFile`.
+    The file is `[[row, column], ...]`, or a table with `cells`, or `pieces` and measures, and
+    optionally scenario and provenance; see `LayoutFile`.
 
     Args:
         path: The file.
-        scenario: The scenario that the layout must be for, or its bundled name or path. Without
-            it, only the form of the file is checked; `check_layout` checks the layout later.
+        scenario: The scenario of the layout, or its bundled name or path. Without it, only the
+            form of the file is checked; `check_layout` checks the layout later.
 
     Raises:
-        LayoutError: If the file cannot be read or is anything else, or if the layout is not one
+        LayoutError: If the file cannot be read or has another form, or if the layout is not one
             for the scenario; the message names the file, the cell or piece and the reason.
     """
     file = LayoutFile.load(path)
@@ -222,9 +222,9 @@ def write_layout(
 
     Args:
         path: The file; an existing one is replaced as a whole.
-        scenario: The scenario that the layout is for, or its bundled name or path.
+        scenario: The scenario of the layout, or its bundled name or path.
         layout: (row, column) of each module, or pieces.
-        provenance: How the layout was made, e.g. method, command, seed, versions, blasts.
+        provenance: Origin of the layout, e.g. method, command, seed, versions, blasts.
 
     Returns:
         The path.
@@ -237,7 +237,7 @@ def write_layout(
 
 
 def _parse(content: Any, source: str) -> LayoutFile:
-    """Return what a file says; `source` is its name, for errors."""
+    """Return the content of a file; `source` is its name, for errors."""
     if not isinstance(content, dict):
         return LayoutFile(_cells(content, source, ""))
     version = content.get("version", CELLS_VERSION)
@@ -272,7 +272,7 @@ def _parse(content: Any, source: str) -> LayoutFile:
 
 
 def _measures(listed: Any, where: str, kind: type[Measure]) -> Layout:
-    """Return the measures of a list of names; `where` it is begins the message of an error."""
+    """Return the measures of a list of names; `where` begins the message of an error."""
     if not isinstance(listed, list):
         raise LayoutError(f"{where}: is {type_word(listed)}, must be a list of names")
     for index, name in enumerate(listed):
@@ -282,7 +282,7 @@ def _measures(listed: Any, where: str, kind: type[Measure]) -> Layout:
 
 
 def _check_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    """Refuse a key that is not known; `where` begins the message (`LayoutError`)."""
+    """Refuse an unknown key; `where` begins the message (`LayoutError`)."""
     for key in table:
         if key not in known:
             raise LayoutError(
@@ -292,14 +292,14 @@ def _check_keys(table: Mapping[str, Any], known: Sequence[str], where: str) -> N
 
 
 def _pieces(listed: Any, source: str, place: str) -> Layout:
-    """Return the pieces of a list; `place` is the key that it stands at."""
+    """Return the pieces of a list; `place` is its key, for errors."""
     if not isinstance(listed, list):
         raise LayoutError(f"{source}: {place}: is {type_word(listed)}, must be a list of tables")
     return tuple(_piece(each, f"{source}: {place}[{i}]") for i, each in enumerate(listed))
 
 
 def _piece(table: Any, where: str) -> Piece:
-    """Return the piece of a table; `where` it is begins the message of an error."""
+    """Return the piece of a table; `where` begins the message of an error."""
     if not isinstance(table, dict):
         raise LayoutError(f"{where}: is {type_word(table)}, must be a table")
     _check_keys(table, tuple(_PIECE_KEYS), f"{where}: ")
@@ -315,13 +315,13 @@ def _piece(table: Any, where: str) -> Piece:
 
 
 def _piece_table(piece: Piece) -> dict[str, Any]:
-    """Return a piece as a file has it."""
+    """Return a piece in the form of a file."""
     table = {key: getattr(piece, key) for key in _PIECE_KEYS}
     return table if piece.turned else {key: table[key] for key in ("item", "row", "column")}
 
 
 def _cells(listed: Any, source: str, place: str) -> Layout:
-    """Return the cells of a list; `place` is the key that it stands at."""
+    """Return the cells of a list; `place` is its key, for errors."""
     if not isinstance(listed, list):
         what = f"{place}: " if place else ""
         message = f"is {type_word(listed)}, must be a list of [row, column] pairs"

@@ -1,4 +1,4 @@
-"""What a scenario is: its sections together.
+"""The scenario model, with all its sections.
 
 All lengths are in metres, x to the right and y upwards from the lower left corner of the site;
 heights are above the ground.
@@ -110,38 +110,38 @@ _LATER_KEYS: Final = (
     *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
     *("hardening", "removable"),
 )
-"""Keys of a build zone that are newer than the first hashes: their defaults do not count."""
+"""Keys of a build zone added after the first hashes, which ignore their defaults."""
 
 _NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
-"""Sections that do not count for the hash; what `simulation` says is there as parameters, and
-components count where the response of facades does."""
+"""Sections that the hash ignores; it has the parameters of `simulation` instead, and the components
+if the response of facades counts."""
 
 _BUILT: Final = {
     *("kind", "name", "corner_m", "rows", "columns", "side_modules"),
     *("height_m", "base_m", "carries"),
 }
-"""Keys of a structure that say what stands where."""
+"""Keys of a structure for its shape and place."""
 
 Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
-"""Where the charge comes from."""
+"""The sources of the charge."""
 
 
 class Scenario(Section):
-    """A protective-layout problem: everything but the layout and the seed.
+    """A protective-layout problem, without layout and seed.
 
     Attributes:
         schema_version: The lowest version of the file format that holds the scenario.
         name: Short name, as in `load_scenario("courtyard")`.
-        description: What the scenario models, for people.
+        description: Description for readers.
         site: The simulated area.
-        charge: Where the charge comes from: one source or several with weights.
+        charge: Sources of the charge: one, or several with weights.
         structures: Structures, protected or not.
-        build_zone: Where barrier modules may be placed; without it, nowhere.
-        simulation: Parameters of the blast model.
-        calibration: Name of the calibration that turns impulses into pascal seconds.
-        gauges: Where overpressure is recorded, by engines that know it.
-        objective: Which load counts, and how those of several charges become one.
-        georeference: Where on a map or drawing the site lies; no result depends on it.
+        build_zone: The zone for barriers; without one, there are none.
+        simulation: Parameters of the particle model.
+        calibration: Name of the calibration that converts impulses of particles to Pa s.
+        gauges: Gauges of overpressure, for the engine `gas`.
+        objective: The objective of layouts.
+        georeference: Place of the site on a map or drawing; no result depends on it.
         components: Components of facades by name, beside those of the catalogue.
     """
 
@@ -163,7 +163,7 @@ class Scenario(Section):
 
     @property
     def bays(self) -> tuple[FilledBay, ...]:
-        """The bays of all facades, with what stands in them."""
+        """The bays of all facades with their components."""
         return self.bays_with(())
 
     def bays_with(self, layout: Iterable[Element]) -> tuple[FilledBay, ...]:
@@ -171,7 +171,7 @@ class Scenario(Section):
         return tuple(bay.filled(self._known) for bay in self.named_bays(layout))
 
     def named_bays(self, layout: Iterable[Element] = ()) -> tuple[NamedBay, ...]:
-        """Return the names of what stands in the bays, with the measures of a layout taken."""
+        """Return the bays with the names of their components, with a layout's measures taken."""
         taken = {each.item for each in layout if isinstance(each, Measure)}
         measures = [each for each in self._hardening if each.name in taken]
         return tuple(
@@ -180,12 +180,12 @@ class Scenario(Section):
 
     @property
     def alternatives(self) -> tuple[Alternatives, ...]:
-        """The bays of all facades with what stands in them, and what measures would put there."""
+        """The bays of all facades with their components and those of the measures."""
         return tuple(bay.alternatives(self._hardening, self._known) for bay in self.named_bays())
 
     @property
     def _known(self) -> dict[str, Glazing | Wall]:
-        """The components by name."""
+        """All components by name."""
         return {**catalogue(), **self.components}
 
     @property
@@ -194,7 +194,7 @@ class Scenario(Section):
 
     @property
     def zone(self) -> BuildZone:
-        """The build zone, for what cannot do without one.
+        """The build zone, for callers that need one.
 
         Raises:
             BlastEnvError: If there is none.
@@ -207,37 +207,37 @@ class Scenario(Section):
 
     @property
     def parameters(self) -> SimulationParameters:
-        """The parameters of the blast model."""
+        """The parameters of the particle model."""
         return self.simulation.parameters
 
     @property
     def charge_radius_m(self) -> float:
-        """Radius of the disc that the charge fills at the start."""
+        """Radius of the charge's disc at the start, m."""
         return charge_radius_m(self.parameters)
 
     @property
     def air_height_m(self) -> float:
-        """How high the simulated air is: as `site` says, or by a rule.
+        """Height of the simulated air, m: that of `site`, or the default.
 
-        The rule: 12 m, or 6 m more than the highest structure or barrier if that is more.
+        The default is 12 m, or 6 m more than the highest structure or barrier if that is more.
         """
         return air_height_m(self.site, self.structures, self.build_zone)
 
     @property
     def height_notes(self) -> tuple[str, ...]:
-        """What the scenario says of heights that an engine without them does not heed."""
+        """The features of the scenario that an engine without heights ignores."""
         return height_notes(self.structures, self.charge, self.build_zone, self.gauges)
 
     @property
     def particle_problems(self) -> tuple[Problem, ...]:
-        """Why particles cannot run the scenario; gas dynamics needs nothing of it."""
+        """The reasons why particle engines cannot run the scenario; `gas` has no such limits."""
         return tuple(particle_problems(self.parameters, self.charge, self.structures))
 
     def check_for_particles(self) -> None:
-        """Refuse a scenario that particles cannot run.
+        """Refuse a scenario that particle engines cannot run.
 
         Raises:
-            ScenarioError: If there is a reason; all are in it.
+            ScenarioError: If there are `particle_problems`; it has all of them.
         """
         problems = self.particle_problems
         if problems:
@@ -245,11 +245,11 @@ class Scenario(Section):
 
     @property
     def content_hash(self) -> str:
-        """SHA-256 of everything that affects a result: not of the words for people.
+        """SHA-256 of all that affects results, without texts for readers.
 
-        Two scenarios that differ only in name, description, the reasons of areas, the names of
-        buildings, what says whether barriers stand, the place on a map, the order of keys or in how
-        they arrive at the same simulation parameters have the same hash.
+        It does not depend on name, description, reasons of areas, names of buildings, data for the
+        stability of barriers, georeference, order of keys, or the form (preset or overrides) of the
+        simulation parameters.
         """
         content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
         for structure in content["structures"]:
@@ -262,7 +262,7 @@ class Scenario(Section):
                 name: each.model_dump(mode="json", exclude=words)
                 for name, each in self.components.items()
             }
-        content["schema_version"] = FIRST_VERSION  # newer keys are there or not, which says it all
+        content["schema_version"] = FIRST_VERSION  # the presence of newer keys suffices
         if self.site.air_height_m == default_air_height_m(self.structures, self.build_zone):
             del content["site"]["air_height_m"]
         if self.build_zone is not None:
@@ -276,10 +276,10 @@ class Scenario(Section):
 
     @property
     def site_hash(self) -> str:
-        """SHA-256 of what a layout belongs to: the build zone, its catalogue and the structures.
+        """SHA-256 of build zone, catalogue and structures, which give a layout its meaning.
 
-        Charges, objective, budget, facades and what counts of a structure may change: the cells and
-        pieces of a layout mean the same.
+        It does not depend on charges, objective, budget and facades, nor on protection, weights
+        and faces of structures.
         """
         zone = None if self.build_zone is None else _without_words(self.build_zone)
         if zone is not None:
@@ -289,14 +289,14 @@ class Scenario(Section):
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any], source: str) -> "Scenario":
-        """Return the scenario that a parsed file describes.
+        """Return the scenario of a parsed file.
 
         Args:
             document: Nested like the models.
             source: Name of the file, for the error.
 
         Raises:
-            ScenarioError: If anything is wrong; all problems are in it.
+            ScenarioError: If it is invalid; the error has all problems.
         """
         changed = WithoutRound.of(document)
         try:
@@ -306,7 +306,7 @@ class Scenario(Section):
             problems: tuple[Problem, ...] = ()
         except ValidationError as error:
             problems = problems_from(error, cls)
-        # Pydantic skips the checks between sections if any section is unsound.
+        # Pydantic skips the checks between sections if any section is invalid.
         problems = changed.as_written((*problems, *check_parts(sound_parts(changed.document))))
         raise ScenarioError(source, (*problems, *version_problems(document)))
 
@@ -351,9 +351,9 @@ class Scenario(Section):
         return self._with_points((), (charge,))
 
     def with_possible_charges(self, charges: Sequence[AnyCharge]) -> "Scenario":
-        """Return the scenario in which these charges are possible as well.
+        """Return the scenario with further possible charges.
 
-        A module must keep clear of a charge that was put where the scenario has none.
+        Modules must keep clear of these charges, too.
 
         Raises:
             ScenarioError: If a charge is out of bounds, or not clear of a structure or the border.
@@ -363,9 +363,9 @@ class Scenario(Section):
     def _with_points(
         self, sources: tuple[AnySource, ...], charges: tuple[AnyCharge, ...]
     ) -> "Scenario":
-        """Return the scenario with other sources, those given and those of some charges.
+        """Return the scenario with the given sources and those of the charges.
 
-        The other sections are sound, and need no check but that of the charge against them.
+        The other sections are valid, so only the sources are checked against them.
         """
         document = [
             {"kind": "point", **charge._asdict()}
@@ -375,7 +375,7 @@ class Scenario(Section):
         ]
         try:
             together = _SOURCES.validate_python((*sources, *document))
-        except ValidationError:  # all that is wrong is in the error of the whole
+        except ValidationError:  # the error of the whole document has all problems
             own = [source.model_dump() for source in sources]
             return Scenario.from_document(
                 self.model_dump() | {"schema_version": SCHEMA_VERSION, "charge": [*own, *document]},
@@ -390,7 +390,7 @@ class Scenario(Section):
     def with_simulation(
         self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
     ) -> "Scenario":
-        """Return the scenario with other parameters of the blast model.
+        """Return the scenario with other parameters of the particle model.
 
         Args:
             preset: Name of another preset; the scenario's overrides stay.
@@ -414,30 +414,30 @@ class Scenario(Section):
 
     @property
     def building_names(self) -> dict[str, str]:
-        """The building that each structure is a part of, by the structure's name."""
+        """Name of each structure's building, by the structure's name."""
         return {each.name: each.building_name for each in self.structures}
 
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
-        """Return the structures that are still there with a layout."""
+        """Return the structures that remain with a layout."""
         away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
         return tuple(each for each in self.structures if each.name not in away)
 
     def vehicle_ground(
         self, source: VehicleSource, layout: Iterable[Element] = ()
     ) -> VehicleGround:
-        """Return what a vehicle meets on a site without barriers, as far as a layout lets it be."""
+        """Return a vehicle's ground without barriers and the structures that a layout removes."""
         ground = vehicle_ground(self._parts((source,)), source)
         return replace(ground, structures=self.structures_with(layout))
 
     def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
-        """Draw charges, independently of each other: a source by its weight, then a place in it.
+        """Draw independent charges: a source by its weight, then a place in it.
 
-        Those of one vehicle are at its worst place, its second worst, and so on.
+        Charges of one vehicle have rising ranks: its worst place, its second worst, and so on.
         """
         return ranked(self.sample_charge(rng) for _ in range(count))
 
     def sample_charge(self, rng: np.random.Generator) -> AnyCharge:
-        """Draw a charge: a source by its weight, then a place in it, or a vehicle's worst one."""
+        """Draw a charge: a source by its weight, then a place in it, or a vehicle's worst place."""
         weights = np.array([source.weight for source in self.charge])
         # Drawn also for a single source, so that adding one does not shift the stream.
         chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
@@ -448,17 +448,17 @@ class Scenario(Section):
 
     @model_validator(mode="after")
     def _check_sections_together(self) -> Self:
-        """Refuse a scenario whose sections do not fit each other."""
+        """Refuse a scenario with inconsistent sections."""
         problems = (*version_problems(self), *check_parts(self._parts(self.charge)))
         if problems:
             raise ScenarioError(self.name, problems)
-        # Equal scenarios are equal in whichever version their files are written.
+        # Equal scenarios compare equal whatever the versions of their files.
         object.__setattr__(self, "schema_version", lowest_version(self))
         return self
 
     @model_serializer(mode="wrap")
     def _in_lowest_version(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out newer keys that say nothing, so that the lowest version will do."""
+        """Omit newer keys with default values, so that the lowest version suffices."""
         document: dict[str, Any] = handler(self)
         for *above, key in unused_new_keys(self):
             table: Any = document
@@ -471,7 +471,7 @@ class Scenario(Section):
         return document
 
     def _parts(self, sources: Sequence[AnySource]) -> Parts:
-        """Return the sections for the checks between them, with these sources."""
+        """Return the sections for the checks between them, with the given sources."""
         return Parts(
             site=self.site,
             sources=dict(enumerate(sources)),
@@ -494,7 +494,7 @@ def _digest(content: dict[str, Any]) -> str:
 
 
 def _without_words(zone: BuildZone) -> dict[str, Any]:
-    """Return what a build zone says, without words for people and unused later keys."""
+    """Return the content of a build zone without texts for readers and unused later keys."""
     content = zone.model_dump(mode="json")
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
@@ -515,7 +515,7 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
 
 
 def _without_test(content: dict[str, Any]) -> None:
-    """Leave out the words of a crash rating, or the rating where there is none."""
+    """Remove the description of a crash rating, or the key of a missing one."""
     if content.get("crash_rating") is None:
         content.pop("crash_rating", None)
     else:
@@ -523,7 +523,7 @@ def _without_test(content: dict[str, Any]) -> None:
 
 
 def _without_negative_zero(value: Any) -> Any:
-    """Return nested values with every -0.0 made 0.0, which is the same place on a site."""
+    """Return nested values with every -0.0 replaced by 0.0, which is the same place on a site."""
     if isinstance(value, dict):
         return {key: _without_negative_zero(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""The objective: what a layout is to lower, a load or what becomes of the facades."""
+"""The objective of a layout: a load, or the response of the facades."""
 
 from typing import Annotated, Final, Literal, Self
 
@@ -27,30 +27,30 @@ _TERMS: Final = {"impulse": "impulse", "peak": "peak", "both": "load"}
 
 
 class ObjectiveSection(Section):
-    """What a layout is to lower.
+    """The quantity that a layout is to minimise.
 
     The load of a structure is its weight times its impulse (`"impulse"`, Pa s), its peak weight
-    times its peak overpressure (`"peak"`, Pa), or the sum of both (`"both"`), each divided by its
-    reference, which has no unit. The loads of the protected structures are added up, and those of
-    several charges become one number.
+    times its peak overpressure (`"peak"`, Pa), or the sum of both, each divided by its reference
+    (`"both"`, dimensionless). The loads of the protected structures are summed, and those of
+    several charges combined into one number.
 
-    With kind `"response"` it is not a load that counts, but what becomes of the facades of the
-    protected structures: the damage of their bays (`blast_env.response.damage`), weighted by area,
-    a number from 0 to 5 without a unit. With a `target` it is the cheapest layout that reaches a
-    level of protection: see `shortfall` and `counted`.
+    With kind `"response"` the response of the protected structures' facades counts instead of a
+    load: the damage of their bays (`blast_env.response.damage`), weighted by area, a dimensionless
+    number from 0 to 5. With a `target` the objective is the cheapest layout that reaches a level of
+    protection: see `response` and `counted`.
 
     Attributes:
-        kind: Whether a load counts, or the response of facades; that needs the engine `gas`, or a
-            surrogate of it.
-        measure: Of the response: `"damage"` is that of the worse of window and wall panel in a
-            bay, by the area of bays; `"glazing"` that of windows alone, by the area of panes.
-        target: Of the response: the level of protection to reach under every charge.
-        quantity: Which load counts; peaks need the engine `gas`.
-        reference_impulse_pa_s: For `"both"`: the impulse that counts as 1.
-        reference_peak_pa: For `"both"`: the peak overpressure that counts as 1.
-        charges: How the loads of several charges become one: their mean, the mean of the worst
+        kind: Load or response of facades; the response needs the engine `gas`, or a surrogate of
+            it.
+        measure: Measure of the response: `"damage"` is that of the worse of window and wall panel
+            in a bay, by the area of bays; `"glazing"` that of windows alone, by the area of panes.
+        target: Level of protection of the response to reach under every charge.
+        quantity: Quantity of the load; peaks need the engine `gas`.
+        reference_impulse_pa_s: Impulse that counts as 1 with `"both"`.
+        reference_peak_pa: Peak overpressure that counts as 1 with `"both"`.
+        charges: Combination of the loads of several charges: their mean, the mean of the worst
             ones (`"cvar"`), or the worst alone.
-        cvar_level: For `"cvar"`: the worst share 1 - `cvar_level` counts; 0.8 unless given.
+        cvar_level: With `"cvar"`, the worst share 1 - `cvar_level` counts; 0.8 unless given.
     """
 
     kind: Literal["load", "response"] = "load"
@@ -64,7 +64,7 @@ class ObjectiveSection(Section):
 
     @model_validator(mode="after")
     def _check_keys_together(self) -> Self:
-        """Refuse references without `both`, `both` without references, a level without `cvar`."""
+        """Refuse keys without effect on the objective, and `both` without its references."""
         problems = []
         if self.is_response and self.quantity != "impulse":
             problems.append(Problem("quantity", "must be left out: kind is 'response'"))
@@ -86,12 +86,12 @@ class ObjectiveSection(Section):
 
     @property
     def needs_peaks(self) -> bool:
-        """Whether peak overpressures count, which particles do not have."""
+        """Whether peak overpressures count, which particle engines do not compute."""
         return self.is_response or self.quantity != "impulse"
 
     @property
     def is_response(self) -> bool:
-        """Whether the response of facades counts, and no load."""
+        """Whether the response of facades counts instead of a load."""
         return self.kind == "response"
 
     @property
@@ -108,7 +108,7 @@ class ObjectiveSection(Section):
 
     @property
     def noun(self) -> str:
-        """What counts, in words: `impulse`, `damage`, with a target `shortfall`."""
+        """Name of the quantity for readers: `impulse`, `damage`, with a target `shortfall`."""
         if self.target is not None:
             return "shortfall"
         if self.is_response:
@@ -122,7 +122,7 @@ class ObjectiveSection(Section):
 
     @property
     def risk(self) -> Risk:
-        """How the loads of several charges become the one that counts."""
+        """The risk measure that combines the loads of several charges."""
         if self.charges == "mean":
             return MeanRisk()
         if self.charges == "worst":
@@ -136,18 +136,18 @@ class ObjectiveSection(Section):
         return f"{load:,.0f} {self.unit}"
 
     def paid(self, load: float) -> float:
-        """Return a load, in `unit`, as rewards are paid: in psi s, psi, or without a unit."""
+        """Return a load in `unit` converted to the unit of rewards: psi s, psi, or none."""
         return load if self.is_response or self.quantity == "both" else load / PA_PER_PSI
 
     def response(self, damage: FloatArray, area_m2: FloatArray) -> float:
-        """Return what counts of the response of one structure's bays.
+        """Return the response of one structure from the damage of its bays.
 
-        That is the mean of their damage by area. With a target it is the mean of the shortfall:
-        0 of a bay that reaches the level, else 1 and by how much its damage is beyond the limit.
+        It is their mean damage, weighted by area. With a target it is the mean shortfall: 0 for a
+        bay that reaches the level, else 1 plus the excess of its damage over the limit.
 
         Args:
-            damage: Of the bays (bays,).
-            area_m2: What each counts for (bays,).
+            damage: Damage of the bays (bays,).
+            area_m2: Area of each (bays,).
         """
         total_m2 = float(area_m2.sum())
         if self.level is not None:
@@ -156,14 +156,14 @@ class ObjectiveSection(Section):
         return float(area_m2 @ damage) / total_m2 if total_m2 > 0.0 else 0.0
 
     def counted(self, combined: float, cost_share: float) -> float:
-        """Return what a layout is worth, from what counts over all charges and what it costs.
+        """Return the objective value of a layout, to be minimised.
 
-        Without a target, the first of the two. With one, a layout that reaches it is worth the
-        share of the budget that it takes, at most 1; any other one 1 and its shortfall.
+        Without a target it is `combined`. With a target it is `cost_share` for a layout that
+        reaches it, at most 1, and 1 plus the shortfall for any other.
 
         Args:
-            combined: What counts, as one number over all charges.
-            cost_share: Cost of the layout over the budget.
+            combined: Load, response or shortfall, combined over all charges.
+            cost_share: Cost of the layout divided by the budget.
         """
         if self.target is None:
             return combined
@@ -177,14 +177,14 @@ class ObjectiveSection(Section):
         peak_weight: float,
         response: float | None = None,
     ) -> float:
-        """Return the load of one structure that counts, in `unit`.
+        """Return the weighted load or response of one structure, in `unit`.
 
         Args:
             impulse_pa_s: Its impulse per area.
             peak_pa: Its peak overpressure.
-            weight: How much its impulse or its response counts.
-            peak_weight: How much its peak counts.
-            response: What counts of its response; 0 for one without a facade.
+            weight: Weight of its impulse or its response.
+            peak_weight: Weight of its peak.
+            response: Its response; `None` counts as 0, for a structure without a facade.
         """
         if self.is_response:
             return weight * (response or 0.0)

@@ -1,4 +1,4 @@
-"""Placing modules or pieces: what may stand where, and layouts that are legal."""
+"""Placement of modules or pieces: legal places and legal layouts."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -29,12 +29,12 @@ from blast_env.scenario.zone import (
 
 
 class CheckedLayout(tuple[Element, ...]):
-    """A layout that keeps every condition of a build zone, and need not be checked again.
+    """A layout that was checked against all conditions of a build zone.
 
-    It is equal to the plain tuple. `Placement.checked` makes it.
+    It equals the plain tuple; see `Placement.checked`.
 
     Attributes:
-        scenario: The scenario that it was checked for.
+        scenario: The scenario against which it was checked.
     """
 
     scenario: Scenario
@@ -42,17 +42,17 @@ class CheckedLayout(tuple[Element, ...]):
 
 @dataclass(frozen=True)
 class Placement:
-    """A layout in the making: immutable, everything placed gives another placement.
+    """An immutable partial layout; placing an element returns another placement.
 
-    What is placed are single modules on cells or, where the build zone has a catalogue, pieces.
+    The elements are single modules on cells or, if the build zone has a catalogue, pieces.
 
-    Made with `Placement.empty`, `Placement.of` and `place`, which keep every condition of the
-    build zone; the constructor itself checks nothing. What may stand depends on what stands
-    already, not on the order, and whatever may stand may also stand with less around it.
+    `Placement.empty`, `Placement.of` and `place` ensure all conditions of the build zone; the
+    constructor itself checks nothing. Legality does not depend on the order of the elements, and
+    every subset of a legal layout is legal.
 
     Attributes:
         scenario: The scenario.
-        layout: The modules' cells, or the pieces, in the order in which they were placed.
+        layout: The modules' cells, or the pieces, in the order of placement.
     """
 
     scenario: Scenario
@@ -60,7 +60,7 @@ class Placement:
 
     @classmethod
     def empty(cls, scenario: AnyScenario) -> "Placement":
-        """Return the placement of nothing.
+        """Return the empty placement.
 
         Args:
             scenario: The scenario, or its bundled name or path.
@@ -74,11 +74,11 @@ class Placement:
         Args:
             scenario: The scenario, or its bundled name or path.
             layout: (row, column) of each module; with a catalogue, pieces (row, column, item,
-                turned). NumPy integers and arrays are welcome.
+                turned). NumPy integers and arrays are accepted.
 
         Raises:
-            LayoutError: If an element is anything else, lies outside the build zone, is repeated
-                or not available once those before it are placed.
+            LayoutError: If an element has another form, lies outside the build zone, is repeated,
+                or is not available after those before it.
         """
         empty = cls.empty(scenario)
         whole = cls(empty.scenario, empty.catalogue.layout_from(layout))
@@ -86,7 +86,7 @@ class Placement:
 
     @property
     def checked(self) -> CheckedLayout:
-        """The layout with the fact that it was checked: `of` and `place` let nothing else stand."""
+        """The layout, marked as checked by `of` and `place`."""
         layout = CheckedLayout(self.layout)
         layout.scenario = self.scenario
         return layout
@@ -105,18 +105,18 @@ class Placement:
         if reason is not None:
             raise LayoutError(reason)
         placed = Placement(self.scenario, (*self.layout, element))
-        # To look it up takes as long as all the rest of a step of the environment.
+        # Looking it up would double the time of a step of the environment.
         vars(placed)["_empty_zone"] = self._empty_zone
         return placed
 
     def explain(self, element: Element) -> str | None:
-        """Return a sentence that says why something cannot be placed, or `None` if it can.
+        """Return the reason why an element cannot be placed, as a sentence, or `None` if it can.
 
         Args:
-            element: (row, column), or a piece; also one that does not exist.
+            element: (row, column), or a piece, which need not exist in the catalogue.
 
         Raises:
-            LayoutError: If it is neither.
+            LayoutError: If it has neither form.
         """
         element = self.catalogue.element_from(element, self._word)
         reason = self._reason_against_site(element) or self._reason_against_taken(element)
@@ -129,7 +129,7 @@ class Placement:
         return None if reason is None else f"{element_text(element)} {reason}"
 
     def explain_vehicles(self) -> tuple[str, ...]:
-        """Return a sentence for each vehicle: how near it comes now, by which way, how fast."""
+        """Return a sentence per vehicle with its stand-off, way and speeds against the layout."""
         obstacles = obstacles_of(self._zone, self.layout, self.scenario.structures)
         return tuple(
             self.scenario.vehicle_ground(source, self.layout).explain(obstacles)
@@ -138,7 +138,7 @@ class Placement:
 
     @cached_property
     def legal(self) -> BoolArray:
-        """What may be placed now, by variant and lower left cell, read-only.
+        """Whether each variant may be placed at each lower left cell, read-only.
 
         Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
         (1, 0, 0) without a build zone.
@@ -158,9 +158,9 @@ class Placement:
 
     @cached_property
     def free(self) -> BoolArray:
-        """Which cells may take a module now, shape (rows, columns), read-only.
+        """Whether each cell may take a module, shape (rows, columns), read-only.
 
-        With a catalogue: on which cells some piece may have its lower left one. (0, 0) without a
+        With a catalogue: whether it may be the lower left cell of some piece. (0, 0) without a
         build zone.
         """
         free: BoolArray = np.any(self.legal, axis=0) if len(self.legal) > 1 else self.legal[0]
@@ -169,7 +169,7 @@ class Placement:
 
     @cached_property
     def open_ground(self) -> BoolArray:
-        """Which cells a piece that may be placed now could cover, (rows, columns), read-only."""
+        """Whether some legal piece could cover each cell (rows, columns), read-only."""
         if not self.catalogue.has_items:
             return self.free
         ground = np.zeros(self._zone.shape, dtype=bool)
@@ -181,55 +181,55 @@ class Placement:
         return ground
 
     def limited_to(self, possible: BoolArray) -> "Placement":
-        """Return the placement in which no more may be placed than some of what is `legal`.
+        """Return the placement with `legal` restricted to a subset.
 
         Args:
-            possible: As `legal`, and nothing that is not.
+            possible: A subset of `legal`, of the same shape.
         """
         limited = Placement(self.scenario, self.layout)
         vars(limited).update(_empty_zone=self._empty_zone, legal=possible)
         return limited
 
     def places(self, cells: BoolArray) -> BoolArray:
-        """Return from which lower left cell each variant covers nothing but some cells.
+        """Return whether each variant at each lower left cell covers only the given cells.
 
         Args:
-            cells: Which cells, shape (rows, columns).
+            cells: Mask of the cells (rows, columns).
 
         Returns:
-            Shape (variants, rows, columns); what stands, stock and budget do not count.
+            Shape (variants, rows, columns), without regard to the layout, stock and budget.
         """
         return self._empty_zone.places(cells)
 
     @property
     def usable(self) -> BoolArray:
-        """Which cells may ever take a module, as far as the site is concerned, read-only.
+        """Whether each cell may take a module on the empty site, read-only.
 
-        Shape (rows, columns). Neither what stands nor stock, budget and access way count here.
+        Shape (rows, columns), without regard to layout, stock, budget and access way.
         """
         return self._empty_zone.usable
 
     @property
     def ground_m(self) -> FloatArray:
-        """How high the ground of each cell is, shape (rows, columns), read-only."""
+        """Height of the ground of each cell, m (rows, columns), read-only."""
         return self._empty_zone.ground_m
 
     @property
     def module_costs(self) -> NDArray[np.float64]:
-        """What a module on each cell costs, shape (rows, columns), read-only.
+        """Cost of a module on each cell, shape (rows, columns), read-only.
 
-        With a catalogue, what the cost of an item is multiplied by there.
+        With a catalogue, the factor of an item's cost there.
         """
         return self._empty_zone.module_costs
 
     @property
     def costs(self) -> NDArray[np.float64]:
-        """What each variant costs by its lower left cell, (variants, rows, columns), read-only."""
+        """Cost of each variant by its lower left cell (variants, rows, columns), read-only."""
         return self._empty_zone.costs
 
     @property
     def catalogue(self) -> Catalogue:
-        """What can be placed; it numbers the actions."""
+        """The catalogue, which numbers the actions."""
         return self._empty_zone.catalogue
 
     @property
@@ -239,7 +239,7 @@ class Placement:
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
-        """The cells that hold a module, piece by piece."""
+        """The cells with a module, piece by piece."""
         cells: list[Cell] = []
         for element in self.layout:
             cells += self.catalogue.cells(element) if isinstance(element, Piece) else (element,)
@@ -247,22 +247,22 @@ class Placement:
 
     @property
     def is_full(self) -> bool:
-        """Whether nothing more can be placed."""
+        """Whether no element can be placed."""
         return not self.legal.any()
 
     @property
     def stock_left(self) -> int:
-        """How many modules of the stock are left, or how many pieces may still be placed."""
+        """Number of modules, or of pieces in all, that remain in the stock."""
         return self._zone.stock - len(self.layout)
 
     @property
     def stocks_left(self) -> tuple[int, ...]:
-        """How many pieces of each item may still be placed."""
+        """Number of pieces of each item that remain in the stock."""
         return tuple(map(self._stock_left_of, range(len(self.catalogue.stocks))))
 
     @cached_property
     def cost(self) -> float:
-        """What the modules or pieces cost together."""
+        """Total cost of the layout."""
         # Summed exactly, so that the order of the layout does not matter.
         costs = self._empty_zone.costs
         number = self.catalogue.variant_number
@@ -270,28 +270,28 @@ class Placement:
 
     @property
     def budget_left(self) -> float | None:
-        """What is left of the budget; `None` without one."""
+        """Remaining budget; `None` without one."""
         budget = self._zone.budget
         return None if budget is None else max(0.0, budget - self.cost)
 
     @property
     def _word(self) -> str:
-        """What an element of the layout is called in an error."""
+        """Word for an element in errors."""
         return "piece" if self.catalogue.has_items else "cell"
 
     @property
     def _zone(self) -> BuildZone:
-        """The build zone; one without cells where the scenario has none."""
+        """The build zone; one without cells if the scenario has none."""
         return self.scenario.build_zone or NO_ZONE
 
     @property
     def _spendable(self) -> float:
-        """What the next module or piece may cost."""
+        """Largest cost of the next element."""
         return self._zone.cost_limit - self.cost
 
     @cached_property
     def _empty_zone(self) -> EmptyZone:
-        """What holds for the cells without the modules."""
+        """The build zone without modules."""
         return empty_zone(self._surroundings)
 
     @property
@@ -307,7 +307,7 @@ class Placement:
 
     @cached_property
     def _taken(self) -> BoolArray:
-        """Which cells hold a module, shape (rows, columns)."""
+        """Whether each cell has a module (rows, columns)."""
         taken = np.zeros(self._zone.shape, dtype=bool)
         if self.cells:
             taken[tuple(zip(*self.cells, strict=True))] = True
@@ -315,7 +315,7 @@ class Placement:
 
     @cached_property
     def _closing(self) -> BoolArray | None:
-        """From where each variant would close the access way, (variants, rows, columns)."""
+        """Whether each variant would close the access way (variants, rows, columns)."""
         way = self._zone.access_way
         if way is None:
             return None
@@ -324,11 +324,11 @@ class Placement:
 
     @cached_property
     def _placed_of(self) -> Counter[str]:
-        """How many pieces of each item stand, or modules under the empty name."""
+        """Number of placed pieces by item; that of modules has the empty name."""
         return Counter(each.item if isinstance(each, Piece) else "" for each in self.layout)
 
     def _stock_left_of(self, item: int) -> int:
-        """Return how many pieces of an item may still be placed."""
+        """Return the number of pieces of an item that remain in the stock."""
         catalogue = self.catalogue
         if not catalogue.has_items:
             return self.stock_left
@@ -337,7 +337,7 @@ class Placement:
 
     @property
     def _is_sound(self) -> bool:
-        """Whether all elements together keep every condition."""
+        """Whether the layout as a whole keeps every condition."""
         zone, catalogue = self._zone, self.catalogue
         if not self.layout:
             return True
@@ -357,7 +357,7 @@ class Placement:
         return zone.access_way is None or is_open(zone.access_way, passable)
 
     def _reason_against_site(self, element: Element) -> str | None:
-        """Return why something may not stand there even alone, or `None` if it may."""
+        """Return the reason why an element is illegal even alone, or `None` if it is legal."""
         zone = self._zone
         if zone is NO_ZONE:
             return "is not usable: the scenario has no build zone"
@@ -379,12 +379,12 @@ class Placement:
         return "would straddle the edge of a terrace" if self._straddles(element) else None
 
     def _straddles(self, element: Element) -> bool:
-        """Whether the ground below an element is of several heights."""
+        """Return whether the ground below an element has several heights."""
         ground = self._empty_zone.ground_m
         return len({ground[cell] for cell in self.catalogue.cells(element)}) > 1
 
     def _reason_against_taken(self, element: Element) -> str | None:
-        """Return why something that stands already is in the way, or `None` if nothing is."""
+        """Return the conflict with a placed element, or `None` if there is none."""
         if not isinstance(element, Piece):
             return "is taken by a module" if element in self.layout else None
         for cell in self.catalogue.cells(element):
@@ -394,7 +394,7 @@ class Placement:
         return None
 
     def _reason_against_stock(self, element: Element) -> str | None:
-        """Return that the stock is used up, or `None` if it is not."""
+        """Return the message of an exhausted stock, or `None` if it is not."""
         if self.stock_left == 0:
             what = "piece" if self.catalogue.has_items else "module"
             return f"the stock of {_counted(len(self.layout), what)} is used up"
@@ -405,7 +405,7 @@ class Placement:
         return f"the stock of {stock} is used up"
 
     def _reason_against_cost(self, element: Element) -> str | None:
-        """Return why something cannot be paid for, or `None` if it can."""
+        """Return the message of an exceeded budget, or `None` if it is not."""
         cost = self.costs[self.catalogue.variant_number(element), element[0], element[1]]
         budget = self._zone.budget
         if budget is None or cost <= self._spendable:
@@ -416,19 +416,19 @@ class Placement:
         )
 
     def _reason_against_closing(self, element: Element) -> str | None:
-        """Return why something would be in the way, or `None` if it would not."""
+        """Return the message of a closed access way, or `None` if it stays open."""
         way, number = self._zone.access_way, self.catalogue.variant_number(element)
         if way is None or self._closing is None or not self._closing[number, *element[:2]]:
             return None
         return f"would close the {way.description}"
 
     def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
-        """Pickle only what cannot be worked out again: arrays would come back writeable."""
+        """Pickle scenario and layout alone: cached arrays would come back writeable."""
         return Placement, (self.scenario, self.layout)
 
 
 def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
-    """Place a layout in its order, or raise the error for the first element that fails."""
+    """Place a layout in order, or raise the error of the first illegal element."""
     placement = empty
     for element in layout:
         if element in placement.layout:
@@ -440,7 +440,7 @@ def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
 
 
 def _check_stock(placement: Placement, layout: Layout, element: Element) -> None:
-    """Refuse an element for which there is nothing left in stock (`LayoutError`)."""
+    """Refuse an element beyond the stock (`LayoutError`)."""
     catalogue, what = placement.catalogue, "modules"
     asked, most = len(layout), len(placement.layout)
     if isinstance(element, Piece):
@@ -457,7 +457,7 @@ def _check_stock(placement: Placement, layout: Layout, element: Element) -> None
 
 
 def _of_cell(element: Element, cell: Cell, reason: str | None) -> str | None:
-    """Return a reason against a cell as one against an element that covers it."""
+    """Return a reason against a cell, worded for an element that covers it."""
     if reason is None or not isinstance(element, Piece):
         return reason
     return f"would stand on {cell_text(cell)}, which {reason}"
@@ -468,10 +468,10 @@ def _counted(count: int, word: str, plural: str = "s") -> str:
 
 
 def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
-    """Return which cells may hold a module as far as the site is concerned.
+    """Return whether each cell may have a module on the empty site.
 
-    That leaves out keep-outs, structures, their clearance and the charge; what depends on the
-    modules already placed (stock, budget, access way) is for `Placement` to say.
+    Keep-outs, structures, their clearance and the charge exclude cells. `Placement` checks the
+    conditions that depend on the layout (stock, budget, access way).
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -483,19 +483,19 @@ def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
 
 
 def met_by_blasts(layout: Iterable[Element]) -> Layout:
-    """Return what of a layout its loads depend on: all but the measures that harden facades."""
+    """Return the elements that affect loads: all but the measures that harden facades."""
     return tuple(element for element in layout if type(element) is not Measure)
 
 
 def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
-    """Return a layout as plain values, in its order.
+    """Return a legal layout as plain values, in order.
 
     Args:
-        scenario: The scenario that the layout is for, or its bundled name or path.
-        layout: (row, column) of each module, or pieces. NumPy integers and arrays are welcome.
+        scenario: The scenario of the layout, or its bundled name or path.
+        layout: (row, column) of each module, or pieces. NumPy integers and arrays are accepted.
 
     Raises:
-        LayoutError: As `Placement.of` does, if something cannot be placed.
+        LayoutError: As `Placement.of`, if an element cannot be placed.
     """
     if isinstance(layout, CheckedLayout) and layout.scenario is scenario:
         return layout

@@ -1,4 +1,4 @@
-"""Problems of a scenario file, each in words that name key, value and bound."""
+"""Problems of a scenario file, with messages that name key, value and bound."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -22,23 +22,23 @@ from blast_env.geometry import Rectangle
 
 
 def extent(rectangle: Rectangle) -> str:
-    """Return the extent of a rectangle in words."""
+    """Return the text of a rectangle's extent."""
     left, bottom, right, top = rectangle
     return f"x {left:g} to {right:g} m, y {bottom:g} to {top:g} m"
 
 
 MAX_PROBLEMS: Final = 20
-"""More problems than this are counted only: no person reads them, and naming them takes long."""
+"""Most problems with messages; further ones are only counted, to save time."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong.
+    """A problem of a scenario.
 
     Attributes:
         key: Path of the key, e.g. `structures[1].rows`; a place such as `line 3, column 5` if the
-            text could not be read; empty if the file as a whole is meant.
-        message: What is wrong, with the value and its bound.
+            text could not be read; empty for the file as a whole.
+        message: The problem, with the value and its bound.
     """
 
     key: str
@@ -48,22 +48,22 @@ class Problem:
         return f"{self.key}: {self.message}" if self.key else self.message
 
     def below(self, parts: KeyParts) -> "Problem":
-        """Return the problem with its key understood as lying below `parts`."""
+        """Return the problem with `parts` put before its key."""
         above = key_path(parts)
         joint = "." if above and self.key and not self.key.startswith("[") else ""
         return Problem(f"{above}{joint}{self.key}", self.message)
 
 
 class ScenarioError(BlastEnvError):
-    """A scenario that cannot be used; the message has one line for each problem.
+    """An invalid scenario; the message has one line per problem.
 
     Args:
-        source: The file, or a name for where the scenario came from.
-        problems: All that is wrong; each counts once.
+        source: The file, or another name of the scenario's source.
+        problems: All problems; repeated ones count once.
 
     Attributes:
         source: As given.
-        problems: The first `MAX_PROBLEMS` of them, and how many more there are.
+        problems: The first `MAX_PROBLEMS` of them, and one with the number of the others.
     """
 
     def __init__(self, source: str, problems: Iterable[Problem]) -> None:
@@ -95,22 +95,22 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
 def problems_from(
     error: ValidationError, model: type[BaseModel], prefix: KeyParts = ()
 ) -> tuple[Problem, ...]:
-    """Translate what pydantic found.
+    """Return the problems of a pydantic error.
 
     Args:
-        error: The error that `model` raised.
-        model: The model that was validated.
-        prefix: Where the validated value lies in the file.
+        error: The error of `model`.
+        model: The validated model.
+        prefix: Keys of the validated value in the file.
     """
     details = error.errors(include_url=False)
     told = [each for detail in details[:MAX_PROBLEMS] for each in _translated(detail, model)]
-    # The others are only counted, which needs no words.
+    # The others are only counted, and need no message.
     counted = [Problem(key_path(detail["loc"]), detail["msg"]) for detail in details[MAX_PROBLEMS:]]
     return tuple(problem.below(prefix) for problem in (*told, *counted))
 
 
 def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Problem]:
-    """Yield the problems that one pydantic error stands for."""
+    """Yield the problems of one entry of a pydantic error."""
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         parts, annotation = _followed(model, detail["loc"])
@@ -126,7 +126,7 @@ def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Proble
     parts, annotation = _followed(model, detail["loc"])
     if kind == "value_error" and isinstance(cause := context["error"], ScenarioError):
         yield from (problem.below(parts) for problem in cause.problems)
-    # Pydantic counts only the sound items of an array; the others have their own errors.
+    # Pydantic counts only the valid items of an array; the others have their own errors.
     elif kind != "too_short" or len(value) < context["min_length"]:
         yield Problem(key_path(parts), _sentence(detail, annotation))
 
@@ -191,7 +191,7 @@ def _kind_problems(
 ) -> Iterator[Problem]:
     """Yield the problems of a table whose kind is missing or unknown.
 
-    Pydantic looks no further in such a table; where the kind can be guessed, this does.
+    Pydantic does not examine such a table further; this does if the kind can be guessed.
     """
     models = {_tag(option, kind_key): option for option in _options(annotation)}
     key, misspelt = kind_key, get_close_matches(kind_key, value, n=1)
@@ -216,7 +216,7 @@ def _kind_problems(
 
 
 _OF_A_KEY: Final = "[key]"
-"""What pydantic puts after a key that is itself wrong."""
+"""Pydantic's location suffix for a key that is itself invalid."""
 
 
 def _followed(model: type[BaseModel], location: KeyParts) -> tuple[KeyParts, Any]:
@@ -243,7 +243,7 @@ def _followed(model: type[BaseModel], location: KeyParts) -> tuple[KeyParts, Any
 
 
 def _options(annotation: Any) -> tuple[Any, ...]:
-    """Return the members of a union without `None`, or the one type that there is."""
+    """Return the members of a union without `None`, or the single type."""
     if hasattr(annotation, "__metadata__"):
         return _options(annotation.__origin__)
     if get_origin(annotation) in (Union, UnionType):
@@ -258,7 +258,7 @@ def _tag(model: type[BaseModel], kind_key: str) -> str:
 
 
 def _has_tag(model: type[BaseModel], tag: str | int) -> bool:
-    """Whether one of the model's literal fields has this value."""
+    """Return whether one of the model's literal fields has this value."""
     return any(
         get_origin(field.annotation) is Literal and tag in get_args(field.annotation)
         for field in model.model_fields.values()

@@ -1,9 +1,9 @@
-"""Where a vehicle gets to at all: its places on a plane that is cut by what it must not cover.
+"""The reach of a vehicle: the positions of its centre that are connected to its entries.
 
-All of it is worked out without a grid, on the places of the vehicle's centre: obstacles grow by
-half of the width on all sides, and cut the plane into rectangles, edges and corners, each of which
-is open to the centre as a whole or not at all. Lengths are whole micrometres there. Places of the
-charge are closer together than these cuts; each is looked up in the part of the plane it lies in.
+The computation is exact, without a grid. Obstacles, grown by half of the vehicle's width on all
+sides, cut the plane of its centre into rectangles, edges and corners, each of which is open or
+closed as a whole. Lengths are whole micrometres. Places of the charge form a finer lattice, and
+each has the state of its part of the plane.
 """
 
 from collections.abc import Iterable
@@ -21,10 +21,10 @@ from blast_env.scenario.sections import Site
 from blast_env.units import MODULE_SIDE_M
 
 _PER_M: Final = 1_000_000
-"""Steps of length in a metre: micrometres, so that what is equal is equal to the last bit."""
+"""Micrometres in a metre; whole numbers make equal lengths compare equal."""
 
 _MOST_STEPS: Final = 1000
-"""Most places along a side of the site at which the charge may go off, obstacles aside."""
+"""Most regular places of the charge along a side of the site."""
 
 
 Steps = NDArray[np.int64]
@@ -32,7 +32,7 @@ Steps = NDArray[np.int64]
 
 
 def places_on(site: Site) -> int:
-    """Return at how many places of a site a vehicle's charge may go off, obstacles aside."""
+    """Return the number of places of a vehicle's charge on a site without obstacles."""
     along_x, along_y = (
         steps_of(side_m) // _step(steps_of(side_m)) for side_m in (site.width_m, site.height_m)
     )
@@ -40,26 +40,26 @@ def places_on(site: Site) -> int:
 
 
 def squares_of(site: Site) -> tuple[int, int]:
-    """Return how many rows and columns of squares of 0.5 m cover a site."""
+    """Return the number of rows and of columns of squares of 0.5 m that cover a site."""
     rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
     return rows, columns
 
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Where a vehicle can get to.
+    """The reach of a vehicle.
 
     The plane of its centre is cut at `x_m` and `y_m` into corners, edges and rectangles: those of
-    even row and column are corners, those of odd ones the rectangles between.
+    even row and column are corners, those of odd row and column the rectangles between.
 
     Attributes:
         width_m: Side of its square.
         x_m: Cuts along x, rising (columns,).
         y_m: Cuts along y, rising (rows,).
-        start: Where its centre is when it has just entered (2 rows - 1, 2 columns - 1).
-        reached: Where its centre can get to, of the same shape.
-        clear: Where it would cover nothing that it can drive over, of the same shape.
-        lattice_x_m: Where along x its charge may go off, rising; all cuts are among it.
+        start: Parts with its centre just after entry (2 rows - 1, 2 columns - 1).
+        reached: Parts that its centre can reach, of the same shape.
+        clear: Parts at which it covers no obstacle that it drives over, of the same shape.
+        lattice_x_m: x of the places of its charge, rising, all cuts included.
         lattice_y_m: The same along y.
     """
 
@@ -74,33 +74,33 @@ class Reach:
 
     @property
     def enters(self) -> bool:
-        """Whether it can enter at all."""
+        """Whether it can enter."""
         return bool(self.reached.any())
 
     @cached_property
     def places_m(self) -> FloatArray:
-        """Places where its charge may go off, (places, 2): those of the lattice that are clear."""
+        """Places of its charge (places, 2): the clear ones of the lattice within reach."""
         return self._places_m(self.reached & self.clear)
 
     @property
     def starts_m(self) -> FloatArray:
-        """Those of the places where it has just entered, (places, 2)."""
+        """Places of its centre just after entry (places, 2)."""
         return self._places_m(self.start)
 
     def _places_m(self, where: BoolArray) -> FloatArray:
-        """Return the places of the lattice that lie in some parts of the plane, (places, 2)."""
+        """Return the places of the lattice in some parts of the plane (places, 2)."""
         of_row = _parts(self.y_m, self.lattice_y_m)
         of_column = _parts(self.x_m, self.lattice_x_m)
         rows, columns = np.nonzero(where[of_row[:, np.newaxis], of_column])
         return np.column_stack((self.lattice_x_m[columns], self.lattice_y_m[rows]))
 
     def near(self, rows: int, columns: int, step_m: float) -> BoolArray:
-        """Return which points of a lattice have a place that is reached within half a step.
+        """Return whether each point of a grid has a reached place within half a step.
 
         Args:
             rows: Points upwards, from the lower border.
             columns: Points to the right, from the left border.
-            step_m: How far apart they are.
+            step_m: Spacing of the points.
         """
         row, column = np.nonzero(self.reached)
         count = np.zeros((rows + 1, columns + 1), dtype=np.int64)
@@ -117,7 +117,7 @@ class Reach:
         return near
 
     def touches(self, rectangle: Rectangle) -> tuple[bool, bool, bool, bool]:
-        """Return whether it gets to the left, lower, right and upper side of a rectangle."""
+        """Return whether it reaches the left, lower, right and upper side of a rectangle."""
         half_m = self.width_m / 2.0
         left, bottom, right, top = rectangle.grown(half_m)
         across = _inner_parts(self.y_m, bottom, top), _inner_parts(self.x_m, left, right)
@@ -138,7 +138,7 @@ class Reach:
         return found[0], found[1], found[2], found[3]
 
     def ground(self, rows: int, columns: int) -> BoolArray:
-        """Return which squares of 0.5 m from the lower left corner of the site it can cover.
+        """Return whether it can cover each square of 0.5 m from the site's lower left corner.
 
         Args:
             rows: Squares upwards.
@@ -147,7 +147,7 @@ class Reach:
         row, column = np.nonzero(self.reached)
         left, right = _squares(self.x_m, column, self.width_m, columns)
         bottom, top = _squares(self.y_m, row, self.width_m, rows)
-        # Corners of many rectangles, added up twice: how many of them cover a square.
+        # Two cumulative sums over the corners of rectangles count those that cover a square.
         counts = np.zeros((rows + 1, columns + 1), dtype=np.int64)
         for y, sign in ((bottom, 1), (top, -1)):
             np.add.at(counts, (y, left), sign)
@@ -157,13 +157,13 @@ class Reach:
 
 
 def _parts(cuts_m: FloatArray, values_m: FloatArray) -> NDArray[np.intp]:
-    """Return in which part of a direction values lie: at a cut, or between two."""
+    """Return the part of an axis in which each value lies: at a cut, or between two."""
     before = np.searchsorted(cuts_m, values_m, side="left")
     return before + np.searchsorted(cuts_m, values_m, side="right") - 1
 
 
 def _inner_parts(cuts_m: FloatArray, low_m: float, high_m: float) -> slice:
-    """Return the parts of a direction strictly between two cuts."""
+    """Return the parts of an axis strictly between two cuts."""
     first = 2 * int(np.searchsorted(cuts_m, low_m + 1e-6)) - 1
     after = 2 * int(np.searchsorted(cuts_m, high_m - 1e-6))
     return slice(max(first, 0), after)
@@ -172,7 +172,7 @@ def _inner_parts(cuts_m: FloatArray, low_m: float, high_m: float) -> slice:
 def _squares(
     cuts_m: FloatArray, index: NDArray[np.intp], width_m: float, count: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first square that is covered from some part of the plane, and the one after."""
+    """Return the first square covered from each part of the plane, and the one after the last."""
     low_m = cuts_m[index // 2] - width_m / 2.0
     high_m = cuts_m[(index + 1) // 2] + width_m / 2.0
     first = np.floor(low_m / MODULE_SIDE_M + 1e-5).astype(np.intp)
@@ -182,15 +182,15 @@ def _squares(
 
 @dataclass(frozen=True)
 class ReachQuery:
-    """What decides where a vehicle gets to.
+    """The input of the computation of a vehicle's reach.
 
     Attributes:
         site: The site.
         width_m: Side of the vehicle's square.
-        entries_m: The strips just inside the border where it enters.
-        closed_m: What it must not cover.
-        solid_m: What it drives over, but where no charge goes off.
-        level_m: Whose corners the places of the charge are level with.
+        entries_m: Strips of its entries, just inside the border.
+        closed_m: Obstacles that it must not cover.
+        solid_m: Obstacles that it drives over, but on which no charge goes off.
+        level_m: Rectangles with corners that add their x and y to the lattice of the charge.
     """
 
     site: Site
@@ -201,7 +201,7 @@ class ReachQuery:
     level_m: tuple[Rectangle, ...]
 
     def answer(self) -> Reach:
-        """Work out where the vehicle gets to."""
+        """Compute the reach of the vehicle."""
         from scipy.ndimage import label  # takes a third of a second to import
 
         plane = _Plane.of(self)
@@ -210,8 +210,8 @@ class ReachQuery:
         for strip_m in self.entries_m:
             start[plane.start(strip_m)] = True
         start &= ~closed
-        # Corners hang together along edges, and edges along rectangles: side by side, never
-        # cornerwise.
+        # Corners connect along edges, and edges along rectangles, so parts connect side by side
+        # and never diagonally.
         labels, count = label(~closed)
         connected = np.zeros(count + 1, dtype=bool)
         connected[labels[start]] = True
@@ -229,12 +229,12 @@ class ReachQuery:
 
 @dataclass(frozen=True, eq=False)
 class _Plane:
-    """The plane of the centres of a vehicle, cut by all that it must not cover, micrometres.
+    """The plane of the centres of a vehicle, cut by all obstacles, micrometres.
 
     Attributes:
-        x: Cuts along x, rising; the first and the last are where it touches the border.
+        x: Cuts along x, rising; at the first and the last the vehicle touches the border.
         y: Cuts along y.
-        lattice_x: Where along x its charge may go off, rising; cuts are among it.
+        lattice_x: x of the places of its charge, rising, cuts included.
         lattice_y: The same along y.
         half: Half of its width.
     """
@@ -251,7 +251,7 @@ class _Plane:
         boxes = np.concatenate(
             (_grown((*query.closed_m, *query.solid_m), half), _grown(query.entries_m, -half))
         )
-        # Nearest to a structure are places that touch it, or that are level with its corners.
+        # The places nearest to a structure touch it, or are level with its corners.
         level = _grown(query.level_m, 0)
         cuts, lattices = [], []
         for axis, side_m in enumerate((query.site.width_m, query.site.height_m)):
@@ -266,10 +266,10 @@ class _Plane:
         return cls(cuts[0], cuts[1], lattices[0], lattices[1], half)
 
     def covering(self, rectangles_m: Iterable[Rectangle]) -> BoolArray:
-        """Return where the vehicle would cover any of the rectangles; to touch is not to cover."""
+        """Return whether the vehicle overlaps a rectangle at each part; touching does not count."""
         covered = np.zeros((2 * len(self.y) - 1, 2 * len(self.x) - 1), dtype=bool)
         left, bottom, right, top = _grown(rectangles_m, self.half).T
-        # What is strictly between; a value that is no cut lies beyond all of them.
+        # The parts strictly between; a value that is not a cut lies beyond all of them.
         low = np.maximum(2 * np.searchsorted(self.y, bottom, side="right") - 1, 0)
         high = 2 * np.searchsorted(self.y, top, side="left")
         first = np.maximum(2 * np.searchsorted(self.x, left, side="right") - 1, 0)
@@ -279,7 +279,7 @@ class _Plane:
         return covered
 
     def start(self, strip_m: Rectangle) -> tuple[slice, slice]:
-        """Return where the vehicle stands within the strip behind an entry."""
+        """Return the parts at which the vehicle stands within the strip behind an entry."""
         ((left, bottom, right, top),) = _grown((strip_m,), -self.half)
         return _from_to(self.y, bottom, top), _from_to(self.x, left, right)
 
@@ -298,18 +298,18 @@ def _grown(rectangles_m: Iterable[Rectangle], by: int) -> Steps:
 
 
 def _within(edges: Steps, first: int, last: int) -> Steps:
-    """Return the edges between two ends, and these; rising, none twice."""
+    """Return the distinct edges between two ends, and the ends, rising."""
     inside = edges[(edges > first) & (edges < last)]
     return np.unique(np.append(inside, (first, last)))
 
 
 def _step(end: int) -> int:
-    """Return how far apart regular places of the charge are on a site that ends there."""
+    """Return the spacing of regular places of the charge on a side of the site, micrometres."""
     module = steps_of(MODULE_SIDE_M)
     return module * ceil(end / module / _MOST_STEPS)
 
 
 def _from_to(cuts: Steps, low: int, high: int) -> slice:
-    """Return the parts of a direction from one cut to another one, both within the site."""
+    """Return the parts of an axis from one cut to another, both within the site."""
     first, last = np.searchsorted(cuts, np.clip([low, high], cuts[0], cuts[-1]))
     return slice(2 * int(first), 2 * int(last) + 1)

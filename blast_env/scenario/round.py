@@ -6,8 +6,8 @@
     centre_m = [12.0, 8.0]
     diameter_m = 2.0
 
-A scenario has them as rectangles of modules, one building each: the modules whose middles are in
-the circle. So engines, placement, pictures and exports know nothing of circles.
+In a scenario each is a building of rectangles of modules: the modules with centres in the circle.
+So engines, placement, pictures and exports need no circles.
 """
 
 import re
@@ -27,7 +27,7 @@ from blast_env.units import MODULE_SIDE_M
 
 KIND: Final = "round"
 
-_MOST_NAME: Final = 36  # names have 40 characters, and parts a number more
+_MOST_NAME: Final = 36  # of the 40 characters of a name; parts add a number
 _OF_RECTANGLES: Final = ("corner_m", "rows", "columns", "side_modules")
 _INDEX: Final = re.compile(r"\bstructures\[(\d+)\]")
 
@@ -39,12 +39,12 @@ def _check_name(name: str) -> str:
 
 
 class RoundSection(Section):
-    """What makes a structure round; its other keys are those of every structure.
+    """The keys of a round structure; further keys are those of every structure.
 
     Attributes:
-        name: Name of the building, and of its only rectangle where there is but one.
-        centre_m: Its middle.
-        diameter_m: Its diameter; as many whole modules stand for it as come nearest.
+        name: Name of the building, and of its rectangle if there is only one.
+        centre_m: Its centre.
+        diameter_m: Its diameter, which is rounded to whole modules.
     """
 
     kind: Literal["round"]
@@ -54,14 +54,14 @@ class RoundSection(Section):
 
     @property
     def width_m(self) -> float:
-        """Its diameter in whole modules."""
+        """Its diameter rounded to whole modules, m."""
         return MODULE_SIDE_M * max(1, round(self.diameter_m / MODULE_SIDE_M))
 
     def parts(self, others: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return its rectangles as tables of a file, which together weigh as much as one.
+        """Return its rectangles as tables of a file, with the weight of one structure in total.
 
         Args:
-            others: What is written of it beside the keys above.
+            others: Its further keys.
         """
         rectangles, walls = disc(round(self.width_m / MODULE_SIDE_M))
         corner_m = [round(each - 0.5 * self.width_m, 9) for each in self.centre_m]
@@ -87,7 +87,7 @@ class RoundSection(Section):
 
 
 def disc(side: int) -> tuple[IntArray, list[int]]:
-    """Return a disc as rectangles of modules, and how many sides of modules of each look out.
+    """Return a disc as rectangles of modules (n, 4), and the number of exposed sides of each.
 
     Args:
         side: Its diameter in modules.
@@ -110,13 +110,13 @@ def disc(side: int) -> tuple[IntArray, list[int]]:
 
 @dataclass(frozen=True)
 class WithoutRound:
-    """A parsed scenario file in which rectangles stand for what is round.
+    """A parsed scenario file with rectangles in place of round structures.
 
     Attributes:
         document: The file.
-        problems: What is wrong with round structures; those stand as they were written.
-        origin: Which structure of the file each structure is, or is a part of.
-        unsound: The structures with these problems, by their index.
+        problems: Problems of round structures, which are left unchanged in `document`.
+        origin: Index in the file of each structure, or of the structure of which it is a part.
+        unsound: Indices of the structures with these problems.
     """
 
     document: Mapping[str, Any]
@@ -126,7 +126,7 @@ class WithoutRound:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> "WithoutRound":
-        """Return what a file says without a circle."""
+        """Return a file with its round structures replaced."""
         listed = document.get("structures")
         is_new = document.get("schema_version") != FIRST_VERSION
         if not isinstance(listed, list | tuple) or not any(map(_is_round, listed)):
@@ -156,7 +156,7 @@ class WithoutRound:
         return cls(changed, tuple(problems), tuple(origin), unsound)
 
     def as_written(self, problems: tuple[Problem, ...]) -> tuple[Problem, ...]:
-        """Return problems with the keys of the file, and those of round structures first."""
+        """Return problems with the keys of the file, those of round structures first."""
         if self.origin is None:
             return problems
         own = [
@@ -183,7 +183,7 @@ def _is_round(table: Any) -> bool:
 def _parts_of(
     table: Mapping[str, Any], index: int
 ) -> tuple[list[Mapping[str, Any]], tuple[Problem, ...]]:
-    """Return the rectangles of a round structure, or itself and what is wrong with it."""
+    """Return the rectangles of a round structure, or the structure itself and its problems."""
     where = ("structures", index)
     own = {key: value for key, value in table.items() if key in RoundSection.model_fields}
     problems = tuple(
@@ -207,7 +207,7 @@ def _parts_of(
 
 
 def _with_parts_named(zone: Mapping[str, Any], names: Mapping[str, list[str]]) -> dict[str, Any]:
-    """Return a build zone whose measures name the rectangles of what is round."""
+    """Return a build zone with the rectangles of round structures named in its measures."""
     changed = dict(zone)
     for key in ("removable", "hardening"):
         if isinstance(measures := zone.get(key), list | tuple):

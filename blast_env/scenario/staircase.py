@@ -1,8 +1,8 @@
 """Oblique walls: sides of buildings of several parts that are staircases of modules.
 
-Seen from one side, the first modules of a plan are a profile. A part of it is an oblique wall where
-a straight line passes all its modules within one of them, as a line does that was drawn with
-modules. Lines steeper than 45 degrees are found from the next side.
+Seen from one side, the first modules of a plan form a profile. A run of the profile is an oblique
+wall if a straight line passes within one module of all its modules. Lines steeper than 45 degrees
+are found from the adjacent side.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,7 +18,7 @@ from blast_env.scenario.sections import AnyStructure, buildings_of
 from blast_env.units import MODULE_SIDE_M
 
 LEAST_STEPS: Final = 3
-"""A wall of fewer steps is not oblique."""
+"""Least steps of an oblique wall."""
 
 STEPPED: Final = (
     "an oblique wall is a staircase of modules: its loads are those along its own normal, with"
@@ -42,8 +42,8 @@ class ObliqueWall:
     Attributes:
         building: Name of the building.
         corner_m: Lower left corner of the building's plan.
-        normal: Its own normal in plan, out of the building, of length 1.
-        edges: The sides of modules that it is made of.
+        normal: Unit normal in plan, out of the building.
+        edges: The sides of modules that form it.
     """
 
     building: str
@@ -56,7 +56,7 @@ def oblique_walls(structures: Iterable[AnyStructure]) -> tuple[ObliqueWall, ...]
     """Return the oblique walls of buildings.
 
     Args:
-        structures: The structures; those of one building are looked at together, in plan.
+        structures: The structures; those of one building are combined in plan.
     """
     return tuple(
         wall
@@ -84,7 +84,7 @@ def _walls_of(building: str, parts: list[Rectangle]) -> Iterator[ObliqueWall]:
 
 
 def _modules(parts: list[Rectangle], around: Rectangle) -> BoolArray:
-    """Return which modules the parts of a building fill (rows, columns)."""
+    """Return whether the parts of a building fill each module (rows, columns)."""
 
     def modules(length_m: float) -> int:
         return round(length_m / MODULE_SIDE_M)
@@ -102,11 +102,11 @@ class _Side:
     """A plan seen from one side, turned so that this is the left one.
 
     Attributes:
-        filled: Which modules are filled (rows, columns).
+        filled: Whether each module is filled (rows, columns).
         place: Row and column of each module in the plan (rows, columns, 2).
-        front: The wall that looks to this side.
-        up: The wall that looks to higher rows.
-        down: The wall that looks to lower ones.
+        front: The wall that faces this side.
+        up: The wall that faces higher rows.
+        down: The wall that faces lower rows.
         outwards: Direction in plan, x and y, of lower columns.
         upwards: Direction in plan of higher rows.
     """
@@ -120,7 +120,7 @@ class _Side:
     upwards: tuple[int, int]
 
     def oblique(self) -> Iterator[tuple[tuple[float, float], frozenset[Edge]]]:
-        """Yield normal and edges of what is oblique, up to 45 degrees."""
+        """Yield normal and edges of each oblique wall, up to 45 degrees."""
         rows = np.flatnonzero(self.filled.any(axis=1))
         if not (np.diff(rows) == 1).all():
             return
@@ -152,7 +152,7 @@ class _Side:
 
 
 def _sides(filled: BoolArray) -> tuple[_Side, ...]:
-    """Return a plan as it is seen from the west, the east, the south and the north."""
+    """Return a plan seen from the west, the east, the south and the north."""
     place = np.moveaxis(np.indices(filled.shape), 0, -1)
     over, other = filled.T, place.transpose(1, 0, 2)
     return (
@@ -164,9 +164,9 @@ def _sides(filled: BoolArray) -> tuple[_Side, ...]:
 
 
 def _straight_runs(profile: IntArray) -> Iterator[tuple[int, int, float]]:
-    """Yield first, last and slope of the longest runs of a profile that are a line's modules.
+    """Yield first, last and slope of the longest straight runs of a profile.
 
-    Each begins as early as its last module lets it, so that neighbours overlap.
+    Each is extended backwards as far as it stays straight, so that neighbours overlap.
     """
     last, first = 0, 0
     bounds = (-np.inf, np.inf)
@@ -191,7 +191,7 @@ def _straight_runs(profile: IntArray) -> Iterator[tuple[int, int, float]]:
 def _slopes(
     profile: IntArray, new: int, known: IntArray, bounds: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the slopes of the lines that pass known places and a new one within a module."""
+    """Return the bounds of the slopes of lines within a module of known places and a new one."""
     along = new - known
     across = np.sign(along) * (profile[new] - profile[known])
     low = ((across - 1) / np.abs(along)).max()

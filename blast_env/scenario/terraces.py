@@ -1,4 +1,4 @@
-"""Raised ground: terraces and podiums, on whose tops barriers and other structures stand."""
+"""Raised ground: terraces and podiums that carry barriers and other structures."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -12,7 +12,7 @@ from blast_env.scenario.sections import AnyStructure
 
 
 def terrace_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem]:
-    """Yield what keeps structures from carrying barriers: each is solid, and has a top."""
+    """Yield the problems of terraces, each of which must be solid and have a height."""
     for index, each in structures.items():
         if each.carries and each.height_m is None:
             message = "is true, needs the structure's height_m: barriers stand on its top"
@@ -23,7 +23,7 @@ def terrace_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem
 
 
 def ground_m(structures: Iterable[AnyStructure], boxes: Boxes) -> FloatArray:
-    """Return how high the ground below squares is, m: the highest terrace that each overlaps."""
+    """Return the height of the ground below squares, m: the highest terrace that each overlaps."""
     return _highest(_terraces(structures), boxes)
 
 
@@ -36,7 +36,7 @@ def _highest(terraces: Iterable[tuple[Rectangle, float]], boxes: Boxes) -> Float
 
 
 def ground_below_m(structures: Iterable[AnyStructure], rectangle_m: Rectangle) -> float:
-    """Return how high the ground below one rectangle is, m; 0 beside all terraces."""
+    """Return the height of the ground below one rectangle, m; 0 beside all terraces."""
     own_m = (high_m for plan_m, high_m in _terraces(structures) if plan_m.overlaps(rectangle_m))
     return max(own_m, default=0.0)
 
@@ -44,7 +44,7 @@ def ground_below_m(structures: Iterable[AnyStructure], rectangle_m: Rectangle) -
 def levels_of(
     structures: Iterable[AnyStructure], rectangle_m: Rectangle
 ) -> dict[float, list[Rectangle]]:
-    """Return a rectangle cut where the ground below it changes its height, by that height, m."""
+    """Return the parts of a rectangle by the height of the ground below them, m."""
     terraces = [each for each in _terraces(structures) if each[0].overlaps(rectangle_m)]
     left, bottom, right, top = rectangle_m
     plans = [each for each, _ in terraces]
@@ -64,7 +64,7 @@ def levels_of(
 def lie_wholly_on(
     structures: Iterable[AnyStructure], height_m: float | None, boxes: Boxes
 ) -> BoolArray:
-    """Return which squares are covered without a gap by terraces of one height."""
+    """Return whether terraces of one height cover each square without a gap."""
     left, bottom, right, top = boxes
     open_m2 = (right - left) * (top - bottom)
     for terrace_m, top_m in _terraces(structures):
@@ -75,7 +75,7 @@ def lie_wholly_on(
 
 
 def is_open_below(structure: AnyStructure, structures: Iterable[AnyStructure]) -> bool:
-    """Return whether a structure begins above the ground, and on no terrace either."""
+    """Return whether there is air below a structure: it is not on the ground or on a terrace."""
     boxes = _as_boxes(structure.rectangle_m)
     return structure.base_m > 0.0 and not lie_wholly_on(structures, structure.base_m, boxes).all()
 

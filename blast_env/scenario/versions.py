@@ -1,4 +1,4 @@
-"""Versions of the file format: which keys are new, and which version holds a scenario."""
+"""Versions of the file format: newer keys, and the lowest version that holds a scenario."""
 
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final
@@ -12,7 +12,7 @@ SCHEMA_VERSION: Final = 2
 """The newest version of the file format; this release reads all of them."""
 
 FIRST_VERSION: Final = 1
-"""The version without heights, in which every wall is as high as the air."""
+"""The first version, without heights: every wall is as high as the air."""
 
 NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "": ("gauges", "objective", "georeference", "components"),
@@ -25,7 +25,7 @@ NEW_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "build_zone": ("height_m", "items", "hardening", "removable"),
     "build_zone.access_way": ("gate",),
 }
-"""What version 2 added, by section; all of it has a default, which is what version 1 means."""
+"""Keys that version 2 added, by section; their defaults have the meaning of version 1."""
 
 NEW_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "charge": ("vehicle",),
@@ -34,7 +34,7 @@ NEW_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
 """Kinds of sections that version 2 added."""
 
 MAX_ITEMS: Final = 100
-"""Longer arrays are errors of their own; their other items are not looked at."""
+"""Most items of an array that are examined; longer arrays are errors anyway."""
 
 
 def check_version(version: int) -> int:
@@ -47,10 +47,10 @@ def check_version(version: int) -> int:
 
 
 def version_problems(content: Any) -> Iterator[Problem]:
-    """Yield the keys that the version of a file does not have.
+    """Yield the problems of keys and kinds that the version of a file does not have.
 
     Args:
-        content: The parsed file, sound or not, or the scenario made from it.
+        content: The parsed file, valid or not, or the scenario made from it.
     """
     version = _item(content, "schema_version")
     if isinstance(version, bool) or version != FIRST_VERSION:
@@ -73,7 +73,7 @@ def version_problems(content: Any) -> Iterator[Problem]:
 
 
 def unused_new_keys(scenario: BaseModel) -> Iterator[KeyParts]:
-    """Yield the newer keys of a scenario that say no more than if they were not there."""
+    """Yield the newer keys of a scenario that have their default values."""
     for parts, table, keys in _tables(scenario):
         if isinstance(table, BaseModel):
             for key in keys:
@@ -95,7 +95,7 @@ def _is_unused(table: BaseModel, key: str) -> bool:
 
 
 def _tables(content: Any) -> Iterator[tuple[KeyParts, Any, tuple[str, ...]]]:
-    """Yield where a table with newer keys is, the table, and the keys."""
+    """Yield (path of a table with newer keys, the table, the keys)."""
     for name, keys in NEW_KEYS.items():
         path = tuple(name.split(".")) if name else ()
         section = content
@@ -109,7 +109,7 @@ def _tables(content: Any) -> Iterator[tuple[KeyParts, Any, tuple[str, ...]]]:
 
 
 def _new_kinds(content: Any) -> Iterator[tuple[KeyParts, str]]:
-    """Yield where a section of a newer kind is, and the kind."""
+    """Yield (path of a section of a newer kind, the kind)."""
     for name, kinds in NEW_KINDS.items():
         section = _item(content, name)
         if isinstance(section, list | tuple):
@@ -119,12 +119,12 @@ def _new_kinds(content: Any) -> Iterator[tuple[KeyParts, str]]:
 
 
 def _item(table: Any, key: str) -> Any:
-    """Return what a table holds under a key; `None` if it is no table, or has no such key."""
+    """Return the value of a table's key; `None` if it is not a table, or has no such key."""
     return table.get(key) if isinstance(table, Mapping) else getattr(table, key, None)
 
 
 def _given(table: Any) -> Collection[str]:
-    """Return the keys that were written."""
+    """Return the keys that were given."""
     if isinstance(table, Mapping):
         return table.keys()
     return table.model_fields_set if isinstance(table, BaseModel) else ()

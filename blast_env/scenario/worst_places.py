@@ -1,4 +1,7 @@
-"""The worst places of a vehicle's charge: those nearest to a wall that counts."""
+"""The worst places of a vehicle's charge: those nearest to a loaded wall of a protected structure.
+
+A loaded wall is one of the structure's `faces`, whose load counts.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,26 +16,25 @@ from blast_env.physics.scene import Charge, WallName
 from blast_env.scenario.sections import AnyStructure, PointM, VehicleSource
 
 _EQUAL_M: Final = 1e-6
-"""Distances that differ by less are equal."""
+"""Tolerance within which distances are equal."""
 
 _NEAR_M: Final = 1e-3
-"""Places that are further away than the nearest one by more are not the worst."""
+"""Largest excess over the least approximate distance of a candidate for the worst place."""
 
 
 @dataclass(frozen=True)
 class WorstPlaces:
-    """Where the charge of a vehicle goes off, the worst place first.
+    """The worst places of a vehicle's charge, in order.
 
-    The first is the place nearest to a wall that counts of a protected structure; each further one
-    is the nearest of those that are at least `VehicleSource.least_apart_m` away from all before it.
-    The charge being the same everywhere, that is the order of the scaled distances. Of places that
-    are as near, the one nearer to the middle of that wall comes first, then the one further to the
-    left, then the lower one.
+    The first is the place nearest to a loaded wall; each further one is the nearest of those at
+    least `VehicleSource.least_apart_m` from all before it. Since the charge is the same everywhere,
+    this is also the order of scaled distances. Among equally near places the one nearest to the
+    middle of its wall comes first, then the leftmost, then the lowest.
 
     Attributes:
         source: The vehicle.
-        places_m: The places, at most `VehicleSource.places`, at least one.
-        distances_m: How far each is from that wall.
+        places_m: The places, at least one and at most `VehicleSource.places`.
+        distances_m: Distance of each place from the nearest loaded wall.
     """
 
     source: VehicleSource
@@ -41,11 +43,11 @@ class WorstPlaces:
 
     @property
     def stand_off_m(self) -> float:
-        """How near the vehicle's centre gets to a protected structure."""
+        """Least distance of the vehicle's centre from a loaded wall."""
         return self.distances_m[0]
 
     def charge(self, rank: int) -> Charge:
-        """Return the charge at a place; where there are no more of them, from the worst one on."""
+        """Return the charge at a place by rank from 0; ranks wrap around at the last place."""
         place_m = self.places_m[rank % len(self.places_m)]
         return Charge(place_m, self.source.tnt_kg, self.source.height_m)
 
@@ -57,7 +59,7 @@ def worst_of(
 
     Args:
         source: The vehicle.
-        places_m: Places where its charge may go off, at least one (places, 2).
+        places_m: Possible places of its charge, at least one (places, 2).
         structures: The structures.
     """
     rough_m = _rough_distance_m(places_m, structures)
@@ -65,7 +67,7 @@ def worst_of(
     chosen: list[PointM] = []
     distances_m: list[float] = []
     while left.any() and len(chosen) < source.places:
-        # Only of the nearest ones is the rest asked. Their order stays: by y, then by x.
+        # Only the nearest are compared exactly; they stay ordered by y, then by x.
         near = np.flatnonzero(left & (rough_m <= rough_m[left].min() + _NEAR_M))
         distance_m, middle_m = nearest_wall(places_m[near], structures)
         best = np.arange(len(near))
@@ -82,7 +84,7 @@ def worst_of(
 
 
 def _rough_distance_m(places_m: FloatArray, structures: Iterable[AnyStructure]) -> FloatArray:
-    """Return the distance of `nearest_wall`, but for rounding (places,)."""
+    """Return the distance of `nearest_wall` up to rounding (places,)."""
     x_m, y_m = np.ascontiguousarray(places_m.T)
     square_m2 = np.full(len(places_m), np.inf)
     for structure in structures:
@@ -95,13 +97,13 @@ def _rough_distance_m(places_m: FloatArray, structures: Iterable[AnyStructure]) 
 
 
 def stand_off_m(structures: Iterable[AnyStructure], position_m: PointM) -> float:
-    """Return how far a place is from the nearest wall that counts of a protected structure."""
+    """Return the distance of a place from the nearest loaded wall, m."""
     distances_m, _ = nearest_wall(np.array([position_m]), structures)
     return float(distances_m[0])
 
 
 def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> PointM:
-    """Return the point of the walls that count of protected structures that is nearest to a place.
+    """Return the point of the loaded walls nearest to a place.
 
     Raises:
         ValueError: If no structure is protected.
@@ -118,11 +120,11 @@ def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> P
 def nearest_wall(
     places_m: FloatArray, structures: Iterable[AnyStructure]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return how far places are from the nearest wall that counts, and from its middle.
+    """Return the distance of places from the nearest loaded wall, and from its middle, m.
 
     Args:
         places_m: The places (places, 2).
-        structures: Of them, the protected ones count.
+        structures: The structures, of which the protected ones count.
     """
     nearest_m, middle_m, most_m = np.full((3, len(places_m)), np.inf)
     x_m, y_m = np.ascontiguousarray(places_m.T)
@@ -137,7 +139,7 @@ def nearest_wall(
 
     for structure in protected:
         left, bottom, right, top = structure.rectangle_m
-        # No wall is further away than this from what is nearest to it.
+        # No wall of the structure is farther from a place than this.
         diagonal_m = hypot(right - left, top - bottom) + 2.0 * _EQUAL_M
         np.minimum(most_m, least_m(structure) + diagonal_m, out=most_m)
     for structure in protected:
@@ -151,7 +153,7 @@ def nearest_wall(
 def _nearer_wall(
     places_m: FloatArray, structure: AnyStructure, nearest_m: FloatArray, middle_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return `_nearest_wall` of what was nearest so far, and of one more structure."""
+    """Return both distances of `nearest_wall`, updated with one more structure."""
     x_m, y_m = places_m.T
     for left, bottom, right, top in _walls(structure):
         across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
@@ -168,7 +170,7 @@ def _nearer_wall(
 
 
 def _walls(structure: AnyStructure) -> Iterator[Rectangle]:
-    """Yield the walls whose load counts, as rectangles without a width."""
+    """Yield the loaded walls as rectangles of width 0."""
     left, bottom, right, top = structure.rectangle_m
     sides: dict[WallName, Rectangle] = {
         "west": Rectangle(left, bottom, left, top),

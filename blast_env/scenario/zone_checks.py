@@ -1,4 +1,4 @@
-"""Checks of a build zone: its catalogue and its areas, and whether anything can be built in it."""
+"""Checks of a build zone: its catalogue, its areas, and the existence of a legal place."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -20,11 +20,11 @@ from blast_env.scenario.zone import (
 from blast_env.units import MODULE_SIDE_M
 
 MOST_PLACES: Final = 10_000_000
-"""Of all items, on each cell, turned or not: what is known of each takes some ten bytes."""
+"""Most places: cells times variants, each of which takes some ten bytes."""
 
 
 def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
-    """Yield what is wrong with a build zone, its areas and what stands around it."""
+    """Yield the problems of a build zone, its areas and its surroundings."""
     zone = surroundings.zone
     yield from _area_problems(zone)
     yield from _key_problems(zone)
@@ -59,7 +59,7 @@ def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
 
 
 def _area_problems(zone: BuildZone) -> Iterator[Problem]:
-    """Check that keep-outs and cost areas have something to do with the zone."""
+    """Check that keep-outs and cost areas overlap the zone."""
     listed: dict[str, Sequence[Area]] = {"keep_outs": zone.keep_outs, "cost_areas": zone.cost_areas}
     for key, areas in listed.items():
         for index, area in enumerate(areas):
@@ -70,7 +70,7 @@ def _area_problems(zone: BuildZone) -> Iterator[Problem]:
 
 
 def _key_problems(zone: BuildZone) -> Iterator[Problem]:
-    """Check that costs and heights are said where they count: of modules, or of items."""
+    """Check that costs and heights are given for modules or for items, whichever the zone has."""
     for index, area in enumerate(zone.cost_areas):
         here = f"build_zone.cost_areas[{index}]"
         needed, other = ("module_cost", "cost_factor")[:: -1 if zone.items else 1]
@@ -96,7 +96,7 @@ def _key_problems(zone: BuildZone) -> Iterator[Problem]:
 
 
 def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
-    """Check the names of the items, that they are in stock, and that each fits somewhere."""
+    """Check that items and measures have unique names, and that items are in stock and fit."""
     places = [f"build_zone.items[{index}]" for index in range(len(zone.items))]
     places += [f"build_zone.hardening[{index}]" for index in range(len(zone.hardening))]
     places += [f"build_zone.removable[{index}]" for index in range(len(zone.removable))]
@@ -130,7 +130,7 @@ def _item_problems(zone: BuildZone, cells: EmptyZone) -> Iterator[Problem]:
 
 
 def _closing(zone: BuildZone, way: AccessWay, cells: EmptyZone) -> BoolArray:
-    """Return from where each variant alone would close the way; nothing if it is too wide."""
+    """Return whether each variant alone would close the way; none if the way is too wide."""
     if way.width_cells > min(zone.shape):
         return np.zeros_like(cells.fits)
     return np.stack([*closing_places(way, cells.passable, cells.catalogue.variants)])
@@ -139,7 +139,7 @@ def _closing(zone: BuildZone, way: AccessWay, cells: EmptyZone) -> BoolArray:
 def _access_way_problem(
     zone: BuildZone, way: AccessWay, passable: BoolArray, available: BoolArray, closing: BoolArray
 ) -> Problem | None:
-    """Return why the access way and the zone do not fit each other, or `None` if they do."""
+    """Return the problem between access way and zone, or `None`."""
     widest_m = min(zone.shape) * MODULE_SIDE_M
     if way.width_m > widest_m:
         message = f"is {way.width_m:g}, must be at most {widest_m:g}, the zone's shorter side"
@@ -158,7 +158,7 @@ def _access_way_problem(
 
 
 def _gate_fault(zone: BuildZone, way: AccessWay, gate: Rectangle) -> str | None:
-    """Return what is wrong with the gate of an access way, or `None`."""
+    """Return the fault of an access way's gate, or `None`."""
     if not zone.rectangle_m.contains(gate):
         bound = extent(zone.rectangle_m)
         return f"the gate ({extent(gate)}) must lie inside the build zone ({bound})"
