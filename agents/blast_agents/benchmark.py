@@ -1,4 +1,4 @@
-"""The package's own methods on the problems of the benchmark."""
+"""The methods of the package on the problems of the benchmark."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -13,7 +13,7 @@ from blast_env.problems.problem import shares_of
 
 
 def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
-    """Return the layout that a proposer of the package proposes."""
+    """Return the layout of a proposer, within the budget of a problem."""
     asked = LayoutProblem(problem.evaluator, problem.case, meter=problem.meter)
     result = proposer.propose(asked, problem.budget, seed)
     if result.interrupted:
@@ -22,7 +22,7 @@ def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layou
 
 
 def method_of(proposer: Proposer) -> Method:
-    """Return a proposer of the package as a method that a problem is given to."""
+    """Return a proposer as a method for benchmark problems."""
     return partial(_proposed, proposer)
 
 
@@ -30,8 +30,8 @@ def find_method(name: str) -> Method:
     """Return a method by the name of a proposer, or by `module:object`.
 
     Raises:
-        UnknownNameError: If there is no such proposer.
-        BlastEnvError: If there is no such module or object, or it cannot be called.
+        UnknownNameError: If the proposer is unknown.
+        BlastEnvError: If the module or object does not exist or is not callable.
     """
     if ":" not in name:
         return method_of(find_proposer(name))
@@ -48,13 +48,13 @@ def find_method(name: str) -> Method:
 def reference_of(
     definition: Definition, evaluator: BlastEvaluator, more: Mapping[str, Layout], cell: str
 ) -> ScoreReference:
-    """Return what a problem is scored between.
+    """Return the reference layouts of a problem's score: the best rule and the best known layout.
 
     Args:
         definition: The problem.
         evaluator: Runs the blasts of the comparison.
-        more: Further layouts that are known, by what found them.
-        cell: The side of the evaluator's cells; see `cell_key`.
+        more: Further known layouts, by the name of their source.
+        cell: Side of the evaluator's cells; see `cell_key`.
     """
     rules = layouts_by_rule(definition.scenario, definition.case.charge)
     rules = {name: tuple(sorted(layout)) for name, layout in rules.items()}

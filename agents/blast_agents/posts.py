@@ -25,31 +25,30 @@ from blast_env.scenario.build_scene import worst_places
 from blast_env.units import MODULE_SIDE_M
 
 _TOLERANCE: Final = 1e-6
-"""Of lengths in modules, and of scaled distances."""
+"""Tolerance of lengths in modules, and of scaled distances in m / kg^(1/3)."""
 
 
 def line_of_posts(
     scenario: AnyScenario,
     charge: AnyCharge | None = None,  # noqa: ARG001
 ) -> Layout:
-    """Return a line of posts that keeps vehicles as far away as the stock reaches.
+    """Return the line of posts with the largest stand-off distance of vehicles within the stock.
 
-    Tried are straight lines along every row and column of the build zone, from one thing that
-    stops a vehicle to the next, and rings around the protected structures at every distance; each
-    with as few posts as leave no gap that the narrowest vehicle fits through. A post is a module
-    or, with a catalogue, an item that stops vehicles, the same one along a line and with its length
-    along it. The line that keeps the vehicles furthest away, by the least scaled distance of any,
-    is taken, and of several the cheapest. Posts without which it keeps them as far away are left
-    out.
+    Candidates are straight lines along every row and column of the build zone, between obstacles
+    to vehicles, and rings around the protected structures at every distance; each has the fewest
+    posts that leave no gap for the narrowest vehicle. A post is a module or, with a catalogue, an
+    item that stops vehicles, the same one along a line and with its length along it. The line with
+    the largest scaled distance of the nearest vehicle is chosen, and of several the cheapest. Posts
+    that do not increase this distance are removed.
 
-    Every post goes through `Placement`: budget, access way and all other conditions hold.
+    `Placement` checks every post: budget, access way and all other conditions hold.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone and a vehicle.
-        charge: Plays no part: the line is against all vehicles of the scenario.
+        charge: Ignored: the line is against all vehicles of the scenario.
 
     Returns:
-        The posts; none if no line keeps the vehicles any further away.
+        The posts; none if no line increases the distance.
 
     Raises:
         BlastEnvError: If the scenario has no build zone or no vehicle.
@@ -61,10 +60,10 @@ def posts_and_wall(
     scenario: AnyScenario,
     charge: AnyCharge | None = None,  # noqa: ARG001
 ) -> Layout:
-    """Return the line of posts, and what is left of the stock as a wall behind it.
+    """Return the line of posts, with a wall of the remaining stock behind it.
 
-    The wall stands across the line of sight from the worst place that the posts leave a vehicle to
-    the protected structures, as near to that place as it can; see `line_of_sight_wall`.
+    The wall crosses the line of sight from the worst place within a vehicle's reach to the
+    protected structures, as near to that place as possible; see `line_of_sight_wall`.
 
     Args:
         scenario: As for `line_of_posts`.
@@ -82,7 +81,7 @@ def posts_and_wall(
 
 @dataclass(frozen=True, eq=False)
 class _TheVery:
-    """A scenario as a key: equal to no other one, for to compare two takes long."""
+    """A scenario as a cache key, compared by identity, because comparison by value is slow."""
 
     scenario: Scenario
 
@@ -95,7 +94,7 @@ class _TheVery:
 
 @lru_cache(maxsize=4)
 def _line_on(very: _TheVery) -> Placement:
-    """Return the line of posts of a scenario, which two rules need."""
+    """Return the line of posts of a scenario, cached for the two rules that need it."""
     scenario = very.scenario
     scenario.zone  # noqa: B018  # refuses a scenario without one
     if not scenario.vehicles:
@@ -120,11 +119,11 @@ def _line_on(very: _TheVery) -> Placement:
 
 
 Line = tuple[tuple[Cell, ...], ...]
-"""Straight runs of squares in the build zone's grid, from end to end, also beyond the zone."""
+"""Straight runs of squares in the build zone's grid, continued beyond the zone."""
 
 
 class _Post(NamedTuple):
-    """What stands along a run: the number of its variant, and its length in modules."""
+    """A post along a run: the number of its variant, and its length in modules."""
 
     variant: int
     length: int
@@ -138,17 +137,17 @@ class _Vehicles:
 
     @staticmethod
     def scaled_m(scenario: Scenario, source: VehicleSource, layout: Layout) -> float:
-        """Return how near a vehicle comes, m / kg^(1/3)."""
+        """Return the scaled distance of a vehicle at its worst place, m / kg^(1/3)."""
         distance_m = worst_places(scenario, source, layout).stand_off_m
         return float(distance_m / np.cbrt(source.tnt_kg))
 
     def farthest(self, placement: Placement, without_speed: bool = False) -> float:
-        """Return the least scaled distance at which any vehicle is kept, m / kg^(1/3).
+        """Return the least scaled distance of all vehicles, m / kg^(1/3).
 
         Args:
-            placement: What stands.
-            without_speed: Whether every piece with a crash rating counts as one that holds, which
-                is soon known, and no less than the distance.
+            placement: The placement.
+            without_speed: Whether all crash-rated pieces count as holding, which is a fast upper
+                bound.
         """
         sources = self.scenario.vehicles
         if without_speed:
@@ -157,7 +156,7 @@ class _Vehicles:
 
     @cached_property
     def _empty(self) -> Placement:
-        """The placement of nothing."""
+        """The empty placement."""
         return Placement.empty(self.scenario)
 
     @cached_property
@@ -178,7 +177,7 @@ class _Vehicles:
 
     @cached_property
     def closed(self) -> BoolArray:
-        """Which squares of the span something closes to every vehicle (rows, columns)."""
+        """Mask of the squares of the span that are closed to every vehicle (rows, columns)."""
         rows, columns = self.span
         closed = np.ones((len(rows), len(columns)), dtype=bool)
         for source in self.scenario.vehicles:
@@ -189,7 +188,7 @@ class _Vehicles:
         return closed
 
     def lines(self) -> Iterator[Line]:
-        """Yield straight lines, then rings from the nearest on."""
+        """Yield straight lines, then rings from the innermost outwards."""
         rows, columns = self.span
         zone = self.scenario.zone
         for row in range(zone.rows):
@@ -202,16 +201,16 @@ class _Vehicles:
             yield self._ring(around.grown(steps * MODULE_SIDE_M))
 
     def items(self) -> list[int]:
-        """Return the numbers of the items that stop vehicles, or that of the single module."""
+        """Return the indices of the items that stop vehicles, or that of the single module."""
         variants = self._empty.catalogue.variants
         return sorted({each.item for each in variants if each.stops_vehicles})
 
     def with_posts(self, line: Line, item: int) -> Placement | None:
-        """Return as few posts as close a line, or `None` if they do not."""
+        """Return the placement of the fewest posts that close a line, or `None` if none do."""
         placement = self._empty
         for run in line:
             post = self._along(item, run)
-            end = 0  # of what closes the run so far
+            end = 0  # of the closed part of the run
             for index in self._closed_along(run, placement):
                 while index - end >= self.width - _TOLERANCE:
                     latest = min(ceil(end + self.width - _TOLERANCE) - 1, index - post.length)
@@ -227,7 +226,7 @@ class _Vehicles:
         return placement
 
     def without_idle_posts(self, placement: Placement) -> Placement:
-        """Return the placement without posts that keep no vehicle any further away."""
+        """Return the placement without posts that do not increase the least scaled distance."""
         farthest = self.farthest(placement)
         for post in placement.layout:
             fewer = tuple(each for each in placement.layout if each != post)
@@ -242,7 +241,7 @@ class _Vehicles:
         return min(each.width_m for each in self.scenario.vehicles) / MODULE_SIDE_M
 
     def _along(self, item: int, run: tuple[Cell, ...]) -> "_Post":
-        """Return an item with as much of its length along a run as it may have."""
+        """Return the variant of an item with the largest length along a run."""
         is_row = run[0][0] == run[-1][0]
         variants = self._empty.catalogue.variants
         posts = [
@@ -253,24 +252,24 @@ class _Vehicles:
         return max(posts, key=lambda post: post.length)
 
     def _is_legal(self, post: _Post, placement: Placement, cell: Cell) -> bool:
-        """Whether a post may be set down now with its first module there."""
+        """Return whether a post may be placed with its first module on a cell."""
         on_empty = self.scenario.zone.has(cell) and self._empty.legal[post.variant, *cell]
-        if not on_empty:  # nor may it beside anything else
+        if not on_empty:  # then neither on any other placement
             return False
-        # One answer, not the mask of all actions: on a large zone that takes a thousand times less.
+        # A single check, which on a large zone is a thousand times faster than the whole mask.
         return placement.explain(placement.catalogue.element_at(post.variant, *cell)) is None
 
     def _closed_along(self, run: tuple[Cell, ...], placement: Placement) -> list[int]:
-        """Return where something closes a run to every vehicle, and its end."""
+        """Return the indices of a run's squares closed to every vehicle, and the run's length."""
         rows, columns = self.span
         row, column = np.transpose(run)
         closed = self.closed[row - rows.start, column - columns.start]
-        if placement.layout:  # of another run, which may cross this one
+        if placement.layout:  # posts of another run, which may cross this one
             closed |= [cell in placement.cells for cell in run]
         return [*np.flatnonzero(closed).tolist(), len(run)]
 
     def _ring(self, inner_m: Rectangle) -> Line:
-        """Return the runs of squares just outside of a rectangle, where there are any."""
+        """Return the runs of squares directly outside a rectangle, within the span."""
         rows, columns = self.span
         vertical, horizontal = self._squares(inner_m)
         low, high = vertical.start + rows.start - 1, vertical.stop + rows.start

@@ -1,4 +1,4 @@
-"""What the package proposes for a site: `blast_env.propose` and `blast_env.search`."""
+"""The proposals of the package for a site: `blast_env.propose` and `blast_env.search`."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,25 +23,25 @@ if TYPE_CHECKING:  # half a second to import
     from blast_agents.surrogate.search import Guesses
 
 HIDDEN_THREATS: Final = 8
-"""Threats that layouts meet where the charge is not known."""
+"""Number of threats for an unknown charge."""
 
 LEAST_GAIN: Final = 0.03
-"""Share of the load that a layout must be expected to take off; otherwise nothing is proposed."""
+"""Least predicted relative reduction of the load by a layout; otherwise nothing is proposed."""
 
 LEAST_PIECE_GAIN: Final = 0.001
-"""Share of the load that a piece must be expected to take off; otherwise it is left out."""
+"""Least predicted relative reduction of the load by a piece; otherwise it is omitted."""
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A proposer that was chosen for a site.
+    """The proposer for a site.
 
     Attributes:
         proposer: The proposer.
-        by: What it goes by, in words.
-        budget: Blasts that it takes to do all that it can.
-        source: What repeats the proposal: which weights, surrogate or rules.
-        is_guessed: Whether the surrogate's guesses choose.
+        by: Description of its basis.
+        budget: Blasts that it needs at most.
+        source: Identification of the weights, surrogate or rules, for the reproduction.
+        is_guessed: Whether predictions of the surrogate select the layout.
     """
 
     proposer: Proposer
@@ -57,20 +57,21 @@ class Chosen:
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
-        """Return the layout, what it is expected to gain, and in `by` what it comes from.
+        """Return the layout, its predicted gain, and its source in `by`.
 
-        It is empty where nothing is expected to gain `LEAST_GAIN`, by blasts or by guesses. What
-        guesses choose is held against the layouts of the rules: see `worth_its_pieces`. Weights
-        were judged on their site by gas dynamics: no rule takes their place by a guess.
+        The layout is empty if the gain, by blasts or predictions, is below `LEAST_GAIN`. A layout
+        selected by predictions is compared with those of the rules: see `worth_its_pieces`. Trained
+        weights were judged on their site by gas dynamics, so predictions never replace their
+        layout by a rule's.
 
         Args:
-            problem: What is asked.
-            budget: Most blasts, where it takes some.
-            seed: Decides what is drawn.
-            report: Is told how far it has come.
+            problem: The problem.
+            budget: Largest number of blasts, for proposers that need some.
+            seed: Seed of all random draws.
+            report: Called with the progress.
 
         Raises:
-            KeyboardInterrupt: If it was interrupted: the best of some rules is no proposal.
+            KeyboardInterrupt: If it was interrupted: the best of some rules is not a proposal.
         """
         blasts = self.budget if budget is None else min(budget, self.budget)
         result = self.proposer.propose(problem, blasts, seed, report)
@@ -79,7 +80,7 @@ class Chosen:
         layout, by = result.layout, self.by
         gain: float | None = None
         rules = layouts_by_rule(problem.scenario, problem.told)
-        if self.budget:  # which rule is it?
+        if self.budget:  # name the rule
             by = f"{by}: {next(name for name, each in rules.items() if each == layout)}"
             gain = problem.reduction(result.history[-1])
         elif problem.scenario.zone.items:
@@ -99,7 +100,7 @@ class Chosen:
 
 
 def _guesses(problem: LayoutProblem) -> "Guesses":
-    # Here, because it takes half a second to import.
+    # Imported here because the import takes half a second.
     from blast_agents.surrogate import packaged_surrogate
     from blast_agents.surrogate.search import Guesses, case_for
 
@@ -107,14 +108,14 @@ def _guesses(problem: LayoutProblem) -> "Guesses":
 
 
 def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]) -> Layout:
-    """Return a layout without the pieces that bring nothing.
+    """Return a layout without useless pieces, or that of a better rule.
 
-    Where a rule's layout is better by the same guesses, it takes the place of the layout. Each
-    piece that takes off less than `LEAST_PIECE_GAIN` goes, those that bring least first, as long as
-    the rest is not worse than the best rule's layout and gains `LEAST_GAIN`.
+    A rule's layout with a better prediction replaces the layout. Each piece that reduces the load
+    by less than `LEAST_PIECE_GAIN` is then removed, the least useful first, as long as the rest is
+    not worse than the best rule's layout and gains `LEAST_GAIN`.
 
     Args:
-        guesses: What a layout is worth.
+        guesses: Predicted loads of layouts.
         layout: The layout.
         rules: The layouts of the rules.
     """
@@ -131,7 +132,7 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
     def without(piece: Element) -> Layout:
         return tuple(each for each in best if each != piece)
 
-    # A wall that is taken away stays away: something may stand in its place.
+    # Removed walls stay removed, because pieces may stand in their place.
     pieces = [each for each in best if not isinstance(each, Removal)]
     guesses.loads([without(piece) for piece in pieces])  # all at once
     for piece in sorted(pieces, key=lambda each: load(without(each))):
@@ -142,15 +143,15 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
 
 
 def chosen_for(problem: LayoutProblem) -> Chosen:
-    """Return what the package proposes by for a case: the first of these that can.
+    """Return the proposer of the package for a case: the first applicable one of these.
 
-    1. Weights that were trained for the very scenario, where some come with the package.
-    2. The surrogate, which was fitted to generated sites, where there is a catalogue. On generated
-       sites it is better than the weights for all of them.
-    3. The best rule by gas dynamics: a blast for each rule and threat.
+    1. The bundled weights that were trained for the scenario.
+    2. The surrogate, which was fitted to generated sites, for a scenario with a catalogue. On
+       generated sites it is better than the weights trained for them.
+    3. The best rule by gas dynamics, with one blast per rule and threat.
     """
     scenario = problem.scenario
-    # Here, because torch and the surrogate take seconds to import, and torch is an extra.
+    # Imported here because torch is an extra, and torch and the surrogate take seconds to import.
     with import_extra("agents", "proposals by trained weights"):
         from blast_agents.surrogate import LearntSearch, packaged_surrogate, search_by
         from blast_agents.training.packaged import packaged_agent
@@ -171,14 +172,14 @@ def chosen_for(problem: LayoutProblem) -> Chosen:
 
 @dataclass(frozen=True)
 class PackageProposer:
-    """Proposes what the package thinks best for a site; see `chosen_for`."""
+    """Proposes the package's best layout for a site; see `chosen_for`."""
 
     name: str = "package"
 
     def propose(
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the layout, and in `by` what it comes from; only the best rule takes blasts."""
+        """Return the layout, with its source in `by`; only the best rule needs blasts."""
         found = chosen_for(problem).propose(problem, budget, seed, report)
         return replace(found, budget=budget)
 
@@ -192,21 +193,20 @@ def propose(
 ) -> SearchResult:
     """Return the layout that the package proposes for a site.
 
-    That takes seconds, but blasts for each rule, some minutes, where single modules are placed and
-    no weights were trained for the scenario; see `chosen_for`.
+    This takes seconds; for a scenario without a catalogue and without bundled weights it takes
+    minutes, for the blasts of all rules; see `chosen_for`.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
-        charge: Where the charge is, if that is known; otherwise the layout is for all the places
-            where the scenario may have one.
-        processes: Worker processes for blasts, where it takes some.
-        report: Is told how far it has come.
+        charge: The charge, if it is known; otherwise the layout is for all charges of the scenario.
+        processes: Worker processes for blasts, if any.
+        report: Called with the progress.
 
     Returns:
-        The layout, and in `by` what it comes from.
+        The layout, with its source in `by`.
 
     Raises:
-        BlastEnvError: If there is no build zone, or nothing is protected.
+        BlastEnvError: If the scenario has no build zone or no protected structure.
         MissingExtraError: If the extra `agents` is not installed.
     """
     problem = problem_of(scenario, charge, processes)
@@ -232,21 +232,20 @@ def search(
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
         method: One of `blast_agents.search.proposers()`.
-        budget: Most blasts that may be spent; that of the method unless given.
-        charge: Where the charge is, if that is known; otherwise the layout is for all the places
-            where the scenario may have one.
-        threats: Charges that are drawn of one that is not known.
-        seed: Decides everything that is drawn.
-        engine: Name of the engine, or the engine; gas dynamics unless given.
-        cache: Folder in which blasts are kept.
-        initial: Layouts that the search begins with, beside those that it draws.
-        processes: Worker processes; they change nothing but the time.
-        report: Is told how far it has come.
+        budget: Largest number of blasts; by default that of the method.
+        charge: The charge, if it is known; otherwise the layout is for all charges of the scenario.
+        threats: Number of threats to draw for an unknown charge.
+        seed: Seed of all random draws.
+        engine: Name of the engine, or the engine; gas dynamics by default.
+        cache: Folder of stored blasts.
+        initial: Initial layouts of the search, in addition to random ones.
+        processes: Worker processes; results do not depend on their number.
+        report: Called with the progress.
 
     Raises:
-        UnknownNameError: If there is no such method, scenario or engine.
-        BlastEnvError: If there is no build zone, nothing arrives at what is protected, or the
-            method cannot do anything with the budget.
+        UnknownNameError: If the method, scenario or engine is unknown.
+        BlastEnvError: If the scenario has no build zone, nothing arrives at the protected
+            structures, or the method is not applicable to the budget.
     """
     found = find_scenario(scenario)
     evaluator = BlastEvaluator(found, engine, cache=cache)
@@ -267,9 +266,9 @@ def problem_of(
     processes: int = 1,
     engine: str | Engine = JUDGE,
 ) -> LayoutProblem:
-    """Return what a proposal is asked and judged by: gas dynamics, and threats nobody has met.
+    """Return the problem of a proposal and its judgement: by default gas dynamics, unseen threats.
 
-    A charge that has only one place is known, whether it is given or not.
+    A charge with a single possible place is known, whether it is given or not.
     """
     found = find_scenario(scenario)
     only = found.charge[0]

@@ -1,8 +1,8 @@
-"""Layouts by hand: rules of thumb, and random layouts.
+"""Rules of thumb for layouts, and random layouts.
 
-A rule takes a scenario and a charge, and gives a layout without a blast. `None` for the charge: it
-is not known, and the layout is against all places where it may be, or against the middle of them.
-`blast_agents.search.registry` lists the rules.
+A rule returns a layout for a scenario and a charge without a blast. For `None`, an unknown charge,
+the layout is against all possible places, or against their mean. `blast_agents.search.registry`
+lists the rules.
 """
 
 from collections import Counter
@@ -34,18 +34,18 @@ from blast_env.sites import Visibility, visibility_layout
 from blast_env.units import MODULE_SIDE_M
 
 NEAR_CHARGE: Final = 0.0
-"""Share of the way through the build zone at which `wall_near_charge` stands."""
+"""Position of `wall_near_charge`, as a share of the depth of the build zone."""
 
 NEAR_BUILDING: Final = 1.0
-"""Share of the way through the build zone at which `wall_near_building` stands."""
+"""Position of `wall_near_building`, as a share of the depth of the build zone."""
 
 _LEAST_GAIN_M: Final = MODULE_SIDE_M / 2.0
-"""A module that makes the wall wider by less than this would rather thicken it."""
+"""Least widening of a wall by a module; one that adds less mainly thickens the wall."""
 
 _TOLERANCE_M: Final = 1e-9
 
 WallKind = Literal["high", "long"]
-"""What a wall of pieces is built of first: the highest items, or those that make most length."""
+"""Preferred items of a wall of pieces: the highest, or the longest for their cost."""
 
 
 def line_of_sight_wall(
@@ -56,28 +56,26 @@ def line_of_sight_wall(
 ) -> Layout:
     """Return a wall across the line of sight from a charge to the protected structures.
 
-    The wall stands at right angles to the line from the charge to the middle of the protected
-    structures (the mean of their centres by weight). It begins on that line and grows to both
-    sides alike for as long as the stock lasts. Where the cells on its own line are not available,
-    it bends, by up to some 60 degrees, or has a gap and goes on behind it. Modules that could only
-    thicken the wall stay in stock. The two sides begin each for itself: where modules lie unluckily
-    to the line, they leave less than a module open there.
+    The wall is perpendicular to the line from the charge to the centre of the protected structures
+    (the mean of their centres by weight). It begins on that line and grows evenly to both sides
+    until the stock is used up. Where the cells on its axis are not available, it bends, by up to
+    about 60 degrees, or continues after a gap. Modules that could only thicken the wall stay in
+    stock. The two sides start independently, and may leave less than a module open at the line.
 
-    With a catalogue the wall is of pieces that lie along it, more or less: first of the highest
-    item (`"high"`), or of the one that makes most length for its cost, or as a piece where there is
-    no budget (`"long"`), until its stock or what it may cost is used up; then of the next one.
-    Items of a single module, such as posts, are left in stock where there are others.
+    With a catalogue the wall consists of pieces approximately along it: first of the highest item
+    (`"high"`), or of the one with the largest length per cost, or per piece without a budget
+    (`"long"`), until its stock or the budget is used up; then of the next one. Items of a single
+    module, such as posts, stay in stock if there are others.
 
-    Every module goes through `Placement`: budget, access way and all other conditions hold.
+    `Placement` checks every module: budget, access way and all other conditions hold.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
-        charge: Where the charge is; its mass plays no part. The middle of where it may be stands
-            for one that is not known (`expected_charge`), and the middle of its first entry for a
-            vehicle.
-        share: How far through the build zone: 0 as near to the charge as a module can stand on
-            the line of sight (or, where none can, beside it), 1 as near to the structures.
-        kind: What is built first where there is a catalogue.
+        charge: The charge; its mass is ignored. The mean place represents an unknown charge
+            (`expected_charge`), and the centre of its first entry a vehicle.
+        share: Position in the build zone: 0 as near to the charge as a module can stand on the
+            line of sight (or, if none can, beside it), 1 as near to the structures.
+        kind: Preferred items with a catalogue.
 
     Returns:
         The modules or pieces, item by item from the line of sight outwards; none if no cell
@@ -85,14 +83,14 @@ def line_of_sight_wall(
 
     Raises:
         BlastEnvError: If the scenario has no build zone, `share` is not from 0 to 1, or the charge
-            is in the middle of the protected structures.
+            is at the centre of the protected structures.
     """
     placement = Placement.empty(scenario)
     return wall_added_to(placement, _place_m(placement, charge), share, kind).layout
 
 
 def _place_m(placement: Placement, charge: AnyCharge | None) -> PointM:
-    """Return where a charge is: the middle, where it may be in more than one place."""
+    """Return the place of a charge: the mean of its possible places."""
     sources = placement.scenario.charge if charge is None else (source_of(charge),)
     return expected_charge(sources).position_m
 
@@ -100,11 +98,11 @@ def _place_m(placement: Placement, charge: AnyCharge | None) -> PointM:
 def wall_added_to(
     placement: Placement, charge_m: PointM, share: float, kind: WallKind = "high"
 ) -> Placement:
-    """Return a placement with a wall beside what stands already; see `line_of_sight_wall`.
+    """Return a placement with an additional wall; see `line_of_sight_wall`.
 
     Args:
-        placement: What stands already.
-        charge_m: Where the charge is.
+        placement: The placement to extend.
+        charge_m: Place of the charge.
         share: As for `line_of_sight_wall`.
         kind: As for `line_of_sight_wall`.
 
@@ -134,12 +132,12 @@ def wall_added_to(
 
 
 def _preferred(placement: Placement, lies_along: BoolArray, kind: WallKind) -> list[int]:
-    """Return the numbers of the variants that a wall is built of, the first choice first.
+    """Return the indices of the variants for a wall, in order of preference.
 
     Args:
-        placement: What stands already.
-        lies_along: Which variants lie along the wall rather than across it (variants,).
-        kind: What is built first.
+        placement: The placement to extend.
+        lies_along: Mask of the variants that lie along the wall rather than across it (variants,).
+        kind: Preferred items.
     """
     variants = placement.catalogue.variants
     of_item = Counter(each.item for each in variants)
@@ -169,17 +167,17 @@ def wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layou
 
 
 def long_wall_near_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
-    """Return `wall_near_charge` of the items that make most length for their cost."""
+    """Return `wall_near_charge` of the items with the largest length per cost."""
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE, "long")
 
 
 def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
-    """Return `wall_near_building` of the items that make most length for their cost."""
+    """Return `wall_near_building` of the items with the largest length per cost."""
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING, "long")
 
 
 def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
-    """Return a wall that bends around the charge, as near to it as the build zone lets it stand.
+    """Return a wall that bends around the charge, as near to it as the build zone allows.
 
     Raises:
         BlastEnvError: As for `line_of_sight_wall`.
@@ -191,9 +189,9 @@ def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layou
 
 
 def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
-    """Return a wall around the protected structure nearest to a charge, as near as it may stand.
+    """Return a wall around the protected structure nearest to a charge, as near as possible.
 
-    It begins on the side of the charge and goes round both ways.
+    It begins on the side of the charge and extends in both directions.
 
     Raises:
         BlastEnvError: As for `line_of_sight_wall`.
@@ -206,11 +204,11 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
 
 
 def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
-    """Return a layout that cuts as many lines of sight as it can; see `visibility_layout`.
+    """Return a layout that greedily cuts lines of sight; see `visibility_layout`.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
-        charge: Where the charge is; `None` for a layout against all places where one may be.
+        charge: The charge; `None` for a layout against all charges of the scenario.
 
     Raises:
         BlastEnvError: If the scenario has no build zone.
@@ -222,14 +220,14 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
 
 
 def expected_charge(sources: Sequence[AnySource]) -> Charge:
-    """Return the charge in the middle of where one may be: for one layout against all of them.
+    """Return the mean charge of several sources, for one layout against all of them.
 
     Args:
-        sources: At least one; of a scenario, or what is known of a hidden charge.
+        sources: At least one source, of a scenario or of a hidden charge.
 
     Returns:
         The means, by weight, of the places, of the masses and of the heights. The place of a
-        vehicle is the middle of its first entry.
+        vehicle is the centre of its first entry.
     """
     weights = np.array([source.weight for source in sources])
     x_m, y_m = weights @ [_middle_m(source) for source in sources] / weights.sum()
@@ -240,12 +238,12 @@ def expected_charge(sources: Sequence[AnySource]) -> Charge:
 
 @dataclass(frozen=True)
 class _End:
-    """One end of a wall that grows.
+    """One end of a growing wall.
 
     Attributes:
         side: 1 to the left of the line of sight, -1 to the right.
-        reach_m: How far it is from the line of sight.
-        off_m: How far its module is before or behind the wall's own line.
+        reach_m: Distance of the end from the line of sight.
+        off_m: Distance of its last module before or behind the wall's axis.
     """
 
     side: float
@@ -254,23 +252,23 @@ class _End:
 
 
 Place = tuple[int, int, int]
-"""Number of a variant, and row and column of its lower left cell."""
+"""Index of a variant, and row and column of its lower left cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """Where pieces can stand in a build zone, as seen from a charge along its line of sight.
+    """Places of pieces in a build zone, in coordinates of the line of sight from a charge.
 
     A single module is a piece of one cell. Arrays are by variant and lower left cell.
 
     Attributes:
-        depth_m: How far a piece's centre is from the charge along the line (variants, rows,
+        depth_m: Distance of a piece's centre from the charge along the line (variants, rows,
             columns).
-        aside_m: How far it is from the line, positive to the left (variants, rows, columns).
-        half_width_m: Half the width that each variant covers across the line (variants,).
-        lies_along: Which variants are at least as long across the line as along it (variants,).
-        between: Which pieces are available and lie between charge and structures (variants, rows,
+        aside_m: Distance of the centre from the line, positive to the left (variants, rows,
             columns).
+        half_width_m: Half width of each variant across the line (variants,).
+        lies_along: Mask of the variants at least as long across the line as along it (variants,).
+        between: Mask of the legal pieces between charge and structures (variants, rows, columns).
     """
 
     depth_m: FloatArray
@@ -313,7 +311,7 @@ class _View:
         )
 
     def wall_depth_m(self, number: int, share: float) -> float:
-        """Return where a wall of a variant stands, at a share of the way along the line."""
+        """Return the depth of a wall of a variant, at a share of the available depths."""
         from_line_m = np.where(self.between[number], np.abs(self.aside_m[number]), np.inf)
         on_line = from_line_m <= from_line_m.min() + MODULE_SIDE_M / 2.0
         depths_m = self.depth_m[number][on_line]
@@ -321,18 +319,18 @@ class _View:
         return near_m + share * (far_m - near_m)
 
     def next_place(self, number: int, legal: BoolArray, wall_m: float, end: _End) -> Place | None:
-        """Return where a wall at a depth goes on with a variant, or `None` if it cannot.
+        """Return the next place of a variant in a wall, or `None` if there is none.
 
         Args:
-            number: Of the variant.
-            legal: From which cells it is available (rows, columns).
+            number: Index of the variant.
+            legal: Mask of its legal places (rows, columns).
             wall_m: Depth of the wall.
             end: The end of the wall.
         """
         aside_m, half_width_m = self.aside_m[number], float(self.half_width_m[number])
         start_m = end.side * aside_m - half_width_m
         gain_m = end.side * aside_m + half_width_m - end.reach_m
-        # Rounded, so that what is equal but for rounding counts as equal.
+        # Rounded, so that values that differ only by rounding are equal.
         off_m = np.abs(self.depth_m[number] - wall_m).round(9)
         gap_m = np.abs(start_m - end.reach_m).round(9)
         wider = gain_m >= _LEAST_GAIN_M
@@ -340,7 +338,7 @@ class _View:
         possible = legal & self.between[number] & wider & ~steep
         if not possible.any():
             return None
-        # Without a gap if possible; else a little wider a gap, if that is nearer to the line.
+        # Without a gap if possible; else a slightly wider gap, if that is nearer to the axis.
         latest_m = end.reach_m + _TOLERANCE_M
         if not (possible & (start_m <= latest_m)).any():
             latest_m = float(start_m[possible].min()) + MODULE_SIDE_M
@@ -349,7 +347,7 @@ class _View:
         return number, *min(cells, key=lambda cell: (off_m[cell], gap_m[cell], cell))
 
     def end_with(self, place: Place, wall_m: float, end: _End) -> _End:
-        """Return an end of a wall at a depth after a piece has been added to it."""
+        """Return an end of a wall at a depth after the addition of a piece."""
         reach_m = end.side * float(self.aside_m[place]) + float(self.half_width_m[place[0]])
         if reach_m <= end.reach_m:  # the piece is at the other end
             return end
@@ -357,30 +355,33 @@ class _View:
 
 
 def _centres_off_m(variants: Sequence[Variant]) -> tuple[FloatArray, FloatArray]:
-    """Return how far up and right of its lower left cell a variant is centred (variants, 1, 1)."""
+    """Return the offsets up and right of variants' centres from their lower left cells' centres.
+
+    Both have the shape (variants, 1, 1).
+    """
     up = np.array([each.rows - 1 for each in variants])[:, np.newaxis, np.newaxis]
     right = np.array([each.columns - 1 for each in variants])[:, np.newaxis, np.newaxis]
     return MODULE_SIDE_M / 2.0 * up, MODULE_SIDE_M / 2.0 * right
 
 
 _RING_START_RAD: Final = 0.2
-"""A ring begins with the nearest of the pieces that are so much off its first line at most."""
+"""Pieces within this angle beyond the first possible one determine the distance of a ring."""
 
 
 def _ring(placement: Placement, around: Rectangle, start_m: PointM) -> Layout:
     """Return a wall around a rectangle, as near to it as pieces can stand.
 
-    Pieces lie along the side of the rectangle that they stand at. The first one stands where the
-    line from the middle of the rectangle to `start_m` passes; each further one where it can as
-    near to that line as possible, seen from the middle. The highest items come first.
+    Pieces lie along the adjacent side of the rectangle. The first one stands on the line from the
+    centre of the rectangle to `start_m`; each further one stands as near to that line as possible,
+    by the angle at the centre. The highest items come first.
 
     Args:
-        placement: Of nothing.
+        placement: The empty placement.
         around: The rectangle.
-        start_m: A point outside of it.
+        start_m: A point outside the rectangle.
 
     Raises:
-        BlastEnvError: If the point is in the middle of the rectangle.
+        BlastEnvError: If the point is at the centre of the rectangle.
     """
     turn_rad, gap_m, lies_along = _around(placement, around, start_m)
     variants = placement.catalogue.variants
@@ -405,12 +406,12 @@ def _ring(placement: Placement, around: Rectangle, start_m: PointM) -> Layout:
 def _around(
     placement: Placement, around: Rectangle, start_m: PointM
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return how pieces would stand around a rectangle (variants, rows, columns).
+    """Return the positions of pieces relative to a rectangle (variants, rows, columns).
 
     Returns:
-        By how much each one's centre is turned from the direction of a point, seen from the
-        middle; the gap between it and the rectangle; and whether it lies along the rectangle's
-        side that it stands at, as far as it can be turned.
+        The angle at the rectangle's centre from the direction of `start_m` to each piece's centre;
+        the gap between piece and rectangle; and whether the piece lies along the adjacent side,
+        which is True for items that cannot be rotated.
     """
     x_m, y_m = placement.scenario.zone.centres_m
     variants = placement.catalogue.variants
@@ -434,7 +435,7 @@ def _around(
 
 
 def _middle_m(source: AnySource) -> PointM:
-    """Return the middle of where a charge may be, of a vehicle that of its first entry."""
+    """Return the centre of a source's bounds; for a vehicle, that of its first entry."""
     if isinstance(source, VehicleSource):
         return source.entries[0].bounds_m.centre
     return source_bounds_m(source).centre
@@ -449,19 +450,19 @@ def _protected_middle_m(scenario: Scenario) -> tuple[float, float]:
 
 
 def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> Layout:
-    """Return a layout with everything in a random place, as much as can be placed.
+    """Return a complete layout of modules or pieces in random places.
 
-    One module after the other goes on a cell that is available then, all of them as likely. With a
-    catalogue an item is drawn first, of those of which a piece can be placed, and then one of its
-    places, turned or not. It ends when nothing can be placed: as a rule with the whole stock,
-    earlier where the budget is used up or anything more would close the access way.
+    Each module is placed on an available cell, drawn uniformly. With a catalogue an item is drawn
+    first, among those that can be placed, and then one of its places and rotations. The layout is
+    complete when nothing more can be placed: usually with the whole stock, or earlier if the budget
+    is used up or any further element would close the access way.
 
     Args:
         scenario: The scenario, or its bundled name or path.
-        rng: Decides everything.
+        rng: Draws items and places.
 
     Returns:
-        The modules or pieces in the order of their placing; none without a build zone.
+        The modules or pieces in the order of their placement; none without a build zone.
     """
     placement = Placement.empty(scenario)
     while not placement.is_full:
@@ -470,11 +471,11 @@ def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> Layout:
 
 
 def random_element(placement: Placement, rng: np.random.Generator) -> Element:
-    """Return something that can be placed: a module, or a piece of an item that is drawn first.
+    """Return a random legal module, or a piece of a random item.
 
     Args:
-        placement: One that is not full.
-        rng: Decides it.
+        placement: A placement that is not full.
+        rng: Draws the item and the place.
     """
     legal, catalogue = placement.legal, placement.catalogue
     if catalogue.has_items:

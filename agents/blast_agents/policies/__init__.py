@@ -1,1 +1,1 @@
-"""Policies for stable-baselines3 that choose a cell of the build zone."""
+"""Policies for stable-baselines3 that select a cell of the build zone."""

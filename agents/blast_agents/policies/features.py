@@ -1,4 +1,7 @@
-"""What the policy looks at on each cell."""
+"""Features of the cells of the build zone and of the site, as inputs of the policy.
+
+Lengths are in squares of the planes, unless stated otherwise.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +13,11 @@ from torch import Tensor
 from blast_env.envs.observations import GridObservation
 
 _LEAST_WAY: Final = 1e-3
-"""A way along an axis that is shorter, in squares, counts as so long: nothing is divided by 0."""
+"""Least length of a path along an axis, in squares, against division by 0."""
 
 
 class Spread(NamedTuple):
-    """Mean place of a plane's values, in squares, and how far they spread about it (batch,)."""
+    """Mean position of a plane's values, in squares, and their covariance (batch,)."""
 
     x: Tensor
     y: Tensor
@@ -24,7 +27,7 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, plane: Tensor) -> "Spread":
-        """Measure a plane (batch, rows, columns)."""
+        """Return mean and covariance of a plane (batch, rows, columns)."""
         over_y, over_x = plane.sum(dim=2), plane.sum(dim=1)
         total = over_x.sum(dim=1).clamp(min=1e-6)
         y_of = torch.arange(plane.shape[1], dtype=plane.dtype, device=plane.device) + 0.5
@@ -37,11 +40,11 @@ class Spread(NamedTuple):
 
     @staticmethod
     def half_extent(variance: Tensor) -> Tensor:
-        """Return half the width of an even spread from its variance."""
+        """Return the half width of a uniform distribution from its variance."""
         return (3.0 * variance.clamp(min=0.0)).sqrt()
 
     def half_width(self, along_x: Tensor, along_y: Tensor) -> Tensor:
-        """Return half the width of an even spread in directions, in squares (batch, directions)."""
+        """Return the half width along directions, in squares (batch, directions)."""
         variance = (
             self.xx[:, None] * along_x.square()
             + 2.0 * self.xy[:, None] * along_x * along_y
@@ -51,19 +54,18 @@ class Spread(NamedTuple):
 
 
 class LinesOfSight(NamedTuple):
-    """A line from each of some places of the charge to the middle of the protected structures.
+    """Lines from places of the charge to the centre of the protected structures.
 
     All attributes are (batch, places), lengths in squares.
 
     Attributes:
-        x: Where it begins, in squares.
-        y: Where it begins, in squares.
-        along_x: Its direction to the right; both together are of length 1.
-        along_y: Its direction upwards.
+        x: Start of the line.
+        y: Start of the line.
+        along_x: Horizontal component of its unit vector.
+        along_y: Vertical component of its unit vector.
         distance: Its length, at least 1.
-        left: How far aside of the line they reach to the left, over how far along it: the tangent
-            of the angle at which they are seen.
-        right: The same to the right, where it is negative.
+        left: Tangent of the angle from the line to the left edge of the structures.
+        right: Tangent of the angle to the right edge, which is negative to the right of the line.
     """
 
     x: Tensor
@@ -78,7 +80,7 @@ class LinesOfSight(NamedTuple):
     def between(cls, x: Tensor, y: Tensor, target: Spread) -> "LinesOfSight":
         """Return the lines from places (batch, places) to the structures.
 
-        Several structures count as one rectangle that is spread as far as they are.
+        Several structures count as one rectangle with the same mean and variances.
         """
         towards_x, towards_y = target.x[:, None] - x, target.y[:, None] - y
         distance = torch.hypot(towards_x, towards_y).clamp(min=1.0)
@@ -88,14 +90,14 @@ class LinesOfSight(NamedTuple):
         return cls(x, y, along_x, along_y, distance, left, right)
 
     def coordinates(self, x: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
-        """Return how far points are along each line and aside of it, in squares.
+        """Return the coordinates of points along each line and aside of it, in squares.
 
         Args:
-            x: In squares (batch, points).
-            y: In squares (batch, points).
+            x: Abscissas of the points, in squares (batch, points).
+            y: Ordinates of the points, in squares (batch, points).
 
         Returns:
-            Two tensors (batch, places, points); to the left of the line is positive.
+            Two tensors (batch, places, points); aside is positive to the left of the line.
         """
         from_x, from_y = x[:, None] - self.x[..., None], y[:, None] - self.y[..., None]
         along_x, along_y = self.along_x[..., None], self.along_y[..., None]
@@ -105,17 +107,17 @@ class LinesOfSight(NamedTuple):
 def stands_before(
     lines: LinesOfSight, along: Tensor, x: Tensor, y: Tensor, target: Spread
 ) -> Tensor:
-    """Return which points lie before the structures, neither in nor behind them, 0 or 1.
+    """Return the mask, 0 or 1, of the points before the structures, neither in nor behind them.
 
     Args:
-        lines: From each place of the charge (batch, places).
-        along: How far the points are along each line, in squares (batch, places, points).
-        x: Of the points, in squares (batch, points).
-        y: Of the points, in squares (batch, points).
+        lines: Lines from each place of the charge (batch, places).
+        along: Coordinates of the points along each line, in squares (batch, places, points).
+        x: Abscissas of the points, in squares (batch, points).
+        y: Ordinates of the points, in squares (batch, points).
         target: The structures.
 
     Returns:
-        (batch, places, points); 0 also for what lies on the other side of the charge.
+        (batch, places, points); 0 also for points on the other side of the charge.
     """
     enter_x, leave_x = _slab(lines.x, x, target.x, target.half_extent(target.xx))
     enter_y, leave_y = _slab(lines.y, y, target.y, target.half_extent(target.yy))
@@ -125,11 +127,11 @@ def stands_before(
 
 
 def likely_places(likely: Tensor, places: int) -> tuple[Tensor, Tensor]:
-    """Return places that stand for a distribution, each for as large a part of it.
+    """Return places that represent equal parts of a distribution.
 
     Args:
-        likely: How likely the charge is in a square (batch, rows, columns).
-        places: How many; 1 gives the mean.
+        likely: Relative probability of the charge per square (batch, rows, columns).
+        places: Number of places; 1 gives the mean.
 
     Returns:
         x and y in squares (batch, places).
@@ -146,7 +148,7 @@ def likely_places(likely: Tensor, places: int) -> tuple[Tensor, Tensor]:
 
 
 def _slab(start: Tensor, end: Tensor, middle: Tensor, half: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the shares of the ways to the points at which they enter and leave a slab."""
+    """Return the shares of the paths to the points at which they enter and leave a slab."""
     way = end[:, None] - start[..., None]
     way = torch.where(way.abs() < _LEAST_WAY, _LEAST_WAY, way)
     one = ((middle - half)[:, None] - start)[..., None] / way
@@ -157,7 +159,7 @@ def _slab(start: Tensor, end: Tensor, middle: Tensor, half: Tensor) -> tuple[Ten
 def _corner_tangents(
     x: Tensor, y: Tensor, along_x: Tensor, along_y: Tensor, target: Spread
 ) -> Tensor:
-    """Return where the corners of a rectangle are seen (corners, batch, places)."""
+    """Return the tangents of the angles to the corners of a rectangle (corners, batch, places)."""
     half_x, half_y = target.half_extent(target.xx), target.half_extent(target.yy)
     tangents = []
     for side_x, side_y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
@@ -169,28 +171,28 @@ def _corner_tangents(
 
 
 BEARINGS: Final = 96
-"""Bearings that are told apart from each place of the charge."""
+"""Number of bearings from each place of the charge."""
 
 MOST_OFFSET: Final = 4.0
-"""They reach so many half widths of the facade to either side of its middle."""
+"""Extent of the bearings to either side of the facade's centre, in half widths of the facade."""
 
 _MOST_DEPTH: Final = 3.0
 
 
 class Bearings(NamedTuple):
-    """On which bearings the cells and the structures are seen from each place of the charge.
+    """Bearings of the cells and the structures from each place of the charge.
 
-    From a place that sees the facade under a wider angle, more of a blast meets it: shares of the
-    facade are weighted by that.
+    More of a blast reaches a facade under a wider angle, so shares of the facade are weighted by
+    that angle.
 
     Attributes:
-        first: The first bearing of each cell (batch, places, cells).
-        last: The one after its last (batch, places, cells).
-        before: Which cells lie before the structures, 0 or 1 (batch, places, cells).
+        first: First bearing of each cell (batch, places, cells).
+        last: Bearing after the last one of each cell (batch, places, cells).
+        before: Mask of the cells before the structures, 0 or 1 (batch, places, cells).
         of_facade: Share of the facade on each bearing (batch, places, BEARINGS).
-        offset: How far from the facade's middle a cell is seen from the charge, in half widths of
-            the facade; mean over the places (batch, cells).
-        offset_size: The same without its sign, place by place (batch, cells).
+        offset: Angular offset of a cell from the facade's centre, in half widths of the facade;
+            mean over the places (batch, cells).
+        offset_size: Mean magnitude of the offset over the places (batch, cells).
         cut: Share of the facade that a module on a cell hides (batch, cells).
     """
 
@@ -204,17 +206,17 @@ class Bearings(NamedTuple):
 
     @classmethod
     def of(cls, lines: LinesOfSight, along: Tensor, aside: Tensor, before: Tensor) -> "Bearings":
-        """Find them.
+        """Return the bearings of cells.
 
         A module hides the bearings between its two outermost corners, in whole steps of `2 *
-        MOST_OFFSET / BEARINGS` half widths of the facade. What does not stand before the structures
-        hides nothing.
+        MOST_OFFSET / BEARINGS` half widths of the facade. Only modules before the structures hide
+        anything.
 
         Args:
-            lines: From each place of the charge (batch, places).
-            along: How far the cells are along each line, in squares (batch, places, cells).
-            aside: How far they are aside of it, in squares (batch, places, cells).
-            before: Which of them lie before the structures, 0 or 1 (batch, places, cells).
+            lines: Lines from each place of the charge (batch, places).
+            along: Coordinates of the cells along each line, in squares (batch, places, cells).
+            aside: Coordinates aside of it, in squares (batch, places, cells).
+            before: Mask of the cells before the structures, 0 or 1 (batch, places, cells).
         """
         half_facade = (lines.left - lines.right).clamp(min=1e-3)[..., None] / 2.0
         middle = (lines.left + lines.right)[..., None] / 2.0
@@ -240,16 +242,14 @@ class Bearings(NamedTuple):
 
 
 class Occlusion(NamedTuple):
-    """What modules do to the bearings; means over the places of the charge.
+    """Occlusion of the bearings by modules; means over the places of the charge.
 
     Attributes:
-        open_cut: Share of the facade that a module on a cell would hide and that nothing hides
-            yet (batch, cells).
+        open_cut: Share of the facade that a module on a cell would newly hide (batch, cells).
         covered: Share of a cell's bearings on which a module stands (batch, cells).
-        depth: How many modules stand on a bearing of a cell, at most 3, divided by 3
-            (batch, cells).
-        hidden: Share of the places from which a module stands on a bearing (batch, BEARINGS).
-        open_facade: Share of the facade that nothing hides yet (batch,).
+        depth: Number of modules on a bearing of a cell, at most 3, divided by 3 (batch, cells).
+        hidden: Share of the places with a module on a bearing (batch, BEARINGS).
+        open_facade: Share of the facade that is not hidden yet (batch,).
     """
 
     open_cut: Tensor
@@ -260,11 +260,11 @@ class Occlusion(NamedTuple):
 
     @classmethod
     def of(cls, bearings: Bearings, barrier: Tensor) -> "Occlusion":
-        """Return what the modules of a barrier hide, and what one more on each cell would.
+        """Return the occlusion by a barrier, and by one more module on each cell.
 
         Args:
-            bearings: Of the cells.
-            barrier: Which cells hold a module, 0 or 1 (batch, cells).
+            bearings: Bearings of the cells.
+            barrier: Mask of the cells with a module, 0 or 1 (batch, cells).
         """
         first, last, before = bearings.first, bearings.last, bearings.before
         depth = _depth(first, last, barrier[:, None] * before)
@@ -282,13 +282,13 @@ class Occlusion(NamedTuple):
 
 
 def _edge(offset: Tensor) -> Tensor:
-    """Return the boundary between two bearings that is nearest, from 0 to BEARINGS."""
+    """Return the nearest boundary between two bearings, from 0 to BEARINGS."""
     share = (offset / MOST_OFFSET + 1.0) / 2.0
     return (share * BEARINGS).round().clamp(0, BEARINGS).long()
 
 
 def _depth(first: Tensor, last: Tensor, modules: Tensor) -> Tensor:
-    """Return how many modules stand on each bearing (batch, places, BEARINGS)."""
+    """Return the number of modules on each bearing (batch, places, BEARINGS)."""
     steps = torch.zeros(*first.shape[:2], BEARINGS + 1, device=first.device)
     steps.scatter_add_(2, first, modules).scatter_add_(2, last, -modules)
     return steps.cumsum(dim=2)[..., :BEARINGS]
@@ -304,20 +304,20 @@ SHARES: Final = ("stock_share", "stock", "budget_share")
 """Channels with the same value everywhere."""
 
 STATIC: Final = ("protected", "cost", "charge")
-"""Channels of which `ZoneGeometry` is made."""
+"""Channels from which `ZoneGeometry` is computed."""
 
 
 class StaticCellFeatures(NamedTuple):
-    """What stays the same on each cell while modules are placed, (batch, cells) each.
+    """Features of each cell that do not depend on the layout, (batch, cells) each.
 
     Attributes:
-        along: How far the cell is along the line of sight, over 10 m.
-        remaining: How far it is from there to the structures, over 10 m.
-        along_share: `along` as a share of the whole way.
-        aside: How far the cell is aside of the line, to the left, over 10 m.
-        aside_size: The same without its sign.
+        along: Distance along the line of sight, over 10 m.
+        remaining: Remaining distance to the structures, over 10 m.
+        along_share: `along` as a share of the length of the line.
+        aside: Distance aside of the line, positive to the left, over 10 m.
+        aside_size: Magnitude of `aside`.
         offset: See `Bearings`.
-        offset_size: The same without its sign.
+        offset_size: See `Bearings`.
         cut: Share of the facade that a module hides, times 10.
     """
 
@@ -332,14 +332,14 @@ class StaticCellFeatures(NamedTuple):
 
 
 class ChangingCellFeatures(NamedTuple):
-    """What there is to say of each cell once modules stand, (batch, cells) each.
+    """Further features of each cell for the present layout, (batch, cells) each.
 
     Attributes:
-        open_cut: Share of the facade that a module hides and nothing else does, times 10.
+        open_cut: Share of the facade that a module would newly hide, times 10.
         covered: See `Occlusion`.
         depth: See `Occlusion`.
         cost: Cost of a module, from 0 to 1.
-        free: Whether it may take a module, 0 or 1.
+        free: Whether a module may be placed, 0 or 1.
     """
 
     open_cut: Tensor
@@ -354,14 +354,14 @@ CELL_FEATURES: Final = (*StaticCellFeatures._fields, *ChangingCellFeatures._fiel
 
 
 class SiteFeatures(NamedTuple):
-    """What there is to say of charge and structures, of the order of 1, (batch, 1) each.
+    """Features of charge and structures, of the order of 1, (batch, 1) each.
 
     Attributes:
-        distance: From the middle of where the charge may be to that of the structures, over 20 m.
-        half_facade: Half their width across the line of sight, over 10 m.
-        half_depth: Half their depth along it, over 10 m.
-        charge_half_length: Half of how far the places of the charge spread along it, over 10 m.
-        charge_half_width: The same across it, over 10 m.
+        distance: Distance from the mean place of the charge to that of the structures, over 20 m.
+        half_facade: Half width of the structures across the line of sight, over 10 m.
+        half_depth: Half depth of the structures along it, over 10 m.
+        charge_half_length: Half extent of the charge's places along it, over 10 m.
+        charge_half_width: Half extent of the charge's places across it, over 10 m.
         charge: Largest value of the charge's plane.
     """
 
@@ -379,7 +379,7 @@ SITE_FEATURES: Final = (
     *SHARES,
     *(f"hidden_{bearing}" for bearing in range(BEARINGS)),
 )
-"""Names of the features of the whole, in their order."""
+"""Names of the features of the site, in their order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,8 +387,8 @@ class Planes:
     """The planes of an observation by the names of their channels.
 
     Attributes:
-        values: From 0 to 1 (batch, channels, height, width).
-        channels: Their names; those of `GridObservation`, in any order and among others.
+        values: Values from 0 to 1 (batch, channels, height, width).
+        channels: Their names, including those of `GridObservation`, in any order.
     """
 
     values: Tensor
@@ -404,23 +404,23 @@ class Planes:
 
 
 _LEVELS: Final = 255.0
-"""Planes have values in steps of 1 over this; as whole numbers their sums are exact."""
+"""Inverse of the step of planes' values: as whole numbers their sums are exact."""
 
 _LENGTH: Final = 20.0
-"""Lengths are divided by so many squares, 10 m, to be of the order of 1."""
+"""Divisor of lengths, in squares (10 m), so that they are of the order of 1."""
 
 _SHARE_GAIN: Final = 10.0
-"""A module hides some tenth of a facade; times this it is of the order of 1."""
+"""Factor on the share of a facade that a module hides, so that it is of the order of 1."""
 
 
 class ZoneView(NamedTuple):
-    """What a policy knows of the cells of the build zone, and of the site as a whole.
+    """Features of the cells of the build zone and of the site.
 
     Attributes:
         cells: Features of each cell (batch, rows, columns, features), named in `CELL_FEATURES`.
-        barrier: Which cells hold a module, 0 or 1 (batch, rows, columns).
-        free: Which may take one, 0 or 1 (batch, rows, columns).
-        site: Features of the whole (batch, features), named in `SITE_FEATURES`.
+        barrier: Mask of the cells with a module, 0 or 1 (batch, rows, columns).
+        free: Mask of the cells where a module may be placed, 0 or 1 (batch, rows, columns).
+        site: Features of the site (batch, features), named in `SITE_FEATURES`.
     """
 
     cells: Tensor
@@ -430,17 +430,17 @@ class ZoneView(NamedTuple):
 
 
 class ZoneGeometry(NamedTuple):
-    """What stays the same while modules are placed.
+    """Features that do not depend on the layout.
 
     Attributes:
         row: First row of the build zone in the planes (batch,).
-        column: First column (batch,).
+        column: First column of the build zone in the planes (batch,).
         rows: Rows of the zone.
-        columns: Its columns.
-        bearings: On which bearings the cells are seen.
+        columns: Columns of the zone.
+        bearings: Bearings of the cells.
         cells: Features of each cell (batch, cells, features), those of `StaticCellFeatures`.
         cost: Cost of a module, from 0 to 1 (batch, cells).
-        site: Features of the whole (batch, features), those of `SiteFeatures`.
+        site: Features of the site (batch, features), those of `SiteFeatures`.
     """
 
     row: Tensor
@@ -454,24 +454,23 @@ class ZoneGeometry(NamedTuple):
 
     @classmethod
     def of(cls, planes: Planes, rows: int, columns: int, places: int = 1) -> "ZoneGeometry":
-        """Read the build zone off as seen along the lines of sight from charge to structures.
+        """Return the geometry of the build zone along the lines of sight.
 
-        The features of a cell turn with the site: how far it is along the line of sight and aside
-        of it, in metres and as shares of the whole way and of the facade, and how much of the
-        facade a module hides there. So what is learnt at one place of the charge holds at the
-        others, and on a turned site. Where the charge is hidden, they are means over `places` that
-        it may be at; 1 takes the middle.
+        The features of a cell rotate with the site: its coordinates along and aside of the line of
+        sight, in lengths and relative to the line's length and to the facade, and the share of the
+        facade that a module hides there. A policy therefore generalises to other places of the
+        charge and to rotated sites. For a hidden charge they are means over `places`.
 
         Args:
-            planes: Those of the observation.
+            planes: Planes of the observation.
             rows: Rows of the build zone.
-            columns: Its columns.
-            places: Places that stand for where the charge may be; 1 takes the middle.
+            columns: Columns of the build zone.
+            places: Number of places that represent the charge; 1 takes the mean.
         """
-        # Only in the build zone cells have a cost.
+        # Only cells of the build zone have a cost.
         row, column = (planes["cost"].amax(dim=dim).gt(0).int().argmax(dim=1) for dim in (2, 1))
         cost = _crop(planes["cost"], row, column, rows, columns)
-        # The plane shows the root of how likely the charge is in a square.
+        # The plane shows the square root of the charge's relative probability in a square.
         likely = (planes["charge"] * _LEVELS).round().square()
         target = Spread.of((planes["protected"] * _LEVELS).round())
         lines = LinesOfSight.between(*likely_places(likely, places), target)
@@ -508,13 +507,13 @@ class ZoneGeometry(NamedTuple):
         return _crop(plane, self.row, self.column, self.rows, self.columns)
 
     def view(self, planes: Planes) -> ZoneView:
-        """Return what the policy sees now.
+        """Return the features of the present layout.
 
-        For each cell there is more to say once modules stand: how much of the facade a module
-        would hide there that nothing hides yet, and what stands on its bearing already.
+        Static features of a cell are complemented by the share of the facade that a module would
+        newly hide there, and by the modules on its bearings.
 
         Args:
-            planes: Those of the observation of these sites.
+            planes: Planes of the observation of these sites.
         """
         barrier, free = (self.crop(planes[name]) for name in ("barrier", "free"))
         seen = Occlusion.of(self.bearings, barrier.flatten(1))
@@ -532,7 +531,7 @@ class ZoneGeometry(NamedTuple):
 
 
 def _measures(planes: Planes, likely: Tensor, target: Spread) -> SiteFeatures:
-    """Return what there is to say of charge and structures."""
+    """Return the features of charge and structures."""
     charge = Spread.of(likely)
     line = LinesOfSight.between(charge.x[:, None], charge.y[:, None], target)
     along_x, along_y = line.along_x, line.along_y

@@ -1,4 +1,4 @@
-"""The policy that looks at every cell with the same small network."""
+"""The spatial policy, which applies the same small network to every cell."""
 
 from typing import Any, Final
 
@@ -26,35 +26,35 @@ _OVERVIEW: Final = (
     *("protected", "other_structures", "charge", "barrier", "unprotected_load"),
     *("structure_height", "barrier_height", "reach_without_barrier", "reach"),
 )
-"""Channels of which the network sees the whole site, those of them that the observation has."""
+"""Channels of the network's overview of the site, as far as the observation has them."""
 
 
 def variant_channels(channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the planes that say where each variant of a catalogue may be placed, in order."""
+    """Return the names of the planes of legal places, one per variant of a catalogue, in order."""
     return tuple(each for each in channels if each.endswith(":legal"))
 
 
 class ZoneExtractor(BaseFeaturesExtractor):
-    """Convolutions over the build zone and over the site: features of every cell and of the whole.
+    """Convolutions over the build zone and the site: features of every cell and of the site.
 
-    A cell's features come from where it lies on the line of sight (`features.ZoneGeometry`), from
-    the 25 cells around it, and from an overview of the site. The result is flat: `width` features
-    of each cell, cell by cell, then `width` features of the whole.
+    The features of a cell are computed from its position relative to the line of sight
+    (`features.ZoneGeometry`), from the 5 x 5 cells around it, and from an overview of the site. The
+    result is flat: `width` features of each cell, cell by cell, then `width` features of the site.
 
-    With a catalogue the cells around show heights and where each variant may be placed as well,
-    and the features of the whole have heights, costs and what is left of the items. With vehicles
-    both show the ground that they reach.
+    With a catalogue, the surrounding cells also show heights and the legal places of each variant,
+    and the features of the site include heights, costs and remaining stock of the items. With
+    vehicles, both show the ground within the vehicles' reach.
 
     Args:
-        observation_space: Of an observation of planes.
+        observation_space: Space of an observation of planes.
         rows: Rows of the build zone.
-        columns: Its columns.
-        places: Places that stand for where the charge may be.
+        columns: Columns of the build zone.
+        places: Number of places that represent the charge.
         width: Number of features.
         channels: Names of the planes.
 
     Raises:
-        BlastEnvError: If the space is not one of these planes on a site that the zone fits in.
+        BlastEnvError: If the space is not of these planes, or the zone does not fit into it.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
         self.items = tuple(each for each in self.channels if each.endswith(values))
         variants = variant_channels(self.channels)
         self.around = ("barrier_height", "stops_vehicles", *variants) if variants else ()
-        # A post belongs where the ground that a vehicle reaches can be cut off.
+        # Posts are useful where they cut off ground within a vehicle's reach.
         self.around += ("reach",) if "reach" in self.channels else ()
         self.near = nn.Conv2d(2 + len(self.around), width, 5, padding=2)
         self.overview = nn.Sequential(
@@ -97,7 +97,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
         """Return the features (batch, width * (rows * columns + 1)).
 
         Args:
-            observations: From 0 to 1 (batch, channels, height, width).
+            observations: Values from 0 to 1 (batch, channels, height, width).
 
         Raises:
             BlastEnvError: If their shape is not that of the space.
@@ -107,7 +107,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
                 f"observations have the shape {tuple(observations.shape[1:])}, must have the "
                 f"policy's {self.shape}: (channels, rows, columns)"
             )
-        with torch.no_grad():  # nothing in here has weights
+        with torch.no_grad():  # this block has no weights
             named = Planes(observations, self.channels)
             geometry = self._geometry(named)
             view = geometry.view(named)
@@ -123,7 +123,7 @@ class ZoneExtractor(BaseFeaturesExtractor):
         return torch.cat((cells.flatten(1), torch.relu(self.whole(whole))), dim=1)
 
     def _geometry(self, planes: Planes) -> ZoneGeometry:
-        """Return the geometry; while sites and charges stay the same, it is not worked out anew."""
+        """Return the geometry, cached for equal sites and charges."""
         static = planes.of(STATIC)
         if self._known is None or not torch.equal(self._known[0], static):
             geometry = ZoneGeometry.of(planes, self.rows, self.columns, self.places)
@@ -145,10 +145,10 @@ def _planes_shape(
 
 
 class ZoneLatents(MlpExtractor):
-    """Hands the features of `ZoneExtractor` on: all to the actor, those of the whole to the critic.
+    """Forwards all features of `ZoneExtractor` to the actor, and those of the site to the critic.
 
     Args:
-        width: Number of features of a cell, and of the whole.
+        width: Number of features of a cell, and of the site.
         critic_width: Neurons of the critic's hidden layer.
     """
 
@@ -166,14 +166,14 @@ class ZoneLatents(MlpExtractor):
 
 
 class CellLogits(nn.Module):
-    """Logits of each cell from its own features, and one of finishing from those of the whole.
+    """Logits of each cell from its features, and one of finishing from those of the site.
 
-    A cell has one logit for each variant that can be set down from there.
+    A cell has one logit per variant, for the placement of its lower left cell there.
 
     Args:
-        width: Number of features of a cell, and of the whole.
-        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
-        variants: How many variants there are; 1 without a catalogue.
+        width: Number of features of a cell, and of the site.
+        finish_bias: Initial bias of the logit of finishing; below 0 it favours placing modules.
+        variants: Number of variants; 1 without a catalogue.
     """
 
     def __init__(self, width: int, finish_bias: float, variants: int = 1) -> None:
@@ -194,21 +194,21 @@ class CellLogits(nn.Module):
 
 
 class ZonePolicy(BasePolicy):
-    """What the spatial policies of both algorithms have in common.
+    """Base class of the spatial policies of both algorithms.
 
     Args:
-        observation_space: Of an observation of planes.
-        action_space: Of the environment.
-        lr_schedule: Learning rate by the share of the training that is left.
+        observation_space: Space of an observation of planes.
+        action_space: Space of the environment's actions.
+        lr_schedule: Learning rate as a function of the remaining share of the training.
         rows: Rows of the build zone.
-        columns: Its columns.
-        places: Places that stand for where the charge may be: more than 1 if it is hidden; 1
-            unless given.
+        columns: Columns of the build zone.
+        places: Number of places that represent the charge, more than 1 for a hidden one; 1 by
+            default.
         width: Number of features of a cell.
         critic_width: Neurons of the critic's hidden layer.
-        finish_bias: What the logit of finishing begins with; below 0, modules are placed first.
-        channels: Names of the planes; those of a `"grid"` observation unless given.
-        **others: For stable-baselines3's policy.
+        finish_bias: Initial bias of the logit of finishing; below 0 it favours placing modules.
+        channels: Names of the planes; by default those of a `"grid"` observation.
+        **others: Arguments of stable-baselines3's policy.
     """
 
     mlp_extractor: MlpExtractor
@@ -246,7 +246,7 @@ class ZonePolicy(BasePolicy):
         self.mlp_extractor = ZoneLatents(self.width, self.critic_width)
 
     def _build(self, lr_schedule: Schedule) -> None:
-        """Put the logits by cell in the place of the dense layer; the optimizer has to know."""
+        """Replace the dense layer by the logits per cell, and rebuild the optimiser for it."""
         super()._build(lr_schedule)  # type: ignore[misc]  # that of the library's policy
         self.action_net: nn.Module = CellLogits(self.width, self.finish_bias, self.variants)
         arguments = {"lr": lr_schedule(1.0)} | self.optimizer_kwargs
@@ -254,8 +254,8 @@ class ZonePolicy(BasePolicy):
 
 
 class SpatialPolicy(ZonePolicy, ActorCriticPolicy):
-    """For stable-baselines3's `PPO`; see `ZonePolicy` for the arguments."""
+    """The policy for stable-baselines3's `PPO`; see `ZonePolicy` for the arguments."""
 
 
 class SpatialMaskablePolicy(ZonePolicy, MaskableActorCriticPolicy):
-    """For sb3-contrib's `MaskablePPO`; see `ZonePolicy` for the arguments."""
+    """The policy for sb3-contrib's `MaskablePPO`; see `ZonePolicy` for the arguments."""
