@@ -1,7 +1,7 @@
-"""The sections of a scenario: site, charge, structures, gauges, simulation; not the build zone.
+"""The sections of a scenario but the build zone: site, charge, structures, gauges, simulation.
 
 All lengths are in metres, x to the right and y upwards from the lower left corner of the site;
-heights are above the ground, which is flat. Last comes where on a map or drawing the site lies.
+heights are above the ground, which is flat.
 """
 
 import re
@@ -45,19 +45,19 @@ PointM = tuple[Coordinate, Coordinate]
 SizeM = tuple[Length, Length]
 
 Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
-"""Of something that stands: a module at least."""
+"""Height of a structure or barrier, m: at least a module's side."""
 
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
 
 VehicleMass = Annotated[StrictFloat, Field(ge=50.0, le=200_000.0)]
-"""Of a vehicle, kg."""
+"""Mass of a vehicle, kg."""
 
 Speed = Annotated[StrictFloat, Field(ge=1.0, le=300.0)]
-"""Of a vehicle, km/h."""
+"""Speed of a vehicle, km/h."""
 
 
 def _check_text(text: str) -> str:
-    """Refuse characters that would steer whatever shows the text; lines may end."""
+    """Refuse characters that control a terminal or page; tabs and line feeds are allowed."""
     wrong = STEERING.search(text)
     if wrong is not None:
         raise ValueError(f"must not have the character {wrong[0]!r}")
@@ -65,13 +65,13 @@ def _check_text(text: str) -> str:
 
 
 FOR_PEOPLE: Final = AfterValidator(_check_text)
-"""Annotation of what somebody wrote for people."""
+"""Annotation of texts for readers."""
 
 Reason = Annotated[str, Field(min_length=1, max_length=200), FOR_PEOPLE]
 
 
 def _check_name(name: str) -> str:
-    """Refuse a name that could not be a part of a file name or of a column heading."""
+    """Refuse a name that is unsuitable for file names and column headings."""
     if re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,39}", name) is None:
         raise ValueError("must be 1 to 40 letters, digits, '_' or '-', the first one a letter")
     return name
@@ -87,12 +87,13 @@ class Section(BaseModel):
 
 
 class Site(Section):
-    """The simulated area; what leaves it is gone.
+    """The simulated area, with open borders.
 
     Attributes:
         width_m: Its extent along x.
         height_m: Its extent along y.
-        air_height_m: How high the simulated air is; without it, `Scenario.air_height_m` decides.
+        air_height_m: Height of the simulated air; the default of `Scenario.air_height_m` unless
+            given.
     """
 
     width_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
@@ -106,12 +107,12 @@ class Site(Section):
 
 
 class ChargeSource(Section):
-    """Base of the places that a charge may come from.
+    """Base of the sources of a charge.
 
     Attributes:
         tnt_kg: TNT-equivalent mass of a charge from this source.
-        weight: How likely this source is, relative to the others.
-        height_m: Height of the charge's centre above the ground; 0 lies on it.
+        weight: Probability of this source, relative to the others.
+        height_m: Height of the charge's centre above the ground; at 0 it lies on the ground.
     """
 
     tnt_kg: Annotated[StrictFloat, Field(ge=0.01, le=100_000.0)]
@@ -150,7 +151,7 @@ class PointSource(ChargeSource):
 
 
 class SegmentSource(ChargeSource):
-    """A charge anywhere on a segment, each place as likely: a vehicle on a road."""
+    """A charge uniformly distributed on a segment: a vehicle on a road."""
 
     kind: Literal["segment"]
     start_m: PointM
@@ -163,7 +164,7 @@ class SegmentSource(ChargeSource):
 
     @property
     def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
-        """The lines on which the charge may be."""
+        """The lines of the charge's places."""
         return (self.segment_m,)
 
     def sample_position_m(self, rng: np.random.Generator) -> PointM:
@@ -174,7 +175,7 @@ class SegmentSource(ChargeSource):
 
 
 class RectangleSource(ChargeSource):
-    """A charge anywhere in a rectangle, each place as likely: a parking area."""
+    """A charge uniformly distributed in a rectangle: a parking area."""
 
     kind: Literal["rectangle"]
     corner_m: PointM
@@ -182,7 +183,7 @@ class RectangleSource(ChargeSource):
 
     @property
     def rectangle_m(self) -> Rectangle:
-        """The area that the charge may be in."""
+        """The area of the charge's places."""
         return Rectangle.from_corner(self.corner_m, self.size_m)
 
     def sample_position_m(self, rng: np.random.Generator) -> PointM:
@@ -207,7 +208,7 @@ class Ground(Section):
 
 
 class Area(Ground):
-    """A rectangle of the site for which something else holds, and why."""
+    """A rectangle of the site under a special condition, with the reason."""
 
     reason: Reason
 
@@ -225,7 +226,7 @@ class Entry(Section):
 
     @property
     def bounds_m(self) -> Rectangle:
-        """The segment as a rectangle without a width."""
+        """The segment as a rectangle of width 0."""
         (x0, y0), (x1, y1) = self.start_m, self.end_m
         return Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
 
@@ -236,7 +237,7 @@ class Entry(Section):
         return max(right - left, top - bottom)
 
     def side(self, site: Site) -> WallName | None:
-        """Return the side of the site that the segment lies on; `None` if on none."""
+        """Return the side of the site on which the segment lies; `None` if on none."""
         bounds, border = self.bounds_m, site.rectangle_m
         if not border.contains(bounds):
             return None
@@ -261,17 +262,17 @@ class Entry(Section):
 
 
 _SlowSize = Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
-"""Less would lie between the places at which speeds are worked out."""
+"""Side of slow ground, m; a smaller one could lie between the places of the speed search."""
 
 
 class SlowArea(Section):
-    """Ground on which a vehicle can be no faster, and why: a speed table, a chicane.
+    """Ground that limits a vehicle's speed, with the reason: a speed table, a chicane.
 
     Attributes:
         corner_m: Lower left corner.
         size_m: Its size.
-        speed_km_h: The largest speed on it.
-        reason: What slows the vehicle.
+        speed_km_h: Largest speed on it.
+        reason: Reason for the limit.
     """
 
     corner_m: PointM
@@ -286,15 +287,15 @@ class SlowArea(Section):
 
 
 class Motion(Section):
-    """How a vehicle drives: what decides its speed where it hits a barrier.
+    """The motion of a vehicle, which decides its impact speed on barriers.
 
     Attributes:
         mass_kg: Its mass, with the load.
         max_speed_km_h: Its largest speed.
-        acceleration_m_s2: How fast it gains speed, at any speed.
-        entry_speed_km_h: Its speed when it has just entered the site; without it, the largest.
+        acceleration_m_s2: Its acceleration at any speed.
+        entry_speed_km_h: Its speed at entry to the site; the largest unless given.
         grip: Coefficient of friction between tyres and ground, which limits speed in turns.
-        slow: Ground on which it can be no faster.
+        slow: Ground that limits its speed.
     """
 
     mass_kg: VehicleMass
@@ -306,24 +307,24 @@ class Motion(Section):
 
     @property
     def entry_km_h(self) -> float:
-        """Its speed when it has just entered the site, at most the largest."""
+        """Its speed at entry to the site, at most the largest."""
         entry = self.max_speed_km_h if self.entry_speed_km_h is None else self.entry_speed_km_h
         return min(entry, self.max_speed_km_h)
 
 
 class VehicleSource(ChargeSource):
-    """A charge in a vehicle, which goes off at one of the worst places that it can get to.
+    """A charge in a vehicle, which goes off at one of the worst places within its reach.
 
-    Where it gets to depends on the layout: see `blast_env.scenario.vehicles`.
+    The reach depends on the layout: see `blast_env.scenario.vehicles`.
 
     Attributes:
-        entries: Where it enters the site.
-        width_m: Its width, and the side of the square of ground that it takes up.
-        drivable: The ground on which it can drive; without any, all of the site.
-        keep_outs: Ground that is closed to it all the same, and why.
-        places: How many of the worst places count; the charge goes off at one after the other.
-        apart_m: Least distance between two of them; without it, the width.
-        motion: How it drives; without it, whatever stops vehicles stops it at any speed.
+        entries: Its entries to the site.
+        width_m: Its width, and the side of its square on the ground.
+        drivable: The ground on which it can drive; the whole site unless given.
+        keep_outs: Ground that is closed to it nevertheless, with reasons.
+        places: Number of worst places; successive charges go off at successive ones.
+        apart_m: Least distance between two of them; the width unless given.
+        motion: Its motion; without one, barriers that stop vehicles stop it at any speed.
     """
 
     kind: Literal["vehicle"]
@@ -337,13 +338,13 @@ class VehicleSource(ChargeSource):
 
     @model_serializer(mode="wrap")
     def _without_motion(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out a motion that is not there."""
+        """Omit a missing motion."""
         dump: dict[str, Any] = handler(self)
         return {key: dump[key] for key in dump if key != "motion" or dump[key] is not None}
 
     @property
     def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:
-        """The lines along which it enters."""
+        """The lines of its entries."""
         return tuple((entry.start_m, entry.end_m) for entry in self.entries)
 
     @property
@@ -353,13 +354,13 @@ class VehicleSource(ChargeSource):
 
 
 PlaceSource = PointSource | SegmentSource | RectangleSource
-"""A source whose places are known before any layout."""
+"""A source with places that do not depend on the layout."""
 
 AnySource = Annotated[PlaceSource | VehicleSource, Field(discriminator="kind")]
 
 
 def _check_faces(faces: tuple[WallName, ...]) -> tuple[WallName, ...]:
-    """Refuse a wall that is named twice, and return the walls in the usual order."""
+    """Refuse a repeated wall, and return the walls in the order of `WALLS`."""
     for wall in WALLS:
         if faces.count(wall) > 1:
             raise ValueError(f"must name each wall at most once, not {wall!r} twice")
@@ -374,13 +375,13 @@ Storeys = Annotated[
 
 
 class FacadePart(Section):
-    """Bays that have other components than the rest of the facade.
+    """Bays with other components than the rest of the facade.
 
     Attributes:
-        walls: On which walls; on all unless given.
-        storeys: In which storeys, from 1; in all unless given.
-        glazing: Name of the component of their windows; as the facade's unless given.
-        wall: Name of the component of their walls, in the same way.
+        walls: Their walls; all unless given.
+        storeys: Their storeys, from 1; all unless given.
+        glazing: Name of the component of their windows; that of the facade unless given.
+        wall: Name of the component of their wall panels; that of the facade unless given.
     """
 
     walls: Walls = WALLS
@@ -389,12 +390,12 @@ class FacadePart(Section):
     wall: Name | None = None
 
     def covers(self, bay: Bay) -> bool:
-        """Return whether a bay is one of them."""
+        """Return whether a bay belongs to them."""
         return bay.wall in self.walls and (self.storeys is None or bay.storey in self.storeys)
 
 
 class FacadeSection(Section):
-    """What the walls of a structure are made of.
+    """The components of a structure's walls.
 
     Attributes:
         storey_m: Height of a storey.
@@ -411,7 +412,7 @@ class FacadeSection(Section):
     parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
 
     def names(self) -> Iterator[tuple[str, str]]:
-        """Yield where a component is named, and its name."""
+        """Yield the key and the name of each component."""
         for key in ("glazing", "wall"):
             if (name := getattr(self, key)) is not None:
                 yield key, name
@@ -421,7 +422,7 @@ class FacadeSection(Section):
 
 
 PASSAGE_M: Final = 2.0
-"""What begins so high above the ground, or higher, stops no vehicle: a car passes below."""
+"""Least height of a structure's underside at which vehicles pass below."""
 
 
 class StructureSection(Section):
@@ -431,20 +432,20 @@ class StructureSection(Section):
         name: Name in tables and pictures; `barrier` is taken by the modules of a layout.
         corner_m: Lower left corner.
         protected: Whether the load on it counts.
-        weight: How much its load counts among the protected structures.
-        peak_weight: How much its peak overpressure counts, where the objective counts peaks; as
-            much as `weight` says unless given.
-        module_capacity: Impulse, simulation units, that a module bears before it is removed;
-            without it modules never fail.
-        height_m: Height of its top above the ground; without it, as high as the air.
+        weight: Weight of its load among the protected structures.
+        peak_weight: Weight of its peak overpressure, if the objective counts peaks; `weight` unless
+            given.
+        module_capacity: Impulse, simulation units, at which a module is removed; modules never fail
+            unless given.
+        height_m: Height of its top above the ground; the height of the air unless given.
         base_m: Height of its underside: above 0 it is a canopy, or a storey over a passage. For gas
             dynamics only.
         carries: Whether it is a terrace: solid from the ground, and barriers may stand on its top.
             For gas dynamics only.
-        faces: The walls whose load counts; a wall is named by the side that it looks to.
-        building: The building that the structure is a part of, where several make one; for
-            people and tables, no result depends on it.
-        facade: What its walls are made of; no load depends on it.
+        faces: The walls whose load counts; a wall is named by the side that it faces.
+        building: Name of its building, if that has several structures, for tables; no result
+            depends on it.
+        facade: The components of its walls; no load depends on it.
     """
 
     name: Name
@@ -466,17 +467,17 @@ class StructureSection(Section):
 
     @property
     def lets_through(self) -> bool:
-        """Whether people and vehicles pass below it: it begins at least `PASSAGE_M` up."""
+        """Whether people and vehicles pass below it: its base is at least `PASSAGE_M` high."""
         return self.base_m >= PASSAGE_M
 
     @property
     def building_name(self) -> str:
-        """The building that it is a part of, or its own name where it is one by itself."""
+        """Name of its building; the name of the structure if it has none."""
         return self.building or self.name
 
     @property
     def counted_peak_weight(self) -> float:
-        """How much its peak counts: `peak_weight`, or `weight` where that is not given."""
+        """Weight of its peak: `peak_weight`, or `weight` unless given."""
         return self.weight if self.peak_weight is None else self.peak_weight
 
 
@@ -495,7 +496,7 @@ class ModularObstacleSection(StructureSection):
 
 
 class ConcreteSquareSection(StructureSection):
-    """A `ConcreteSquare`: as many rows as columns of modules."""
+    """A `ConcreteSquare`: a square of modules."""
 
     kind: Literal["ConcreteSquare"]
     side_modules: Count
@@ -523,7 +524,7 @@ AnyStructure = Annotated[
 
 
 class GaugeSection(Section):
-    """A place in the air where overpressure is recorded.
+    """A gauge of overpressure in the air.
 
     Attributes:
         name: Name in tables and pictures.
@@ -542,7 +543,7 @@ def _check_preset(name: str) -> str:
 
 
 def _check_overrides(overrides: dict[str, Any]) -> dict[str, Any]:
-    """Refuse overrides of parameters that do not exist and values out of bounds."""
+    """Refuse overrides of unknown parameters, and values out of bounds."""
     groups = (_group_problems(group, values) for group, values in overrides.items())
     problems = tuple(chain.from_iterable(groups))
     if problems:
@@ -551,7 +552,7 @@ def _check_overrides(overrides: dict[str, Any]) -> dict[str, Any]:
 
 
 def _group_problems(group: str, values: object) -> tuple[Problem, ...]:
-    """Return what is wrong with the overrides of one group of parameters."""
+    """Return the problems of the overrides of one group of parameters."""
     field = SimulationParameters.model_fields.get(group)
     if field is None:
         return (unknown_key((group,), SimulationParameters.model_fields),)
@@ -561,8 +562,8 @@ def _group_problems(group: str, values: object) -> tuple[Problem, ...]:
     if not isinstance(values, Mapping):
         return (Problem(group, f"is {type_word(values)}, must be a table"),)
     try:
-        # A group's values are independent of each other and all have defaults, so the overrides
-        # can be checked alone and every complaint is about a key that was written.
+        # A group's values are independent and have defaults, so the overrides can be checked
+        # alone, and every problem concerns a given key.
         model.model_validate(values, strict=True)
     except ValidationError as error:
         return problems_from(error, model, (group,))
@@ -570,10 +571,10 @@ def _group_problems(group: str, values: object) -> tuple[Problem, ...]:
 
 
 class SimulationSection(Section):
-    """The blast model's parameters: a preset by name, and what differs from it.
+    """The particle model's parameters: a preset by name, with overrides.
 
     Attributes:
-        preset: Name of one of `blast_env.physics.parameters.PRESETS`.
+        preset: A name in `blast_env.physics.parameters.PRESETS`.
         overrides: Nested like `SimulationParameters`: `{"air": {"spacing_units": 3.0}}`.
     """
 
@@ -610,7 +611,7 @@ class MapGeoreference(Georeference):
     Attributes:
         longitude_deg: Longitude of the site's lower left corner, WGS 84.
         latitude_deg: Its latitude.
-        crs: Coordinate reference system in which layouts go back to the map, as pyproj reads it:
+        crs: Coordinate reference system of layouts exported to the map, as pyproj reads it:
             `EPSG:4326` (longitude, latitude), `EPSG:25832`.
     """
 
@@ -621,7 +622,7 @@ class MapGeoreference(Georeference):
 
 
 class DrawingGeoreference(Georeference):
-    """The place of a site in a drawing whose place on the Earth nobody said.
+    """The place of a site in a drawing without a place on the Earth.
 
     Attributes:
         x_m: The site's lower left corner along the drawing's x axis, in metres.
@@ -639,7 +640,7 @@ AnyGeoreference = Annotated[MapGeoreference | DrawingGeoreference, Field(discrim
 
 
 def buildings_of(structures: Iterable[AnyStructure]) -> dict[str, list[AnyStructure]]:
-    """Return structures by the building that they are parts of, in their order."""
+    """Return structures by the names of their buildings, in order."""
     buildings: dict[str, list[AnyStructure]] = {}
     for each in structures:
         buildings.setdefault(each.building_name, []).append(each)

@@ -1,14 +1,14 @@
-"""Vehicles with a charge: what stops one, and where its charge goes off.
+"""Vehicles with a charge: the obstacles that stop one, and the places of its charge.
 
-A vehicle is a square of ground, `width_m` on a side, whose sides stay parallel to those of the
-site. From the border it moves in any direction without a turn, and never covers a structure,
-ground that is closed to it, a gate, or what stops it. To touch is allowed: it fits through a gap of
-just its width, but not through one of a micrometre less, nor cornerwise between two things that
-touch (`blast_env.scenario.reach`).
+A vehicle is a square of ground, `width_m` on a side, with sides parallel to those of the site. From
+the border it moves in any direction without rotation, and never covers a structure, closed ground,
+a gate, or an obstacle that stops it. Touching is allowed: it fits through a gap of exactly its
+width, but not through one that is 1 micrometre narrower, nor diagonally between two touching
+obstacles (`blast_env.scenario.reach`).
 
-A vehicle that has a speed breaks what has a crash rating that does not cover its mass, or its speed
-where it hits it (`blast_env.scenario.driving`), and drives on, no slower. What gives way opens ways
-to other pieces, and longer run-ups; so that is asked again until nothing more gives way.
+A vehicle with a motion breaks through pieces whose crash rating does not cover its mass, or its
+impact speed (`blast_env.scenario.driving`), and drives on without loss of speed. Broken pieces open
+ways to others and longer run-ups, so the search repeats until no further piece breaks.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -43,19 +43,19 @@ from blast_env.scenario.zone import BuildZone
 from blast_env.units import MODULE_SIDE_M
 
 _SAME_M: Final = 1e-9
-"""Edges that differ by less are the same, as in `Rectangle.contains`."""
+"""Tolerance within which edges are equal, as in `Rectangle.contains`."""
 
 MOST_PLACES: Final = 3_000_000
-"""Places of all vehicles at which their charges may go off: three vehicles on the largest site."""
+"""Most places of the charges of all vehicles: three vehicles on the largest site."""
 
 
 @dataclass(frozen=True)
 class VehicleCharge:
-    """The charge of a vehicle before there is a layout; see `WorstPlaces.charge`.
+    """The charge of a vehicle without a layout; see `WorstPlaces.charge`.
 
     Attributes:
         source: The vehicle.
-        rank: How many worse places there are than the one at which it goes off.
+        rank: Rank of its place among the worst places, from 0.
     """
 
     source: VehicleSource
@@ -74,18 +74,18 @@ class VehicleCharge:
     def with_charge(
         self, tnt_kg: float | None = None, height_m: float | None = None
     ) -> "VehicleCharge":
-        """Return the same one with another mass or height of the charge; bounds are not checked."""
+        """Return a copy with another mass, kg, or height, m; bounds are not checked."""
         changes = {"tnt_kg": tnt_kg, "height_m": height_m}
         given = {key: value for key, value in changes.items() if value is not None}
         return VehicleCharge(self.source.model_copy(update=given), self.rank)
 
 
 AnyCharge = Charge | VehicleCharge
-"""A charge at a place, or one that a vehicle brings as near as a layout lets it."""
+"""A charge at a place, or one in a vehicle, with a place that depends on the layout."""
 
 
 def source_of(charge: AnyCharge) -> AnySource:
-    """Return the source that has this charge alone: a point, or the vehicle.
+    """Return the source of a single charge: a point, or the vehicle.
 
     Raises:
         ValidationError: If the charge is out of bounds.
@@ -94,7 +94,7 @@ def source_of(charge: AnyCharge) -> AnySource:
 
 
 def ranked(charges: Iterable[AnyCharge]) -> tuple[AnyCharge, ...]:
-    """Return charges with those of each vehicle at its worst place, its second worst, and so on."""
+    """Return charges with rising ranks for those of each vehicle."""
     met: dict[VehicleSource, int] = {}
     result: list[AnyCharge] = []
     for charge in charges:
@@ -108,12 +108,12 @@ def ranked(charges: Iterable[AnyCharge]) -> tuple[AnyCharge, ...]:
 
 
 class RatedPiece(NamedTuple):
-    """Something that stops the vehicles that its crash rating covers.
+    """A piece or gate that stops the vehicles covered by its crash rating.
 
     Attributes:
-        rectangle: What it covers, metres.
+        rectangle: Its rectangle, m.
         rating: Its crash rating.
-        name: What it is called.
+        name: Its name in messages.
     """
 
     rectangle: Rectangle
@@ -122,12 +122,12 @@ class RatedPiece(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """What a layout puts in the way of a vehicle, rectangles in metres.
+    """The obstacles of a layout for vehicles, rectangles in m.
 
     Attributes:
-        stops: What it cannot pass.
-        solid: What it drives over; but no charge goes off inside of it.
-        rated: What stops it as far as a crash rating goes.
+        stops: Obstacles that stop every vehicle.
+        solid: Obstacles that vehicles drive over, but inside which no charge goes off.
+        rated: Obstacles with a crash rating.
     """
 
     stops: tuple[Rectangle, ...] = ()
@@ -142,10 +142,10 @@ NOTHING: Final = Obstacles()
 def obstacles_of(
     zone: BuildZone, layout: Iterable[Element], structures: Sequence[AnyStructure]
 ) -> Obstacles:
-    """Return what a layout of a build zone puts in the way.
+    """Return the obstacles of a layout.
 
-    Single modules stop a vehicle; of the items of a catalogue, those that are said to. What stands
-    on a terrace no vehicle meets.
+    Single modules stop vehicles; items of a catalogue do if `stops_vehicles` is true. Elements on a
+    terrace are out of reach, and no obstacles.
 
     Raises:
         LayoutError: If there is no such item, or it cannot be turned.
@@ -167,15 +167,15 @@ def obstacles_of(
 
 @dataclass(frozen=True)
 class VehicleGround:
-    """What a vehicle meets on the empty site.
+    """A vehicle with its surroundings on the empty site.
 
     Attributes:
         source: The vehicle.
         site: The site.
         structures: The structures.
-        gates: Gates that are closed to it, whatever its speed.
-        rated_gates: Gates that are closed to it as far as their crash ratings go.
-        charge_radius_m: Radius of the disc that the charge fills.
+        gates: Gates that stop it at any speed.
+        rated_gates: Gates with a crash rating.
+        charge_radius_m: Radius of the charge's disc.
     """
 
     source: VehicleSource
@@ -187,7 +187,7 @@ class VehicleGround:
 
     @property
     def entries(self) -> tuple[tuple[Entry, WallName], ...]:
-        """The entries on the border that are wide enough, with the side of the site."""
+        """The wide enough entries on the border, each with its side of the site."""
         return tuple(
             (entry, side)
             for entry in self.source.entries
@@ -197,17 +197,17 @@ class VehicleGround:
 
     @cached_property
     def closed_m(self) -> tuple[Rectangle, ...]:
-        """Everything that it must not cover; gates that may give way are among it."""
+        """All closed rectangles, including gates with a crash rating."""
         return (*self.always_closed_m, *(gate.rectangle for gate in self.rated_gates))
 
     @cached_property
     def standing_m(self) -> tuple[Rectangle, ...]:
-        """The structures that it does not pass below."""
+        """The structures that it cannot pass below."""
         return tuple(each.rectangle_m for each in self.structures if not each.lets_through)
 
     @cached_property
     def always_closed_m(self) -> tuple[Rectangle, ...]:
-        """Everything that it must not cover, at any speed."""
+        """The rectangles that are closed at any speed."""
         return (
             *self.standing_m,
             *(area.rectangle_m for area in self.source.keep_outs),
@@ -218,19 +218,19 @@ class VehicleGround:
         )
 
     def drive(self, obstacles: Obstacles = NOTHING) -> "Drive":
-        """Return what stops the vehicle, and what not; for equal arguments, the same object."""
+        """Return the drive of the vehicle against obstacles, cached."""
         return _drive(self, obstacles)
 
     def reach(self, obstacles: Obstacles = NOTHING) -> Reach:
-        """Return where the vehicle gets to; for equal arguments, the same object."""
+        """Return the reach of the vehicle against obstacles, cached."""
         return self.drive(obstacles).reach
 
     def worst_places(self, obstacles: Obstacles = NOTHING) -> WorstPlaces:
-        """Return where its charge goes off; for equal arguments, the same object."""
+        """Return the worst places of its charge against obstacles, cached."""
         return _worst_places(self, obstacles)
 
     def explain(self, obstacles: Obstacles = NOTHING) -> str:
-        """Return in words how near the vehicle comes, and by which way."""
+        """Return a sentence with the vehicle's stand-off, way and speeds."""
         worst, source = self.worst_places(obstacles), self.source
         x_m, y_m = worst.places_m[0]
         name = f"the vehicle with {source.tnt_kg:g} kg TNT"
@@ -251,16 +251,16 @@ class VehicleGround:
 
     @property
     def entry_stand_off_m(self) -> float:
-        """How near to a protected structure it is when it has just entered."""
+        """Least distance of its centre, just after entry, from a loaded wall, m."""
         return float(nearest_wall(self.reach().starts_m, self.structures)[0].min())
 
 
 class Impact(NamedTuple):
-    """Where a vehicle hits a piece with a crash rating, at its fastest.
+    """The fastest impact of a vehicle on a piece with a crash rating.
 
     Attributes:
         piece: The piece.
-        speed_km_h: The largest speed at which the vehicle hits it.
+        speed_km_h: Largest impact speed.
         holds: Whether it stops the vehicle.
     """
 
@@ -271,13 +271,13 @@ class Impact(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What a vehicle does against a layout.
+    """The drive of a vehicle against a layout.
 
     Attributes:
-        ground: The vehicle, and what it meets on the empty site.
-        reach: Where it gets to, through what gives way.
-        held: The pieces with a crash rating that stop it, if it gets to them.
-        broken: Those that do not.
+        ground: The vehicle with its surroundings on the empty site.
+        reach: Its reach, through the broken pieces.
+        held: The pieces with a crash rating that stop it, if it reaches them.
+        broken: The pieces with a crash rating that do not.
     """
 
     ground: VehicleGround
@@ -287,14 +287,14 @@ class Drive:
 
     @cached_property
     def speeds(self) -> SpeedField | None:
-        """How fast it is where; `None` if it has no speed."""
+        """Its largest speed at each place; `None` if it has no motion."""
         if self.ground.source.motion is None:
             return None
         return _speeds(self.ground, self.reach.near(*_places_shape(self.ground), STEP_M))
 
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
-        """The pieces with a crash rating that it hits, those that give way first."""
+        """Its impacts on pieces with a crash rating, broken ones first; none without a motion."""
         if self.speeds is None:
             return ()
         return tuple(
@@ -306,10 +306,10 @@ class Drive:
 
     @cached_property
     def worst(self) -> WorstPlaces:
-        """Where its charge goes off.
+        """The worst places of its charge.
 
         Raises:
-            ValueError: If the vehicle cannot enter; a scenario has none such.
+            ValueError: If the vehicle cannot enter, which a valid scenario excludes.
         """
         if not len(self.places_m):
             raise ValueError("the vehicle cannot enter, so its charge goes off nowhere")
@@ -317,9 +317,9 @@ class Drive:
 
     @cached_property
     def weakest_way(self) -> tuple[tuple[WayPoint, ...], tuple[Impact, ...]]:
-        """A way to the worst place with its speeds, and what it breaks through, in that order.
+        """A way to the worst place with its speeds, and the impacts on the pieces it breaks.
 
-        Both are empty if it has no speed.
+        Both are in the order of the drive, and empty without a motion.
         """
         if self.speeds is None:
             return (), ()
@@ -333,9 +333,9 @@ class Drive:
 
     @cached_property
     def places_m(self) -> FloatArray:
-        """Places where its charge may go off, (places, 2).
+        """Places of its charge, m (places, 2).
 
-        Also those beyond a piece that stopped the vehicle: its load gets as far as the rating says.
+        They include places beyond a piece that stopped it, at the penetration of the rating.
         """
         return np.concatenate([self.reach.places_m, *self._beyond_m()])
 
@@ -357,7 +357,7 @@ class Drive:
                 yield places[[self._is_clear(place, radius_m, standing) for place in places]]
 
     def _is_clear(self, place: FloatArray, radius_m: float, standing: Sequence[Rectangle]) -> bool:
-        """Return whether a charge fits there."""
+        """Return whether a charge fits at a place."""
         x, y = place.tolist()
         around = Rectangle(x, y, x, y).grown(radius_m)
         inside = self.ground.site.rectangle_m.contains(around)
@@ -366,7 +366,7 @@ class Drive:
 
 @lru_cache(maxsize=64)
 def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
-    """Work out what stops a vehicle."""
+    """Compute the drive of a vehicle."""
     motion = ground.source.motion
     held = (*obstacles.rated, *ground.rated_gates)
     broken: tuple[RatedPiece, ...] = ()
@@ -375,7 +375,7 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
     broken = tuple(each for each in held if each.rating.mass_kg < motion.mass_kg)
     held = tuple(each for each in held if each not in broken)
     slow = tuple(each for each in held if each.rating.speed_km_h < motion.max_speed_km_h)
-    if slow:  # nothing is faster than on the site without barriers, which is known once for all
+    if slow:  # speeds are largest on the site without barriers, which is computed only once
         slow = _too_slow(slow, _free_speeds(ground))
     while True:
         reach = _reach(ground, obstacles, held, broken)
@@ -393,12 +393,12 @@ def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
 def _too_slow(
     pieces: Iterable[RatedPiece], speeds: SpeedField, among: BoolArray | None = None
 ) -> tuple[RatedPiece, ...]:
-    """Return the pieces that a vehicle hits faster than their crash ratings cover.
+    """Return the pieces with impact speeds above those of their crash ratings.
 
     Args:
         pieces: The pieces.
-        speeds: Its speeds.
-        among: From which places of those it hits them; from all, unless given.
+        speeds: Speeds of the vehicle.
+        among: Places from which it may hit them (rows, columns); the open ones unless given.
     """
     return tuple(
         each
@@ -408,7 +408,7 @@ def _too_slow(
 
 
 def _along(way: Sequence[WayPoint]) -> Iterator[PointM]:
-    """Yield places along a way, half a metre apart or less; its own lie at the ends of arcs."""
+    """Yield places along a way, at most about 0.5 m apart, between its points at ends of arcs."""
     for one, other in pairwise(way):
         (x_m, y_m), (to_x_m, to_y_m) = one.place_m, other.place_m
         steps = max(round(hypot(to_x_m - x_m, to_y_m - y_m) / MODULE_SIDE_M), 1)
@@ -444,18 +444,20 @@ def _places_shape(ground: VehicleGround) -> tuple[int, int]:
 
 
 _FEW_ARCS: Final = 6
-"""Of so many arcs one is taken for a first look: their radii grow by a factor of three, about."""
+"""Step of the arcs in the first search: successive radii grow by a factor of about three."""
 
 
 @lru_cache(maxsize=256)
 def _weak_on(
     ground: VehicleGround, bits: bytes, pieces: tuple[RatedPiece, ...]
 ) -> tuple[RatedPiece, ...]:
-    """Return which pieces give way to a vehicle that gets to some places; many layouts leave these.
+    """Return the pieces that break under a vehicle with the given open places.
+
+    It is cached because many layouts have the same open places.
 
     Args:
-        ground: The vehicle, and what it meets.
-        bits: The places.
+        ground: The vehicle with its surroundings.
+        bits: The open places, packed.
         pieces: The pieces.
     """
     if _too_slow(pieces, _speeds_on(ground, bits, _FEW_ARCS)) == pieces:
@@ -464,7 +466,7 @@ def _weak_on(
 
 
 def _speeds(ground: VehicleGround, is_open: BoolArray) -> SpeedField:
-    """Work out how fast a vehicle with a speed is where it gets to."""
+    """Compute the speeds of a vehicle with a motion at the open places."""
     return _speeds_on(ground, _as_bits(is_open))
 
 
@@ -491,20 +493,20 @@ def _speeds_on(ground: VehicleGround, bits: bytes, arc_step: int = 1) -> SpeedFi
 
 @lru_cache(maxsize=8)
 def _free_speeds(ground: VehicleGround) -> SpeedField:
-    """Work out the speeds on the site without barriers, with gates that give way."""
+    """Compute the speeds on the site without barriers, with all rated gates broken."""
     reach = _reach(ground, NOTHING, (), ground.rated_gates)
     return _speeds(ground, reach.near(*_places_shape(ground), STEP_M))
 
 
 @lru_cache(maxsize=1024)
 def _worst_places(ground: VehicleGround, obstacles: Obstacles) -> WorstPlaces:
-    """Return where the charge goes off; kept for longer than the reach, which takes more memory."""
+    """Return the worst places; the cache is larger than that of drives, which take more memory."""
     return ground.drive(obstacles).worst
 
 
 @lru_cache(maxsize=64)
 def _outside(site: Rectangle, inside: tuple[Rectangle, ...]) -> tuple[Rectangle, ...]:
-    """Return rectangles that cover the site but for some of it; none if that is all of it."""
+    """Return rectangles that cover the site outside some others; none if there are no others."""
     if not inside:
         return ()
     xs = np.unique([site.left, site.right, *(x for each in inside for x in each[0::2])])

@@ -1,4 +1,4 @@
-"""The build zone: its cells, and which of them may take a module or a piece."""
+"""The build zone: its cells, and their availability for modules and pieces."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -53,21 +53,21 @@ BUDGET_TOLERANCE: Final = 1e-9
 """Share of the budget by which rounding may exceed it."""
 
 MOST_STOCK: Final = 10_000
-"""Modules, or pieces of all items together, that there may be to place."""
+"""Largest stock of modules, or of pieces of all items."""
 
 
 class KeepOut(Area):
-    """A part of the build zone that must stay empty, and why."""
+    """A part of the build zone that must stay empty, with the reason."""
 
 
 class CostArea(Area):
-    """A part of the build zone in which building has another cost, and why.
+    """A part of the build zone with another cost, with the reason.
 
     Attributes:
         module_cost: Cost of a module on a cell that overlaps the area, in a zone without a
             catalogue.
-        cost_factor: In a zone with a catalogue, what the cost of an item is multiplied by on a
-            cell that overlaps the area.
+        cost_factor: Factor of the cost of an item on a cell that overlaps the area, in a zone with
+            a catalogue.
     """
 
     module_cost: Cost | None = None
@@ -75,13 +75,13 @@ class CostArea(Area):
 
     @model_serializer(mode="wrap")
     def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out the one that the zone has no use for."""
+        """Omit the missing one of the two costs."""
         return {key: value for key, value in handler(self).items() if value is not None}
 
 
 @dataclass(frozen=True, eq=False)
 class _SameItems:
-    """The very items of a zone: to compare them takes longer than to make a catalogue of them."""
+    """The items of a zone compared by identity, since comparison by value is slow."""
 
     items: tuple[Item, ...]
     hardening: tuple[Hardening, ...]
@@ -105,9 +105,9 @@ def _catalogue_of(same: _SameItems, shape: tuple[int, int]) -> Catalogue:
 
 
 class BuildZone(Section):
-    """Where barriers may stand: a grid of cells of one module each.
+    """The zone for barriers: a grid of cells of one module each.
 
-    What is placed are the items of a catalogue or, without one, single modules.
+    Barriers are the items of a catalogue or, without one, single modules.
 
     Attributes:
         corner_m: Lower left corner of the cell (0, 0).
@@ -115,19 +115,18 @@ class BuildZone(Section):
         columns: Number of columns, counted to the right.
         items: The catalogue; without one, single modules are placed.
         hardening: Measures that harden facades, beside the items; of two that change the same
-            component of a bay, the one that stands later here counts.
-        removable: Structures that may be taken away, beside the items.
-        stock: How many modules there are to place; with a catalogue, the most pieces that may be
-            placed in all, which are all that there are unless it is given.
+            component of a bay, the later one counts.
+        removable: Measures that remove structures, beside the items.
+        stock: Number of modules; with a catalogue, the most pieces and measures in all, which is
+            their total stock unless given.
         keep_outs: Areas in which no cell may be used.
-        module_capacity: As for structures, for the modules of the barrier.
+        module_capacity: Capacity of the barrier's modules, as for structures.
         clearance_m: Least clear distance between a module and a structure.
-        module_cost: Cost of a module outside all cost areas; items have costs of their own.
-        cost_areas: Areas in which a module has another cost; the highest one counts.
-        budget: What modules or pieces may cost together; without it, anything.
-        access_way: A way across the zone that must stay open; without it, none need.
-        height_m: Height of the modules; without it, as high as the air. Items have heights of
-            their own.
+        module_cost: Cost of a module outside all cost areas, without a catalogue.
+        cost_areas: Areas with another cost; the highest one counts.
+        budget: Largest total cost of a layout; unlimited unless given.
+        access_way: A way across the zone that must stay open, if there is one.
+        height_m: Height of the modules, without a catalogue; the height of the air unless given.
     """
 
     corner_m: PointM
@@ -149,7 +148,7 @@ class BuildZone(Section):
     @model_validator(mode="before")
     @classmethod
     def _stock_of_items(cls, given: Any) -> Any:
-        """Fill in the stock of a zone with a catalogue: all the pieces that there are."""
+        """Fill in the stock of a zone with a catalogue: pieces of all items, and measures."""
         if not isinstance(given, Mapping) or "stock" in given:
             return given
         items = given.get("items")
@@ -158,12 +157,12 @@ class BuildZone(Section):
         pieces = sum(map(_pieces_of, items))
         for measures in (given.get("hardening"), given.get("removable")):
             pieces += len(measures) if isinstance(measures, list | tuple) else 0
-        # An empty catalogue is an error of its own, `build_zone_problems`.
+        # `build_zone_problems` reports an empty catalogue.
         return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
 
     @property
     def catalogue(self) -> Catalogue:
-        """What can be placed."""
+        """The catalogue of items, or of the single module."""
         if self.items:
             same = _SameItems(self.items, self.hardening, self.removable)
             return _catalogue_of(same, self.shape)
@@ -171,18 +170,18 @@ class BuildZone(Section):
 
     @property
     def measures(self) -> tuple[AnyMeasure, ...]:
-        """What is taken or not: what hardens facades, then what takes structures away."""
+        """The measures: those that harden facades, then those that remove structures."""
         return (*self.hardening, *self.removable)
 
     def taken_away(self, layout: Iterable[Element]) -> frozenset[str]:
-        """Return the names of the structures that a layout takes away."""
+        """Return the names of the structures that a layout removes."""
         taken = {each.item for each in layout if isinstance(each, Removal)}
         own = (each.structures for each in self.removable if each.name in taken)
         return frozenset(name for names in own for name in names)
 
     @property
     def may_be_taken_away(self) -> frozenset[str]:
-        """The names of the structures that some layouts take away."""
+        """The names of the structures that a layout can remove."""
         return frozenset(name for each in self.removable for name in each.structures)
 
     def modules(self, layout: Iterable[Element]) -> tuple[PlacedModule, ...]:
@@ -203,14 +202,14 @@ class BuildZone(Section):
         return tuple(modules)
 
     def piece_name(self, piece: Piece) -> str:
-        """Return what a piece is called in tables: its item and its centre in metres."""
+        """Return the name of a piece in tables: its item and its centre in metres."""
         x_m, y_m = self.element_rectangle_m(piece).centre
         return f"{piece.item}_x{x_m:.3f}_y{y_m:.3f}"
 
     def rigid_piece(self, element: Element) -> RigidPiece | None:
-        """Return a piece, or a module, as a rigid body.
+        """Return a piece or a module as a rigid body.
 
-        `None` for what has no height of its own: it is as high as the air.
+        It is `None` for a module as high as the air, and for a measure.
 
         Raises:
             LayoutError: If there is no such item, or it cannot be turned.
@@ -257,7 +256,7 @@ class BuildZone(Section):
 
     @property
     def cost_limit(self) -> float:
-        """What the modules may cost together, rounding allowed for; infinite without a budget."""
+        """The budget with an allowance for rounding; infinite without a budget."""
         return inf if self.budget is None else self.budget * (1.0 + BUDGET_TOLERANCE)
 
     def cells(self) -> Iterator[Cell]:
@@ -274,33 +273,33 @@ class BuildZone(Section):
         return Rectangle.from_corner(corner, (MODULE_SIDE_M, MODULE_SIDE_M))
 
     def cells_rectangle_m(self, row: int, column: int, rows: int, columns: int) -> Rectangle:
-        """Return what a rectangle of cells covers, by its lower left cell."""
+        """Return the rectangle of cells, m, by its lower left cell and its numbers of cells."""
         corner = self.cell_rectangle_m((row, column))[:2]
         return Rectangle.from_corner(corner, (columns * MODULE_SIDE_M, rows * MODULE_SIDE_M))
 
     def cell_centre_m(self, cell: Cell) -> PointM:
-        """Return the middle of the square that a cell covers."""
+        """Return the centre of a cell, m."""
         return self.cell_rectangle_m(cell).centre
 
     def has(self, cell: Cell) -> bool:
-        """Whether the grid has a cell."""
+        """Return whether a cell lies in the grid."""
         return 0 <= cell[0] < self.rows and 0 <= cell[1] < self.columns
 
 
 def _pieces_of(item: Any) -> int:
-    """Return how many pieces an item of a catalogue, checked or not, says that there are."""
+    """Return the stock of an item of a catalogue, validated or not; 0 if it is no whole number."""
     stock = item.get("stock") if isinstance(item, Mapping) else getattr(item, "stock", 0)
     return stock if isinstance(stock, int) else 0
 
 
 NO_ZONE: Final = BuildZone.model_construct(corner_m=(0.0, 0.0), rows=0, columns=0, stock=0)
-"""What stands for the zone of a scenario without one where that is no error: it has no cells."""
+"""The zone without cells, in place of a missing one."""
 
 
 def source_bounds_m(source: AnySource) -> Rectangle:
-    """Return the smallest rectangle around all the places that the charge's centre may be at.
+    """Return the bounding box of all places of the charge's centre, m.
 
-    Of a vehicle, whose places depend on the layout, around those where it enters the site.
+    For a vehicle, whose places depend on the layout, it is that of its entries.
     """
     if isinstance(source, RectangleSource):
         return source.rectangle_m
@@ -311,9 +310,9 @@ def source_bounds_m(source: AnySource) -> Rectangle:
 
 
 def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
-    """Return how near the centre of a charge from this source can come to each rectangle.
+    """Return the least distance of the charge's centre from each rectangle, m.
 
-    Of a vehicle, how near the border is where it enters the site.
+    For a vehicle it is the distance of its entries on the border.
     """
     if isinstance(source, VehicleSource):
         each = [box_distances_m(entry.bounds_m, boxes) for entry in source.entries]
@@ -325,15 +324,15 @@ def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
 
 
 def distance_m(source: AnySource, rectangle: Rectangle) -> float:
-    """Return how near the centre of a charge from this source can come to a rectangle."""
+    """Return the least distance of the charge's centre from a rectangle, m; see `distances_m`."""
     left, bottom, right, top = (np.array(side) for side in rectangle)
     return float(distances_m(source, (left, bottom, right, top)))
 
 
 def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> FloatArray:
-    """Return the distances between a segment and rectangles.
+    """Return the distances between a segment and rectangles, m.
 
-    Two convex figures that do not meet are nearest at a corner of one of them.
+    Two disjoint convex figures are nearest at a corner of one of them.
     """
     (x0, y0), (x1, y1) = start, end
     step_x, step_y = x1 - x0, y1 - y0
@@ -357,14 +356,14 @@ def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> FloatArray:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """A build zone and everything that decides, before any module, which cells may be used.
+    """A build zone with all that decides the usable cells before any module is placed.
 
     Attributes:
         zone: The build zone.
         structures: The structures on the site.
-        sources: Where the charge may come from.
-        charge_radius_m: Radius of the disc that the charge fills.
-        site: The site, for the entries of vehicles; `None` if it is unsound.
+        sources: The sources of the charge.
+        charge_radius_m: Radius of the charge's disc.
+        site: The site, for the entries of vehicles; `None` if it is invalid.
     """
 
     zone: BuildZone
@@ -379,17 +378,18 @@ class EmptyZone:
     """The cells of a build zone without modules; all arrays are read-only.
 
     Attributes:
-        catalogue: What can be placed.
-        usable: Which cells may be used, shape (rows, columns).
-        passable: Which cells no structure covers that stops people, shape (rows, columns).
-        ground_m: How high the ground of each cell is, shape (rows, columns).
-        levels: The cells of each height of the ground (heights, rows, columns); none where it is
+        catalogue: The catalogue.
+        usable: Whether each cell may be used, shape (rows, columns).
+        passable: Whether each cell is free of structures without a passage, shape (rows, columns).
+        ground_m: Height of the ground of each cell, shape (rows, columns).
+        levels: Mask of each height of the ground (heights, rows, columns); heights is 0 if it is
             flat.
-        module_costs: What a module on each cell costs, shape (rows, columns); with a catalogue,
-            what the cost of an item is multiplied by there.
-        fits: Where the cells under each variant may be used, by its lower left cell, shape
+        module_costs: Cost of a module on each cell, shape (rows, columns); with a catalogue, the
+            factor of an item's cost there.
+        fits: Whether the cells under each variant may be used, by its lower left cell, shape
             (variants, rows, columns).
-        costs: What each variant costs there (variants, rows, columns); infinite outside.
+        costs: Cost of each variant by its lower left cell (variants, rows, columns); infinite if it
+            reaches outside.
     """
 
     catalogue: Catalogue
@@ -402,7 +402,7 @@ class EmptyZone:
     costs: NDArray[np.float64]
 
     def places(self, free: BoolArray) -> BoolArray:
-        """Return where each variant covers nothing but free cells, all of them on one level.
+        """Return whether each variant covers only free cells, all of them on one level.
 
         Shape (variants, rows, columns).
         """
@@ -426,7 +426,7 @@ class EmptyZone:
 
 @lru_cache(maxsize=16)
 def empty_zone(surroundings: Surroundings) -> EmptyZone:
-    """Return what holds for the cells; for the same surroundings, the same object."""
+    """Return the cells of a build zone without modules, cached."""
     zone = surroundings.zone
     boxes, usable = zone.boxes, usable_cells(surroundings)
     passable = np.ones_like(usable)
@@ -449,7 +449,7 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
 
 
 def usable_cells(surroundings: Surroundings) -> BoolArray:
-    """Return which cells may be used, shape (rows, columns)."""
+    """Return whether each cell may be used, shape (rows, columns)."""
     usable = np.ones(surroundings.zone.shape, dtype=bool)
     for _, blocked in _blocked(surroundings, surroundings.zone.boxes):
         usable &= ~blocked
@@ -457,7 +457,7 @@ def usable_cells(surroundings: Surroundings) -> BoolArray:
 
 
 def reason_against(surroundings: Surroundings, cell: Cell) -> str | None:
-    """Return why a cell of the grid may not be used, or `None` if it may."""
+    """Return the reason why a cell of the grid may not be used, or `None` if it may."""
     boxes = _boxes(surroundings.zone, np.array([cell[0]]), np.array([cell[1]]))
     for reason, blocked in _blocked(surroundings, boxes):
         if blocked.any():
@@ -473,7 +473,7 @@ def _boxes(zone: BuildZone, rows: NDArray[np.int_], columns: NDArray[np.int_]) -
 
 
 def _blocked(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, BoolArray]]:
-    """Yield each reason against cells, with the cells that it holds for."""
+    """Yield each reason against the use of cells, with a mask of the cells."""
     zone, radius_m = surroundings.zone, surroundings.charge_radius_m
     for keep_out in zone.keep_outs:
         yield f"must stay empty: {keep_out.reason}", overlapping(keep_out.rectangle_m, boxes)
@@ -504,7 +504,7 @@ def _blocked(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, Bo
 
 
 def _on_entries(source: VehicleSource, site: Site | None, boxes: Boxes) -> BoolArray:
-    """Return the squares that overlap a vehicle that stands at one of its entries."""
+    """Return whether a vehicle at one of its entries overlaps each square."""
     inside = np.zeros(np.broadcast_shapes(boxes[0].shape, boxes[1].shape), dtype=bool)
     if site is not None:
         for entry in source.entries:
@@ -515,12 +515,12 @@ def _on_entries(source: VehicleSource, site: Site | None, boxes: Boxes) -> BoolA
 
 
 def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, BoolArray]]:
-    """Yield the cells without the clearance from each structure."""
+    """Yield for each structure a reason with a mask of the cells within the clearance."""
     clearance_m = surroundings.zone.clearance_m
     ground = ground_m(surroundings.structures, boxes)
     for structure in surroundings.structures:
         distances = box_distances_m(structure.rectangle_m, boxes)
-        if structure.carries:  # nothing keeps clear of what lies below it
+        if structure.carries:  # cells on a terrace need no clearance from it
             distances = np.where(ground < (structure.height_m or inf), distances, inf)
         yield (
             f"is closer than {clearance_m:g} m to the structure {structure.name!r}"
@@ -530,9 +530,9 @@ def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, 
 
 
 def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
-    """Return what a module on each cell costs: the highest cost of the areas around it.
+    """Return the cost of a module on each cell: the highest of the areas that overlap it.
 
-    With a catalogue that is the factor on an item's cost, 1 outside all areas.
+    With a catalogue it is the factor of an item's cost, 1 outside all areas.
     """
     highest = np.zeros(zone.shape)
     for area in zone.cost_areas:
@@ -545,7 +545,7 @@ def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
 def _costs(
     variant: Variant, module_costs: NDArray[np.float64], zone: BuildZone
 ) -> NDArray[np.float64]:
-    """Return what a variant costs by its lower left cell (rows, columns).
+    """Return the cost of a variant by its lower left cell (rows, columns).
 
     Every module of a piece bears its share of the cost, times the factor of its own cell.
     """
