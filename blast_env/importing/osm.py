@@ -142,7 +142,7 @@ def _features(path: Path, skipped: _Skipped) -> Iterator[MapFeature]:
 
 
 def _way(way: Any, tags: Tags, skipped: _Skipped) -> MapFeature | None:
-    """Return a way as an outline if it is closed and no street, otherwise as a line."""
+    """Return a way as an outline if it is closed and not a street, otherwise as a line."""
     try:
         places = _places(way.nodes)
     except osmium.InvalidLocationError:

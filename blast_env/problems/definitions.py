@@ -65,7 +65,7 @@ class Definition:
 
     @property
     def name(self) -> str:
-        """Name, as `control_room-told-v1`; those of further places end in `-told_2-v1`."""
+        """Name, such as `control_room-told-v1`; with another place, `control_room-told_2-v1`."""
         place = "" if self.place == 1 else f"_{self.place}"
         return f"{self.site}-{self.family}{place}-v{self.version}"
 

@@ -24,7 +24,7 @@ STEPPED: Final = (
     "an oblique wall is a staircase of modules: its loads are those along its own normal, with"
     " which components of 10 ms bend 3 to 7 % too far"
 )
-"""Note on a building with one (`python -m studies.gas oblique`)."""
+"""Note on a building with an oblique wall (`python -m studies.gas oblique`)."""
 
 
 class Edge(NamedTuple):

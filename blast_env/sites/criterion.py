@@ -344,9 +344,9 @@ def _wall_share(scenario: Scenario, lines: Visibility) -> float:
 
 
 def _longest_runs(zone: BuildZone) -> Iterator[tuple[float | None, int]]:
-    """Yield the height of each kind of wall, and how many modules a straight one has.
+    """Yield the height of each kind of wall, and the number of modules of a straight one.
 
-    All modules; or pieces of one item, as many as there are and are paid for.
+    It is the stock of modules or, with items, of one item's pieces as far as the budget allows.
     """
     if not zone.items:
         yield zone.height_m, zone.stock
