@@ -567,7 +567,9 @@ class GasResult:
                 f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
             )
         if not self.run.is_known(index):
-            notes.append(f"{NOT_KNOWN}: {self.end_reason}")
+            waited = self.end_reason is not EndReason.LOADS_KNOWN
+            why = str(self.end_reason) if waited else "take until='walls' to wait for it"
+            notes.append(f"{NOT_KNOWN}: {why}")
         if self.run.solver.lifted:
             notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")
         return tuple(notes)
