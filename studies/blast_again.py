@@ -1,9 +1,9 @@
-"""The blasts of tables once more, with the engine as it is now: `python -m studies.blast_again`.
+"""Repeat the blasts of tables with the present engine: `python -m studies.blast_again`.
 
-Loads in a table of `studies.blast_table` are those of the engine that ran them. This command reads
-sites, layouts and charges from tables and runs them again, each site in a process. Blasts are kept
-in a folder: broken off, the command goes on from there, and with more layouts a site it runs only
-those that are new.
+The loads in a table of `studies.blast_table` depend on the version of the engine. This command
+reads sites, layouts and charges from tables and runs the blasts again, one process per site. Blasts
+are cached in a folder: an interrupted command continues from there, and with more layouts per site
+it runs only the new ones.
 """
 
 from collections.abc import Sequence
@@ -46,8 +46,8 @@ def asked_in(table: pd.DataFrame, layouts: int | None) -> list[SiteBlasts]:
 
     Args:
         table: The table.
-        layouts: Most blasts of a site: those without a barrier first, then drawn ones; all unless
-            given.
+        layouts: Maximum number of blasts per site, first without a barrier, then drawn at random;
+            `None` for all.
     """
     found = []
     for number, (name, rows) in enumerate(table.groupby("scenario", sort=False)):
@@ -65,7 +65,7 @@ def _blast(row: dict[object, object]) -> tuple[Layout, Charge]:
 
 
 def run_site(asked: SiteBlasts, cells: str | None, folder: Path) -> list[dict[str, object]]:
-    """Run the blasts of a site that the folder does not have, and return the rows of all."""
+    """Run the blasts of a site that are missing in the folder; return the rows of all blasts."""
     site, engine = scenario_of(asked.name), find_engine("gas", cells=cells)
     evaluator = BlastEvaluator(site, engine, cache=folder)
     rows = []
@@ -85,7 +85,7 @@ def main(
     cells: Annotated[str | None, typer.Option(help="uniform, coarse or fine.")] = None,
     processes: Annotated[int, typer.Option(min=1)] = 2,
 ) -> None:
-    """Run the blasts of tables again; write a table of each under its own name."""
+    """Run the blasts of tables again; write one table for each, with the same file name."""
     with user_errors():
         make_folder(out)
         run = partial(run_site, cells=cells, folder=out / "blasts")

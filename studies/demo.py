@@ -68,7 +68,7 @@ class AgentComparison:
     """The trained agent against the other entries.
 
     Attributes:
-        standings: Of a league with one agent.
+        standings: Standings of a league with one agent.
     """
 
     standings: Standings

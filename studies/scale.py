@@ -163,7 +163,7 @@ STORES: Final[dict[str, Callable[[Path, int], Store]]] = {"files": files, "SQLit
 
 
 def measure_store(make: Callable[[Path, int], Store], folder: Path, entries: int) -> StoreFigures:
-    """Fill a store in an empty folder, use it, let two processes write to it, and overfill it."""
+    """Measure a store in an empty folder: fill, read, write from two processes, overfill."""
     content = np.random.default_rng(0).bytes(CONTENT_BYTES)
     room = 2 * entries * CONTENT_BYTES
     store = make(folder, room)

@@ -115,7 +115,7 @@ def catalogue() -> dict[str, Glazing | Wall]:
 
 
 def find_component(name: str, own: dict[str, Glazing | Wall] | None = None) -> Glazing | Wall:
-    """Return a component by name, of a scenario (`own`) or else of the catalogue.
+    """Return a component by name, from a scenario's components or else the catalogue.
 
     Raises:
         UnknownNameError: If there is none; the message suggests the nearest one.

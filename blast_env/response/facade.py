@@ -294,7 +294,7 @@ def peak_factor(cell_m: float, tnt_kg: float) -> float:
 
 
 def slowest_period_s(bays: Sequence[FilledBay]) -> float:
-    """Return the longest natural period of what stands in bays, s; 0 without any."""
+    """Return the longest natural period of the components of bays, s; 0 without components."""
     panes = (_pane(each.glazing).system for each in bays if each.glazing is not None)
     panels = (_panel(each.wall, each.bay.height_m).system for each in bays if each.wall is not None)
     return max((each.period_s for each in (*panes, *panels)), default=0.0)

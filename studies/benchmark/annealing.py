@@ -1,4 +1,4 @@
-"""Annealing from the rules' layouts, tuned for 50 blasts; the surrogate stands for gas dynamics."""
+"""Annealing from the rules' layouts, tuned for 50 blasts, with the surrogate for gas dynamics."""
 
 from dataclasses import dataclass, replace
 from functools import partial

@@ -80,7 +80,7 @@ def main(
     tables: Annotated[Path, typer.Option(help="Folder for the tables.")] = TABLES,
     pictures: Annotated[Path, typer.Option(help="Folder for the pictures.")] = PICTURES,
 ) -> None:
-    """Run the study and bring tables and pictures up to date."""
+    """Run the study and update the tables and pictures."""
     effort = Effort(layouts=layouts, seeds=seeds, charges=charges, realisations=realisations)
     items = ItemEffort(layouts=random, budget=budget, place_budget=place_budget)
     with user_errors(), running_on(cluster):

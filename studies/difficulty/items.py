@@ -262,7 +262,7 @@ class ItemStudy:
         places: The places of the charge.
 
     Raises:
-        BlastEnvError: As `every_place`, or if nothing can be placed.
+        BlastEnvError: As `every_place`, or if the engine is unknown.
     """
 
     def __init__(

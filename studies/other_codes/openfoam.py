@@ -130,7 +130,7 @@ def rho_central_foam(scene: WallScene, until_s: float, folder: Path) -> Historie
 
     Args:
         scene: The scene.
-        until_s: Simulated time to end at.
+        until_s: Simulated time at the end.
         folder: Folder of the case; must be empty or new.
 
     Raises:

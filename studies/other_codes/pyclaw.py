@@ -88,7 +88,7 @@ def by_pyclaw(cell_m: float, until_s: float, python: Path) -> Histories:
 
     Args:
         cell_m: Side of a cell.
-        until_s: Simulated time to end at.
+        until_s: Simulated time at the end.
         python: An interpreter with clawpack.
 
     Raises:
