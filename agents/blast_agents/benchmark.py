@@ -10,6 +10,7 @@ from blast_env.evaluation import BlastEvaluator
 from blast_env.geometry import Layout
 from blast_env.problems import BenchmarkProblem, Definition, KnownLayout, Method, ScoreReference
 from blast_env.problems.problem import shares_of
+from blast_env.problems.references import engine_key
 
 
 def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
@@ -65,6 +66,7 @@ def reference_of(
     known = dict(zip(names, layouts, strict=True))
     return ScoreReference(
         definition.digest,
+        engine_key(evaluator.engine),
         {name: shares[name] for name in rules},
         *(KnownLayout(each, known[each], {cell: shares[each]}) for each in (rule, best)),
     )

@@ -16,7 +16,13 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastCache, BlastEvaluator
 from blast_env.problems.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.problems.problem import shares_of
-from blast_env.problems.references import ScoreReference, Share, cell_key, stored_references
+from blast_env.problems.references import (
+    ScoreReference,
+    Share,
+    cell_key,
+    engine_key,
+    stored_references,
+)
 from blast_env.problems.submissions import MOST_RUNS, Run, Submission, read_runs, write_runs
 from blast_env.statistics import Estimate, stratified_estimate
 
@@ -166,7 +172,7 @@ def judge(
     """Replay a submission by gas dynamics.
 
     Equal layouts run once. The best rule and the best known layout run with the same cells, unless
-    their shares with these cells are stored.
+    their shares with these cells and this version of the engine are stored.
 
     Args:
         submission: The layouts.
@@ -218,7 +224,7 @@ def _judged(
     stored = {
         each.layout: each.shares[cell]
         for each in (reference.rule, reference.best)
-        if cell in each.shares and evaluator.engine.name == JUDGE
+        if cell in each.shares and engine_key(evaluator.engine) == reference.engine
     }
     wanted = (reference.rule.layout, reference.best.layout, *(run.layout for run in runs))
     layouts = [each for each in dict.fromkeys(wanted) if each not in stored]

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar
 from pydantic import ConfigDict, Field
 
 from blast_env.documents import checked_as, parse_json
+from blast_env.engines import Engine
 from blast_env.geometry import Layout
 
 Share = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -39,6 +40,7 @@ class ScoreReference:
 
     Attributes:
         digest: Digest of the problem's definition.
+        engine: The engine that judged the shares, with its version: `gas 6`.
         rules: Share of the load that remains with each rule, with cells of 0.5 m, by name.
         rule: The best of the rules: score 0.
         best: The best known layout: score 1.
@@ -47,9 +49,15 @@ class ScoreReference:
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
     digest: str
+    engine: str
     rules: dict[str, Share]
     rule: KnownLayout
     best: KnownLayout
+
+
+def engine_key(engine: Engine) -> str:
+    """Return an engine's name and version for `ScoreReference.engine`: another has other loads."""
+    return engine.version.partition(" (")[0]
 
 
 def cell_key(cell_m: float) -> str:

@@ -26,7 +26,7 @@ from blast_env.problems import (
     make,
     play,
 )
-from blast_env.problems.references import cell_key, stored_references
+from blast_env.problems.references import cell_key, engine_key, stored_references
 from blast_env.statistics import mean_estimate
 from blast_env.tables import markdown_table
 from studies.benchmark.annealing import Setting, on_sites, settings, sites_for
@@ -60,7 +60,8 @@ def references(
         engine = find_engine(JUDGE, 0.5)
         for name, definition in DEFINITIONS.items():
             stored = known.get(name)
-            if stored and stored.digest == definition.digest and name not in found:
+            made_by = (definition.digest, engine_key(engine))
+            if stored and (stored.digest, stored.engine) == made_by and name not in found:
                 continue
             if monotonic() - began > most_s:
                 break

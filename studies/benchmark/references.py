@@ -25,7 +25,7 @@ def published_layouts(definition: Definition, published: PublishedBlasts) -> Ite
     if any(isinstance(charge, VehicleCharge) for charge in charges):
         return
     met: dict[str, set[tuple[float, float, float, float]]] = defaultdict(set)
-    for scenario_hash, layout, charge in published.rows:
+    for _, scenario_hash, layout, charge in published.rows:
         if scenario_hash == definition.scenario.content_hash:
             met[layout].add(charge)
     wanted = {(*c.position_m, c.height_m, c.tnt_kg) for c in charges if isinstance(c, Charge)}

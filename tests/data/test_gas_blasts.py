@@ -1,6 +1,7 @@
 """The gas blasts as a data set: what its card promises of every row."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -75,12 +76,15 @@ def test_what_was_published_need_not_be_run_again(rows: pd.DataFrame) -> None:
 
         def found(
             cells: str,
+            version: str = re.findall(r"gas (\d+) \(", row["engine"])[0],
             of: PublishedBlasts = published,
             asked: tuple[str, Layout, Charge] = (site.content_hash, layout, charge),
         ) -> BlastLoads | None:
-            return of.get(BlastKey(*asked, 0, f"cell_m=0.5, cells='{cells}'", "none", ""))
+            engine = f"gas {version} (numba) cell_m=0.5, cells='{cells}'"
+            return of.get(BlastKey(*asked, 0, engine, "none", ""))
 
         assert found("coarse") is None
+        assert found("uniform", version="99") is None  # another version has other loads
         loads = found("uniform")
         assert (loads is None) == has_growing
         if loads is not None:

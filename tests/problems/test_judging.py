@@ -37,7 +37,9 @@ def wall(row: int) -> tuple[Piece, ...]:
 
 
 REFERENCES = {
-    NAME: ScoreReference("", {}, KnownLayout("rule", wall(16)), KnownLayout("best", wall(12)))
+    NAME: ScoreReference(
+        "", "row 1", {}, KnownLayout("rule", wall(16)), KnownLayout("best", wall(12))
+    )
 }
 
 
@@ -239,3 +241,19 @@ def test_so_many_runs_and_no_more_before_any_is_looked_at(tmp_path: Path) -> Non
 def test_a_problem_has_no_budget_that_counts_for_no_score() -> None:
     with pytest.raises(BlastEnvError, match="budget is 1001, must be an integer from 0 to 1000"):
         make(NAME, 1001, engine=RowEngine())
+
+
+def test_shares_of_another_version_of_the_engine_are_judged_again() -> None:
+    """Stored shares are of the load that the version had."""
+    cells = {"": 0.123}
+    stored = ScoreReference(
+        "", "row 1", {}, KnownLayout("rule", wall(16), cells), KnownLayout("best", wall(12), cells)
+    )
+    runs = Submission("own", (run(14, 50),))
+
+    def rule(reference: ScoreReference) -> float:
+        (run,) = judge(runs, None, engine=RowEngine(), references={NAME: reference}).runs
+        return run.rule
+
+    assert rule(stored) == 0.123
+    assert rule(replace(stored, engine="row 0")) != 0.123
