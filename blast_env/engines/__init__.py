@@ -1,6 +1,6 @@
-"""The engines: what they have in common, those that there are, and running a blast on one.
+"""Engines: their common interface, the registry, and functions that run blasts on them.
 
-`engines.gas` is not imported here: it takes Numba, and with it half a second.
+`engines.gas` is not imported here, because it imports Numba, which takes half a second.
 """
 
 from blast_env.engines.contract import (

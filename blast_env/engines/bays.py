@@ -1,7 +1,7 @@
-"""Bays under a blast of gas dynamics: their pressure histories, and what becomes of them.
+"""Bays of facades under a gas-dynamics blast: pressure histories, response and damage.
 
-A bay's history is the mean overpressure on the faces of cells in it, step by step. Bays with no air
-before them, as in a wall between two parts of a building, have none and are left out.
+The history of a bay is the mean overpressure on its cell faces at each step. Bays that no air
+touches, as in a wall between two parts of a building, have none and are left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,21 +48,22 @@ BAY_COLUMNS: Final = (
     Column("rotation_deg", "degrees", "support rotation of the wall panel"),
     Column("damage", "", "damage of the wall panel in the terms of PDC-TR 06-08"),
 )
-"""A row a bay; what a bay does not have is empty."""
+"""One row per bay; values for components that a bay lacks are empty."""
 
 LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN)
-"""A row a bay of a blast."""
+"""One row per bay under a blast."""
 
 
 @dataclass(frozen=True, eq=False)
 class BayLoads:
-    """The pressure histories of the bays of a blast.
+    """The pressure histories of the bays under a blast.
 
     Attributes:
-        bays: The bays with air before them.
-        recorder: Their histories, a patch each.
+        bays: The bays that air touches.
+        recorder: Their histories, one patch each.
         oblique: Loads on oblique walls; `None` without such a wall.
-        on_oblique: In which bay of an oblique wall each of these is, -1 for in none (bays,).
+        on_oblique: Index of the oblique-wall bay that holds each of these bays, -1 for none
+            (bays,).
     """
 
     bays: tuple[FilledBay, ...]
@@ -74,12 +75,12 @@ class BayLoads:
     def begin(
         cls, run: "GasRun", bays: Sequence[FilledBay], oblique: ObliqueLoads | None = None
     ) -> "BayLoads":
-        """Return the recorder of a run that has not begun; the run has to record it.
+        """Return the loads of a run that has not begun, to be recorded by `GasRun.record`.
 
         Args:
             run: The run.
             bays: The bays of its scenario.
-            oblique: Its loads on oblique walls, recorded in the same way.
+            oblique: Its loads on oblique walls, which it records as well.
         """
         from blast_env.physics.gas.probes import PatchHistories
 
@@ -96,7 +97,7 @@ class BayLoads:
 
     @property
     def history_pa(self) -> NDArray[np.float32]:
-        """Mean overpressures, along their own normals on oblique walls (bays, steps)."""
+        """Mean overpressures, Pa, on oblique walls along the wall's normal (bays, steps)."""
         history_pa = self.recorder.history_pa
         if self.oblique is not None:
             chosen = self.on_oblique >= 0
@@ -105,17 +106,17 @@ class BayLoads:
 
     @cached_property
     def response(self) -> FacadeResponse:
-        """What becomes of the bays."""
+        """The response of the windows and wall panels in the bays."""
         return respond(self.bays, *self.histories)
 
     def damages(
         self, alternatives: Sequence[Alternatives], peak_factor: float
     ) -> tuple[BayDamage, ...]:
-        """Return the damage of the bays under each component that they may have.
+        """Return the damage of the bays with each of their possible components.
 
         Args:
-            alternatives: What may stand in the bays of the scenario.
-            peak_factor: What peaks are multiplied by to be as sharp as in the open.
+            alternatives: The possible components of the bays of the scenario.
+            peak_factor: Factor on peaks to make them as sharp as in the open.
         """
         by_name = {each.name: each for each in alternatives}
         own = [by_name[each.bay.name] for each in self.bays]
@@ -123,7 +124,10 @@ class BayLoads:
 
     @property
     def histories(self) -> tuple[FloatArray, FloatArray]:
-        """Times, two or more however soon a run ended, and overpressures at them (bays, times)."""
+        """Two or more times, s (times,), and the overpressures at them, Pa (bays, times).
+
+        A run of fewer than two steps is padded to two times.
+        """
         time_s, step_s = self.recorder.time_s, self.recorder.step_s
         history_pa = self.history_pa.astype(np.float64)
         if len(time_s) > 1:
@@ -136,7 +140,7 @@ class BayLoads:
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
 
         Raises:
-            UnknownNameError: If there is no bay of that name with air before it.
+            UnknownNameError: If no bay of that name touches air.
         """
         import pandas as pd
 
@@ -147,10 +151,10 @@ class BayLoads:
         return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
 
     def table(self, run: "GasRun") -> "pd.DataFrame":
-        """Return one row a bay; see `LOADED_BAY_COLUMNS`.
+        """Return one row per bay; see `LOADED_BAY_COLUMNS`.
 
         Args:
-            run: The run that has recorded them.
+            run: The run that recorded the bays.
         """
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
@@ -159,10 +163,10 @@ class BayLoads:
         return table_of(rows, LOADED_BAY_COLUMNS)
 
     def known(self, run: "GasRun") -> dict[str, bool]:
-        """Return whether the load of each bay is known, by its name.
+        """Return whether the load of each bay was known at the end of the run, by its name.
 
         Args:
-            run: The run that has recorded them.
+            run: The run that recorded the bays.
         """
         names = [each.name for each in run.site.structures]
         come = {name: run.has_come(index) for index, name in enumerate(names)}
@@ -175,13 +179,13 @@ class BayLoads:
 
 
 class UnjudgedWalls(NamedTuple):
-    """Walls that count, of a building with a facade, but stand in no bay: no verdict covers them.
+    """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
 
     Attributes:
-        building: Its name; structures that are parts of one building are one.
-        area_m2: Their area that touches air, m2.
-        of_m2: That of all its walls that count, m2.
-        structures: The parts that they belong to.
+        building: Name of the building.
+        area_m2: Area of these walls that touches air, m2.
+        of_m2: Area of all counted walls of the building that touches air, m2.
+        structures: The parts of the building with such walls.
     """
 
     building: str
@@ -191,7 +195,7 @@ class UnjudgedWalls(NamedTuple):
 
     @property
     def words(self) -> str:
-        """How much it is, of which parts."""
+        """A sentence that states the area and the parts."""
         parts = ", ".join(self.structures)
         return (
             f"{self.area_m2:.1f} of {self.of_m2:.1f} m2 of its walls stand in no bay ({parts}): "
@@ -206,11 +210,13 @@ def unjudged_walls(
     bays: Sequence[FilledBay],
     area_m2: FloatArray,
 ) -> tuple[UnjudgedWalls, ...]:
-    """Return what no verdict covers of buildings with a facade, one each, where there is any.
+    """Return the walls that no verdict covers, one item per building with any.
+
+    Only buildings with a facade are examined.
 
     Args:
         table: The faces of cells.
-        outlines: The structures of the run; each says which of its walls count.
+        outlines: The structures of the run, with their counted walls.
         buildings: The building of each structure of the scenario.
         bays: The bays of the scenario.
         area_m2: Area of each face along the normal of its wall, m2 (faces,).
@@ -233,7 +239,7 @@ def unjudged_walls(
 
 
 def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
-    """Return what became of bays, one row each, with the keys of `BAY_COLUMNS`."""
+    """Return the response of bays, one row each, with the keys of `BAY_COLUMNS`."""
     panes = {index: row for row, index in enumerate(found.glazed.tolist())}
     panels = {index: row for row, index in enumerate(found.walled.tolist())}
     rows = []
@@ -274,7 +280,7 @@ def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
 def bay_patches(
     table: "FaceTable", structures: Sequence[str], bays: Sequence[FilledBay]
 ) -> NDArray[np.int64]:
-    """Return which bay each face of a cell is in, -1 for none (faces,)."""
+    """Return the index of the bay of each cell face, -1 for none (faces,)."""
     patch = np.full(len(table.faces), -1)
     walls: dict[tuple[str, str], list[int]] = {}
     for index, each in enumerate(bays):

@@ -1,13 +1,13 @@
-"""What an engine is: it tells the loads of a blast, and what kind of answer that is; all of them.
+"""The interface of engines, which compute the loads of a blast, and the registry of engines.
 
-An engine of one's own is a class with a name, a version and `loads`; everything else has a default:
+A custom engine is a class with a name, a version and `loads`; everything else has a default:
 
     class Mine(Engine):
         name, version = "mine", "mine 1"
 
         def loads(self, scenario, layout, charge, seed): ...
 
-It can be given wherever an engine's name can. A line in the table below gives it a name of its own.
+An instance is accepted wherever an engine's name is. A row in the table below registers a name.
 """
 
 from abc import ABC
@@ -44,19 +44,19 @@ class StructureLoad:
     Attributes:
         name: Name of the structure.
         protected: Whether its load counts.
-        weight: How much it counts among the protected structures.
+        weight: Its weight among the protected structures.
         impulse_sim: Sum of m |v| over the collisions, simulation units.
-        transferred_impulse_sim: Momentum really transferred, simulation units.
-        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; by gas
-            dynamics the peak specific impulse, as a mean over the walls that count.
-        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which know none.
-        peak_weight: How much that counts among the protected structures.
-        in_range: Whether the calibration was made for this distance and charge.
-        notes: Why not, a sentence each.
-        building: The building that it is part of; its own name where it is one by itself.
-        area_m2: Area of the walls that count; `None` where the engine knows none.
-        response: What counts of the response of its bays, where the objective counts that.
-        worst_damage: The largest damage of its bays, where that counts.
+        transferred_impulse_sim: Momentum actually transferred, simulation units.
+        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; for gas
+            dynamics the peak specific impulse, averaged over the counted walls.
+        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which have none.
+        peak_weight: Weight of the peak among the protected structures.
+        in_range: Whether this distance and charge lie in the range of the calibration.
+        notes: Reasons if they do not, one sentence each.
+        building: The building that it is part of; its own name if it is a building by itself.
+        area_m2: Area of the counted walls; `None` where the engine has no areas.
+        response: Response of its bays in the objective; `None` unless the objective is a response.
+        worst_damage: The largest damage of its bays, for the same objective.
     """
 
     name: str
@@ -91,8 +91,8 @@ class StructureLoad:
             impulse_pa_s: Impulse per area, Pa*s.
             peak_pa: Largest overpressure on its walls, Pa.
             in_range: Whether the engine was checked for this distance and charge.
-            notes: Why not, a sentence each.
-            area_m2: Area of the walls that count.
+            notes: Reasons if it was not, one sentence each.
+            area_m2: Area of the counted walls.
         """
         return cls(
             name=structure.name,
@@ -119,12 +119,12 @@ AnyPart = TypeVar("AnyPart", bound=_Part)
 
 
 def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
-    """Return the parts of a building whose loads are its load: those protected, or else all."""
+    """Return the parts whose loads make up a building's load: the protected ones, or else all."""
     return [each for each in parts if each.protected] or parts
 
 
 def mean_over_area(load: FloatArray, area: FloatArray) -> float:
-    """Return the load of a wall, structure or building: the mean over its area; NaN without any.
+    """Return the area-weighted mean load of a wall, structure or building; NaN without parts.
 
     Args:
         load: Loads on its parts (n,).
@@ -134,10 +134,10 @@ def mean_over_area(load: FloatArray, area: FloatArray) -> float:
 
 
 def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
-    """Return the loads on buildings, from those on the structures that they consist of.
+    """Combine the loads on structures into loads on buildings.
 
-    Impulses are means over the area of the walls that count. Where the engine knows no areas the
-    structures' weights stand for them.
+    Impulses are means over the area of the counted walls. Where the engine has no areas, the
+    weights of the structures replace them.
     """
     parts: dict[str, list[StructureLoad]] = {}
     for load in loads:
@@ -170,14 +170,14 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
 
 @dataclass(frozen=True, eq=False)
 class BlastLoads:
-    """The loads of one blast on all structures; the barrier is none.
+    """The loads of one blast on all structures, without the barrier.
 
     Attributes:
-        structures: One load a structure, in the order of the scene.
+        structures: One load per structure, in the order of the scene.
         module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
             scene, simulation units (modules,); for gas dynamics the momentum on its walls, N s.
-        bays: Damage of the bays of facades under each component that they may have, where the
-            objective counts that.
+        bays: Damage of the bays of facades with each of their possible components; empty unless
+            the objective is a response.
     """
 
     structures: tuple[StructureLoad, ...]
@@ -187,11 +187,11 @@ class BlastLoads:
     def with_facades(
         self, named: Collection[NamedBay], objective: ObjectiveSection
     ) -> "BlastLoads":
-        """Return the loads with the response of the facades; no blast is needed for other ones.
+        """Return the loads with the response of given facades, without another blast.
 
         Args:
-            named: What stands in the bays.
-            objective: Says what counts of their response.
+            named: The bays with the names of their components.
+            objective: Defines the measure of the response.
 
         Raises:
             BlastEnvError: If the bays were not recorded.
@@ -207,11 +207,14 @@ class BlastLoads:
 
     @property
     def level(self) -> LevelOfProtection:
-        """The level of protection that the facades of the protected structures reach."""
+        """The level of protection of the facades of the protected structures."""
         return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
 
     def are_for(self, scenario: AnyScenario) -> bool:
-        """Return whether these can be loads of a scenario: finite, one a structure and module."""
+        """Return whether these can be the loads of a scenario.
+
+        They must be finite, one per structure and module, with its bays where it needs them.
+        """
         found = find_scenario(scenario)
         names = [structure.name for structure in found.structures]
         modules = sum(structure.rows * structure.columns for structure in found.structures)
@@ -224,7 +227,7 @@ class BlastLoads:
         )
 
     def _has_bays_of(self, scenario: Scenario) -> bool:
-        """Return whether the damage of bays is what a scenario asks for: of known bays, finite."""
+        """Return whether the bays and components are the scenario's, and the damage is finite."""
         if not scenario.objective.is_response:
             return not self.bays
         known = {each.name: {*each.glazing, *each.wall} for each in scenario.alternatives}
@@ -241,12 +244,12 @@ class BlastLoads:
 
     @property
     def protected_impulse_pa_s(self) -> float:
-        """Impulses of the protected buildings, by weight, added up, Pa*s."""
+        """Weighted sum of the impulses of the protected buildings, Pa*s."""
         return sum(each.weight * each.impulse_pa_s for each in on_buildings(self.protected))
 
     @property
     def protected_impulse_sim(self) -> float:
-        """Impulses of the protected structures, by weight, added up, simulation units."""
+        """Weighted sum of the impulses of the protected structures, simulation units."""
         return sum(load.weight * load.impulse_sim for load in self.protected)
 
     @property
@@ -259,7 +262,7 @@ class BlastLoads:
         """Return the load of the protected structures in the unit of the objective.
 
         Args:
-            objective: Says which load counts.
+            objective: Selects the load: impulse, peak or response.
         """
         impulse_pa_s = {each.name: each.impulse_pa_s for each in on_buildings(self.protected)}
         return sum(
@@ -275,19 +278,19 @@ class BlastLoads:
 
     @property
     def in_range(self) -> bool:
-        """Whether the calibration was made for this distance to every protected structure."""
+        """Whether the load on every protected structure is in the range of the calibration."""
         return all(load.in_range for load in self.protected)
 
 
 def structure_response(
     bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
 ) -> tuple[float, float]:
-    """Return what counts of the response of one structure, and the largest damage of its bays.
+    """Return the response of one structure in the objective, and the largest damage of its bays.
 
     Args:
-        bays: The damage of its bays under each component that they may have.
-        named: What stands in the bays, of all structures.
-        objective: Says what counts.
+        bays: The damage of its bays with each of their possible components.
+        named: The bays of all structures with the names of their components.
+        objective: Defines the measure of the response.
     """
     chosen = {each.bay.name: each for each in named}
     is_glazing = objective.measure == "glazing"
@@ -302,11 +305,11 @@ def structure_response(
 
 @dataclass(frozen=True)
 class EngineOption:
-    """A setting that one engine has and others have not.
+    """A setting that is specific to one engine.
 
     Attributes:
-        name: Name of the field and, with dashes, of the command line's option.
-        help: What it is, a sentence for people.
+        name: Name of the field and, with dashes, of the command-line option.
+        help: Description for users, one sentence.
     """
 
     name: str
@@ -314,11 +317,11 @@ class EngineOption:
 
 
 class BlastOutcome(Protocol):
-    """What happened in a blast, whichever engine ran it."""
+    """The outcome of a blast on any engine."""
 
     @property
     def structures(self) -> "pd.DataFrame":
-        """One row a structure."""
+        """One row per structure."""
 
     @property
     def digest(self) -> str:
@@ -335,28 +338,28 @@ class RunnableBlast(Protocol):
         """Run the blast.
 
         Args:
-            progress: Called from time to time with the share of the time limit that has passed.
+            progress: Called periodically with the elapsed share of the time limit.
         """
 
 
 class Engine(ABC):
-    """Tells what a blast does to a site.
+    """Computes the loads of blasts on a site.
 
     Attributes:
         name: Name in records and calibrations.
         version: Version of the code that does the physics.
-        has_noise: Whether a charge has several realisations, drawn by a seed.
-        has_peaks: Whether it knows overpressures, and not impulses alone.
-        knows_heights: Whether a blast goes over what stands.
-        needs_calibration: Whether a law of the scenario's turns its impulses into Pa s.
-        title: Its kind, for people.
-        caveat: What is to be said with every result, a sentence; empty for nothing.
-        checked_for: What its loads were checked for, as in "outside what gas dynamics was ...".
-        options: Settings that it alone has.
-        unfolding: Where `BlastSimulator-v0` finds what shows a blast step by step, as
+        has_noise: Whether one charge has several realisations, selected by a seed.
+        has_peaks: Whether it computes overpressures as well as impulses.
+        knows_heights: Whether blasts pass over structures and barriers.
+        needs_calibration: Whether a calibration of the scenario converts its impulses to Pa s.
+        title: Its kind, for display.
+        caveat: Warning with every result, one sentence; empty for none.
+        checked_for: The scope of its checks as a noun clause, for "outside ...".
+        options: Settings that only this engine has.
+        unfolding: The class that shows a blast step by step in `BlastSimulator-v0`, as
             "module:Class"; empty where there is no blast to show.
-        screening: Where films of a blast are made, in the same form.
-        shown: Where `blast-env simulate` finds what shows a blast, in the same form.
+        screening: The class that makes films of a blast, in the same form.
+        shown: The class that shows a blast in `blast-env simulate`, in the same form.
     """
 
     has_noise: ClassVar[bool] = False
@@ -377,13 +380,13 @@ class Engine(ABC):
     def loads(
         self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
     ) -> BlastLoads:
-        """Return the loads of one blast on all structures: those of `blast` if it runs any.
+        """Return the loads of one blast on all structures, by default by running `blast`.
 
         Args:
             scenario: The scenario.
             layout: A legal layout.
-            charge: What goes off: where it does, or the vehicle that brings it.
-            seed: Decides the noise; engines without any pay no heed to it.
+            charge: The charge in place, or the vehicle that carries it.
+            seed: Seed of the noise; engines without noise ignore it.
         """
         return self.blast(scenario, layout, seed, charge).run().loads()
 
@@ -394,20 +397,20 @@ class Engine(ABC):
         seed: int = 0,  # noqa: ARG002
         charge: AnyCharge | None = None,  # noqa: ARG002
     ) -> RunnableBlast:
-        """Return one blast, to be run and looked into.
+        """Return one blast, for running and inspection.
 
         Raises:
-            BlastEnvError: If the engine tells loads without running one.
+            BlastEnvError: If the engine computes loads without a blast.
         """
         raise BlastEnvError(
             f"engine {self.name!r} tells loads without a blast: there is none to show"
         )
 
     def check(self, scenario: Scenario) -> None:
-        """Refuse a scenario whose loads this engine cannot tell.
+        """Refuse a scenario whose loads this engine cannot compute.
 
         Raises:
-            BlastEnvError: If it cannot; the message says why.
+            BlastEnvError: If it cannot; the message gives the reason.
         """
         if scenario.objective.needs_peaks and not self.has_peaks:
             counts = scenario.objective
@@ -419,27 +422,27 @@ class Engine(ABC):
             )
 
     def cost(self, scenario: Scenario, charge: AnyCharge) -> "CostGuess | None":  # noqa: ARG002
-        """Return what a blast costs, about; `None` where that is not worth telling before."""
+        """Return an estimate of the cost of a blast; `None` for engines without one."""
         return None
 
     def calibration(self, scenario: Scenario) -> Calibration | None:  # noqa: ARG002
-        """Return the law that turns its impulses into Pa s; `None` where none is needed."""
+        """Return the calibration that converts its impulses to Pa s; `None` if it needs none."""
         return None
 
     def preset(self, scenario: Scenario) -> str | None:  # noqa: ARG002
-        """Return the name of the scenario's parameters that it runs with; `None` for none."""
+        """Return the name of the preset of parameters in the scenario; `None` if it has none."""
         return None
 
     @property
     def words(self) -> str:
-        """The engine for people: its name, and the settings that decide its results."""
+        """The engine's name and the settings that affect its results, for display."""
         return self.name
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:  # noqa: ARG002
-        """Return in a line which engine spoke.
+        """Describe the engine in one line.
 
         Args:
-            scenarios: What it runs; engines with parameters name their presets.
+            scenarios: The scenarios of its runs; engines with parameters name their presets.
         """
         known = self.version.split()[0] == self.name
         return f"engine {self.version}" if known else f"engine {self.name}, {self.version}"
@@ -464,13 +467,13 @@ class Engine(ABC):
 
 @dataclass(frozen=True)
 class _Row:
-    """Where an engine is, and what must be known of it before it is imported.
+    """The place of an engine, and the facts needed before its import.
 
     Attributes:
-        place: "module:Class", as text: only the engine that runs is imported, for Numba alone
+        place: "module:Class", as text: only the engine in use is imported, because Numba alone
             takes half a second.
-        needs_calibration: As of the class.
-        extra: The extra that it needs; empty for none.
+        needs_calibration: Same as `Engine.needs_calibration` of the class.
+        extra: The package extra that it needs; empty for none.
     """
 
     place: str
@@ -488,21 +491,21 @@ _TABLE: Final[Mapping[str, _Row]] = MappingProxyType(
 )
 
 ENGINE_NAMES: Final = tuple(_TABLE)
-"""The engines that come with the package; the first one is the reference of the paper's model."""
+"""The engines in the package; the first one is the reference of the paper's model."""
 
 CALIBRATED_ENGINES: Final = tuple(name for name, row in _TABLE.items() if row.needs_calibration)
-"""Those whose loads a calibration turns into Pa s."""
+"""The engines whose loads need a calibration to be in Pa s."""
 
 JUDGE: Final = "gas"
-"""The engine whose word counts about protection."""
+"""The engine whose results decide about protection."""
 
 
 def default_engine(*scenarios: Scenario, particles: str = ENGINE_NAMES[0]) -> str:
-    """Return the name of the engine that sites take where nobody names one.
+    """Return the name of the default engine of sites.
 
-    Gas dynamics as soon as one site states anything that particles leave aside: a height, a
-    catalogue, a raised charge, walls that do not count, a gauge. Otherwise the particle model,
-    which was made for such sites.
+    It is gas dynamics if any site has a feature that particles ignore: a height, a catalogue, a
+    raised charge, walls that do not count, a gauge. Otherwise it is the particle model, which was
+    made for sites without such features.
 
     Args:
         scenarios: The sites.
@@ -522,8 +525,8 @@ def find_engine(
     Args:
         engine: The name, or the engine.
         cell_m: Side of the cells of gas dynamics; that of the engine unless given.
-        until: Loads that a blast of gas dynamics waits for; as the engine says unless given.
-        cells: Whether cells of gas dynamics grow, and how soon; as the engine says unless given.
+        until: Loads that a blast of gas dynamics waits for; those of the engine unless given.
+        cells: Growth of the cells of gas dynamics; that of the engine unless given.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
@@ -546,6 +549,6 @@ def _made(name: str) -> Engine:
 
 
 def load_plugin(place: str) -> Any:
-    """Return what a "module:name" stands for; see `Engine.unfolding`."""
+    """Import and return the object at "module:name"; see `Engine.unfolding`."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)

@@ -1,7 +1,7 @@
-"""Gas dynamics as an engine: loads in Pa s and Pa directly, no calibration between.
+"""Gas dynamics as an engine: loads directly in Pa s and Pa, without a calibration.
 
-An impulse is the peak specific impulse (`blast_env.physics.gas.probes`). One charge and one layout
-have one result: there is no noise, and a seed only draws the charge.
+Impulses are peak specific impulses (`blast_env.physics.gas.probes`). The engine is deterministic
+for a given charge and layout; a seed only draws the charge.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -74,19 +74,19 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     from blast_env.recording.tables import RunRecord
 
 NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
-"""Note on a load that is not known; `GasSettings.until` says which loads a run waits for."""
+"""Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
 
 _PROGRESS_CALLS: Final = 100
 
 
 _PEAK_AND_REBOUND: Final = 0.75
-"""Of a natural period: when a component that was hit has swung in and back out."""
+"""Share of a natural period in which a loaded component swings in and rebounds."""
 
 
 def response_time_s(scenario: Scenario) -> float:
-    """Return how long the slowest component of the facades of a site takes to respond, s.
+    """Return the response time of the slowest component of the facades of a site, s.
 
-    Components that hardening may put there count, too.
+    Components that hardening may install are included.
     """
     hardened = (
         bay
@@ -98,7 +98,7 @@ def response_time_s(scenario: Scenario) -> float:
 
 @dataclass(frozen=True)
 class GasEngine(GasSettings, Engine):
-    """Runs blasts as compressible gas, in compiled code; see `GasSettings` for its settings."""
+    """Computes blasts in a compressible gas, in compiled code; for settings see `GasSettings`."""
 
     has_peaks: ClassVar[bool] = True
     title: ClassVar[str] = "Gas dynamics"
@@ -121,12 +121,12 @@ class GasEngine(GasSettings, Engine):
         """Return a run at time 0, independent of every other run.
 
         Args:
-            site: What stands where.
+            site: The structures, the barrier, the charge and the gauges.
             recorders: Makes further recorders for the grid: maps, pictures.
-            response_s: How long it goes on at least after the last load was reached.
+            response_s: Minimum duration of the run after the last load has arrived.
 
         Raises:
-            BlastEnvError: If the grid would not fit into memory, or the charge or a gauge is in a
+            BlastEnvError: If the grid does not fit into memory, or the charge or a gauge is in a
                 solid.
         """
         from blast_env.physics.gas.engine import GasRun  # Numba takes half a second to import
@@ -140,11 +140,11 @@ class GasEngine(GasSettings, Engine):
         seed: int = 0,
         charge: AnyCharge | None = None,
     ) -> "GasBlast":
-        """Return one blast, to be run and looked into."""
+        """Return one blast, for running and inspection."""
         return GasBlast(find_scenario(scenario), layout, seed, self, charge)
 
     def cost(self, scenario: Scenario, charge: AnyCharge) -> CostGuess:
-        """Return what a blast costs, about; nothing is built for it."""
+        """Return an estimate of the cost of a blast, without building its grid."""
         if isinstance(charge, VehicleCharge):
             source = charge.source
             charge = Charge(source_bounds_m(source).centre, source.tnt_kg)
@@ -158,22 +158,22 @@ class GasEngine(GasSettings, Engine):
 
     @property
     def words(self) -> str:
-        """Its name, and the side of its cells."""
+        """Its name and the side of its cells."""
         return f"{self.name}, {self.cell_words}"
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
-        """Return in a line which engine spoke, and with which cells."""
+        """Describe the engine and its cells in one line."""
         return f"{super().describe(scenarios)}, {self.cell_words}"
 
 
 @dataclass(frozen=True, eq=False)
 class GasBlast:
-    """One blast of the gas engine that can be run.
+    """One blast of the gas engine, ready to run.
 
     Attributes:
-        scenario: The scenario; its bundled name or path will do.
+        scenario: The scenario, or its bundled name or path.
         layout: Cells of the build zone that hold a barrier module.
-        seed: Decides the charge, where the scenario leaves it open; nothing else.
+        seed: Draws the charge where the scenario leaves it open, and nothing else.
         engine: The engine.
         charge: The charge, instead of one drawn from the scenario.
     """
@@ -186,12 +186,12 @@ class GasBlast:
 
     @cached_property
     def site(self) -> BlastSite:
-        """What stands where."""
+        """The structures, the barrier, the charge and the gauges."""
         return build_site(self.scenario, self.layout, self.seed, self.charge)
 
     @property
     def threat(self) -> AnyCharge:
-        """The charge before there is a layout: a vehicle brings it as near as that lets it."""
+        """The charge before the layout is known, or the vehicle that carries it."""
         return draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
 
     def run(
@@ -202,9 +202,9 @@ class GasBlast:
         """Run the blast to its end.
 
         Args:
-            progress: Called from time to time with the share of the time limit that has passed.
-            recorders: Makes further recorders for the grid: maps, pictures. They stay in the
-                result, in `run.solver.recorders`.
+            progress: Called periodically with the elapsed share of the time limit.
+            recorders: Makes further recorders for the grid: maps, pictures. The result keeps them
+                in `run.solver.recorders`.
         """
         run = self.engine.start_on(self.site, recorders, response_time_s(self.scenario))
         oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
@@ -223,15 +223,15 @@ class GasBlast:
 
 @dataclass(frozen=True, eq=False)
 class GasResult:
-    """What happened in a blast of the gas engine.
+    """The outcome of a blast of the gas engine.
 
     Attributes:
-        blast: What was run.
+        blast: The blast.
         run: The run, at its end.
-        bay_loads: Histories of the bays of facades; `None` where nobody recorded them.
-        piece_loads: Histories on both sides of the barrier's pieces; `None` where nobody recorded
-            them, or no piece has a height.
-        oblique: Loads on oblique walls along their own normals; `None` without one.
+        bay_loads: Histories of the bays of facades; `None` if not recorded.
+        piece_loads: Histories on both sides of the barrier's pieces; `None` if not recorded or if
+            no piece has a height.
+        oblique: Loads on oblique walls along the normal of the wall; `None` without such a wall.
     """
 
     blast: GasBlast
@@ -247,12 +247,12 @@ class GasResult:
 
     @property
     def engine_version(self) -> str:
-        """Version of the code that did the physics."""
+        """Version of the code that computed the physics."""
         return self.blast.engine.version
 
     @property
     def end_reason(self) -> EndReason:
-        """Why the run ended."""
+        """Reason for the end of the run."""
         return self.run.end_reason or EndReason.TIME_LIMIT
 
     @property
@@ -262,15 +262,15 @@ class GasResult:
 
     @property
     def steps(self) -> int:
-        """Steps of the engine."""
+        """Number of steps of the engine."""
         return self.run.steps
 
     @property
     def collisions(self) -> "pd.DataFrame":
-        """There are none: a gas has no particles that collide.
+        """Unavailable, since a gas has no particles that collide.
 
         Raises:
-            BlastEnvError: Always; the message says what there is instead.
+            BlastEnvError: Always; the message names the alternatives.
         """
         raise BlastEnvError(
             "engine 'gas' has no collisions: loads are in structures, modules, faces and gauges"
@@ -278,52 +278,52 @@ class GasResult:
 
     @cached_property
     def faces(self) -> "pd.DataFrame":
-        """One row a face of a cell, structures and barrier; see `FACE_COLUMNS`."""
+        """One row per cell face, structures and barrier; see `FACE_COLUMNS`."""
         return face_table(self.run)
 
     @cached_property
     def on_walls(self) -> "pd.DataFrame":
-        """The same, with loads on oblique walls along their own normals; `share` is of the area."""
+        """`faces` with loads on oblique walls along their normals, and the area `share`."""
         return (
             self.faces.assign(share=1.0) if self.oblique is None else self.oblique.table(self.faces)
         )
 
     @cached_property
     def modules(self) -> "pd.DataFrame":
-        """One row a face of a module that touches air; see `MODULE_COLUMNS`."""
+        """One row per module face that touches air; see `MODULE_COLUMNS`."""
         return module_table(self.run, self.faces)
 
     @cached_property
     def walls(self) -> "pd.DataFrame":
-        """One row a wall or roof of a structure; see `WALL_COLUMNS`."""
+        """One row per wall or roof of a structure; see `WALL_COLUMNS`."""
         return wall_table(self.run, self.on_walls)
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
-        """One row a structure; see `STRUCTURE_COLUMNS`."""
+        """One row per structure; see `STRUCTURE_COLUMNS`."""
         return structure_table(self.run, self.on_walls)
 
     @cached_property
     def buildings(self) -> "pd.DataFrame":
-        """One row a building, whose parts are one; see `BUILDING_COLUMNS`."""
+        """One row per building, with its parts combined; see `BUILDING_COLUMNS`."""
         names = self.blast.scenario.building_names
         stepped = stepped_buildings(self.blast.scenario.structures)
         return structure_table(self.run, self.on_walls, names, stepped)
 
     @property
     def stepped_notes(self) -> tuple[str, ...]:
-        """What there is to say of peaks on oblique walls, a sentence a building."""
+        """Notes on peaks on oblique walls, one sentence per building."""
         stepped = self.buildings["stepped"].to_numpy(dtype=bool)
         return tuple(f"{name}: {STEPPED}" for name in self.buildings["building"][stepped])
 
     @cached_property
     def gauges(self) -> "pd.DataFrame":
-        """One row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
+        """One row per gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
         return gauge_table(self.run)
 
     @property
     def gauge_notes(self) -> tuple[str, ...]:
-        """Gauges whose load is not known, a sentence each."""
+        """Notes on gauges whose load is not known, one sentence each."""
         late = ~self.gauges["known"].to_numpy(dtype=bool)
         return tuple(f"gauge {name}: {NOT_KNOWN}" for name in self.gauges["name"][late])
 
@@ -343,14 +343,14 @@ class GasResult:
 
     @cached_property
     def bays(self) -> "pd.DataFrame":
-        """One row a bay: its load, and what becomes of it; see `LOADED_BAY_COLUMNS`."""
+        """One row per bay, with its load and response; see `LOADED_BAY_COLUMNS`."""
         if self.bay_loads is None:
             return table_of([], LOADED_BAY_COLUMNS)
         return self.bay_loads.table(self.run)
 
     @cached_property
     def unjudged(self) -> tuple[UnjudgedWalls, ...]:
-        """Walls of buildings with a facade that stand in no bay, one a building."""
+        """Counted walls in no bay, one item per building with a facade and such walls."""
         scenario, table = self.blast.scenario, self.run.table
         share = np.ones(len(table.face)) if self.oblique is None else self.oblique.share
         return unjudged_walls(
@@ -365,7 +365,7 @@ class GasResult:
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
 
         Raises:
-            UnknownNameError: If there is no bay of that name with air before it.
+            UnknownNameError: If no bay of that name touches air.
         """
         if self.bay_loads is None:
             raise UnknownNameError("bay", name, ())
@@ -373,7 +373,7 @@ class GasResult:
 
     @cached_property
     def pieces(self) -> "pd.DataFrame":
-        """One row a piece of the barrier: does it stand? See `PIECE_COLUMNS`."""
+        """One row per barrier piece, with its load and stability; see `PIECE_COLUMNS`."""
         if self.piece_loads is None:
             return table_of([], PIECE_COLUMNS)
         return self.piece_loads.table(self.time_s)
@@ -389,14 +389,14 @@ class GasResult:
         return self.piece_loads.history(name)
 
     def impulse(self, structure: str) -> ScaledImpulse:
-        """Return the peak specific impulse, mean over the walls that count.
+        """Return the peak specific impulse on a structure, averaged over the counted walls.
 
         Args:
             structure: Name of the structure.
 
         Returns:
             `.pa_s`, `.psi_s`, and `.in_range` with `.notes`: whether the engine was checked for
-            such a distance, charge and cell, and the run was not cut off.
+            such a distance, charge and cell, and the load was known at the end of the run.
 
         Raises:
             UnknownNameError: If there is no structure of that name.
@@ -407,7 +407,7 @@ class GasResult:
         return self._scaled(names.index(structure))
 
     def loads(self) -> BlastLoads:
-        """Return the loads on all structures; gas has no simulation units (NaN)."""
+        """Return the loads on all structures; values in simulation units are NaN."""
         named = {each.name: each for each in self.blast.scenario.structures}
         loads = tuple(
             StructureLoad.on(
@@ -429,42 +429,42 @@ class GasResult:
         return BlastLoads(loads, self.module_impulse_n_s, bays)
 
     def _walls(self, index: int) -> NDArray[np.int64]:
-        """Return the faces of the walls of a structure whose load counts (n,)."""
+        """Return the indices of the faces of the counted walls of a structure (n,)."""
         table = self.run.table
         counting = [FACE_NAMES.index(name) for name in self.run.site.structures[index].faces]
         return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
 
     @cached_property
     def _peak_pa(self) -> FloatArray:
-        """Peaks on the faces of cells, along the normals of oblique walls (faces,)."""
+        """Peaks on cell faces, Pa, on oblique walls along the normal of the wall (faces,)."""
         peak_pa = self.run.loads.peak_pa
         return peak_pa if self.oblique is None else self.oblique.peaks_pa(peak_pa)
 
     def _mean(self, index: int, values: FloatArray) -> float:
-        """Return the mean of a load over the walls of a structure that count; NaN without any."""
+        """Return the mean of a load over the counted walls of a structure; NaN without any."""
         own = self._walls(index)
         along = values if self.oblique is None else self.oblique.along_normals(values)
         return mean_over_area(along[own], self._share[own])
 
     def _scaled(self, index: int) -> ScaledImpulse:
-        """Return the impulse on a structure, by its index into those of the site."""
+        """Return the impulse on a structure, by its index in the site."""
         notes = self._notes(index)
         return ScaledImpulse(self._mean(index, self.run.loads.impulse_pa_s), not notes, notes)
 
     def _area_m2(self, index: int) -> float:
-        """Return the area of the walls of a structure that count."""
+        """Return the area of the counted walls of a structure, m2."""
         return float(self._share[self._walls(index)].sum()) * self.run.grid.cell_m**2
 
     @cached_property
     def _share(self) -> FloatArray:
-        """Share of the area of each face that its wall has (faces,)."""
+        """Ratio of the area of the real wall to that of each face (faces,)."""
         return np.ones(len(self.run.table.faces)) if self.oblique is None else self.oblique.share
 
     @cached_property
     def module_impulse_n_s(self) -> FloatArray:
-        """Momentum on each module of the structures over its walls, N s (modules,).
+        """Momentum on the walls of each module of the structures, N s (modules,).
 
-        In the order of the structures, row by row.
+        Modules are in the order of the structures, row by row.
         """
         table, sums = self.run.table, []
         for index, outline in enumerate(self.run.site.structures):
@@ -478,7 +478,7 @@ class GasResult:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of all loads, the gauges and the end, as hexadecimal digits."""
+        """SHA-256 of all loads, the gauges, the end time and the number of steps, hexadecimal."""
         state = sha256()
         for table in (self.run.loads, self.run.gauges):
             if table is not None:
@@ -489,7 +489,7 @@ class GasResult:
 
     @cached_property
     def run_record(self) -> "RunRecord":
-        """Everything needed to repeat the run: what was run, with which versions."""
+        """The inputs and versions needed to repeat the run, and its outcome."""
         blast, charge, known = self.blast, self.run.site.charge, versions(self.engine_version)
         return {
             "scenario": blast.scenario.name,

@@ -1,7 +1,7 @@
 """Tables of a blast of gas dynamics: loads by face, module, wall, structure, building and gauge.
 
-Impulses are peak specific impulses (`blast_env.physics.gas.probes`): that of a face of a cell, else
-the mean over the area. Each row says whether its load was known when the run ended
+Impulses are peak specific impulses (`blast_env.physics.gas.probes`) of cell faces, or their means
+over the area. The `known` column states whether a load was known when the run ended
 (`blast_env.physics.gas.ending`).
 """
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     from blast_env.physics.gas.probes import LoadTable
 
 KNOWN_COLUMN: Final = Column("known", "", "whether the load was known when the run ended")
-"""Whether a load can still have grown; see `blast_env.physics.gas.ending`."""
+"""False for a load that could have grown after the end; see `blast_env.physics.gas.ending`."""
 
 _LOADS: Final = (
     Column("impulse_pa_s", "Pa s", "peak specific impulse, mean over the area"),
@@ -43,7 +43,7 @@ FACE_COLUMNS: Final = (
     Column("z_m", "m", "centre, above the ground"),
     *_LOADS,
 )
-"""A row a face of a cell."""
+"""One row per cell face."""
 
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),
@@ -57,7 +57,7 @@ MODULE_COLUMNS: Final = (
     *_LOADS,
     Column("piece", "", "piece of a barrier that it is part of; empty if it is of none"),
 )
-"""A row a face of a module that touches air."""
+"""One row per module face that touches air."""
 
 WALL_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),
@@ -66,7 +66,7 @@ WALL_COLUMNS: Final = (
     Column("area_m2", "m2", "its area that touches air"),
     *_LOADS,
 )
-"""A row a wall or roof of a structure; not of the barrier."""
+"""One row per wall or roof of a structure, without the barrier."""
 
 _OF_COUNTING_WALLS: Final = (
     Column("height_m", "m", "its height"),
@@ -84,7 +84,7 @@ STRUCTURE_COLUMNS: Final = (
     Column("weight", "", "its weight among the protected structures"),
     *_OF_COUNTING_WALLS,
 )
-"""A row a structure; the loads are those on the walls that count."""
+"""One row per structure; loads are on the counted walls."""
 
 BUILDING_COLUMNS: Final = (
     Column("building", "", "name of the building, or of the structure that is one by itself"),
@@ -93,9 +93,9 @@ BUILDING_COLUMNS: Final = (
     Column("stepped", "", "whether it has an oblique wall, whose loads are along its own normal"),
     *_OF_COUNTING_WALLS,
 )
-"""A row a building; its loads are those on the walls that count of its protected parts.
+"""One row per building; loads are on the counted walls of its protected parts.
 
-Of a building without a protected part all parts count.
+In a building without a protected part, all parts count.
 """
 
 GAUGE_COLUMNS: Final = (
@@ -108,17 +108,17 @@ GAUGE_COLUMNS: Final = (
     Column("impulse_pa_s", "Pa s", "peak specific impulse"),
     KNOWN_COLUMN,
 )
-"""A row a gauge."""
+"""One row per gauge."""
 
 
 def load_values(loads: "LoadTable") -> dict[str, FloatArray]:
-    """Return the loads on the points of a table, by column."""
+    """Return the loads at the points of a table, by column."""
     names = [column.name for column in _LOADS if column is not KNOWN_COLUMN]
     return {name: getattr(loads, name) for name in names}
 
 
 def face_table(run: "GasRun") -> "pd.DataFrame":
-    """Return one row a face of a cell, structures and barrier; see `FACE_COLUMNS`."""
+    """Return one row per cell face, structures and barrier; see `FACE_COLUMNS`."""
     import pandas as pd  # it takes a third of a second
 
     table = run.table
@@ -149,7 +149,7 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
 
 
 def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataFrame":
-    """Return impulses as means over the area, peaks as the largest, arrivals as the first."""
+    """Group faces: area means of impulses, largest peaks, first arrivals."""
     means = ["impulse_pa_s", "known"]
     weighed = faces.assign(**{each: faces[each] * faces["share"] for each in means})
     groups: Any = weighed.groupby(keys, sort=False, observed=True)
@@ -161,7 +161,7 @@ def _grouped(run: "GasRun", faces: "pd.DataFrame", keys: list[str]) -> "pd.DataF
 
 
 def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
-    """Return one row a face of a module that touches air; see `MODULE_COLUMNS`.
+    """Return one row per module face that touches air; see `MODULE_COLUMNS`.
 
     Args:
         run: The run.
@@ -186,11 +186,11 @@ def module_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
-    """Return one row a wall or roof of a structure; see `WALL_COLUMNS`.
+    """Return one row per wall or roof of a structure; see `WALL_COLUMNS`.
 
     Args:
         run: The run.
-        faces: Its `face_table` with the `share` of the area that each face has.
+        faces: Its `face_table` with a column `share`, the area ratio of real wall to face.
     """
     counting = {each.name: each.faces for each in run.site.structures if each.cells is None}
     own = faces[faces["structure"].isin(list(counting))]
@@ -206,12 +206,12 @@ def structure_table(
     buildings: Mapping[str, str] | None = None,
     stepped: Collection[str] = (),
 ) -> "pd.DataFrame":
-    """Return one row a structure, or one a building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
+    """Return one row per structure or building; see `STRUCTURE_COLUMNS`, `BUILDING_COLUMNS`.
 
     Args:
         run: The run.
-        faces: As for `wall_table`.
-        buildings: The building that each structure is a part of, by name.
+        faces: Same as for `wall_table`.
+        buildings: The building of each structure, by name; `None` for one row per structure.
         stepped: The buildings with a wall that is a staircase.
     """
     together: dict[str, list[StructureOutline]] = {}
@@ -227,7 +227,7 @@ def structure_table(
 
 
 def means_by_wall(faces: "pd.DataFrame", column: str) -> "pd.Series[float]":
-    """Return the mean of a load over the area of each wall, by its name."""
+    """Return the mean of a load over the area of each wall, by the name of the wall."""
     groups = faces.assign(load=faces[column] * faces["share"]).groupby("face", observed=True)
     means: pd.Series[float] = groups["load"].sum() / groups["share"].sum()
     return means
@@ -240,7 +240,7 @@ def _mean_load(faces: "pd.DataFrame", column: str) -> float:
 def _structure_row(
     run: "GasRun", faces: "pd.DataFrame", name: str, parts: Sequence[StructureOutline]
 ) -> dict[str, object]:
-    """Return the loads on the walls that count of some structures together."""
+    """Return the combined loads on the counted walls of structures."""
     counted = counted_parts(parts)
     structure, face = faces["structure"], faces["face"]
     counting = [(structure == each.name) & face.isin(each.faces) for each in counted]
@@ -267,7 +267,7 @@ def _structure_row(
 
 
 def gauge_table(run: "GasRun") -> "pd.DataFrame":
-    """Return one row a gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
+    """Return one row per gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
     import pandas as pd  # it takes a third of a second
 
     gauges = run.gauges

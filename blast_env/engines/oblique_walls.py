@@ -1,10 +1,10 @@
-"""Loads on oblique walls along their own normals.
+"""Loads on oblique walls along the normal of the wall.
 
-An oblique wall is a staircase of modules, whose corners have peaks that the real wall has not. What
-counts is the momentum along the wall's own normal, per area of the real wall: the mean over a bay
-of the overpressures on the steps, each by how far it looks along that normal.
+An oblique wall is a staircase of modules, whose corners have peaks that the real wall lacks. The
+load is therefore the momentum along the wall's normal per area of the real wall: the mean over a
+bay of the overpressures on the steps, weighted by the cosine between step and wall normals.
 
-Impulses are such means of the impulses on faces of cells; peaks are those of the mean.
+Impulses are such means of the impulses on cell faces; peaks are the peaks of the mean.
 """
 
 from collections.abc import Sequence
@@ -32,12 +32,12 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 
 @dataclass(frozen=True, eq=False)
 class ObliqueLoads:
-    """The loads on the bays of oblique walls of a blast.
+    """The loads of a blast on the bays of oblique walls.
 
     Attributes:
-        bay: Which of these bays each face of a cell is in, -1 for none (faces,).
-        share: How far each face looks along the normal of its wall, 1 elsewhere (faces,).
-        recorder: Mean overpressures along the normals, a patch a bay.
+        bay: Index of the oblique-wall bay of each cell face, -1 for none (faces,).
+        share: Cosine between the normals of each face and its wall, 1 elsewhere (faces,).
+        recorder: Mean overpressures along the normals, one patch per bay.
     """
 
     bay: NDArray[np.int64]
@@ -46,7 +46,7 @@ class ObliqueLoads:
 
     @classmethod
     def begin(cls, run: "GasRun", structures: Sequence[AnyStructure]) -> "ObliqueLoads | None":
-        """Return what a run that has not begun will record; `None` without an oblique wall.
+        """Attach a recorder to a run that has not begun; return `None` without an oblique wall.
 
         Args:
             run: The run.
@@ -73,7 +73,7 @@ class ObliqueLoads:
         return np.asarray(self.bay >= 0)
 
     def along_normals(self, values: FloatArray) -> FloatArray:
-        """Return values of faces, those of oblique walls as means over their bays (faces,)."""
+        """Return values of faces, on oblique walls replaced by the means of bays (faces,)."""
         bay, share = self.bay[self.members], self.share[self.members]
         area = np.bincount(bay, weights=share)
         means = np.bincount(bay, weights=share * values[self.members]) / area
@@ -82,25 +82,27 @@ class ObliqueLoads:
         return found
 
     def peaks_pa(self, peak_pa: FloatArray) -> FloatArray:
-        """Return the peaks of faces, those of oblique walls as peaks of their bays (faces,)."""
+        """Return the peaks of faces, on oblique walls replaced by the peaks of bays (faces,)."""
         found = peak_pa.copy()
         peaks = self.recorder.history_pa.max(axis=1, initial=0.0).astype(np.float64)
         found[self.members] = peaks[self.bay[self.members]]
         return found
 
     def table(self, faces: "pd.DataFrame") -> "pd.DataFrame":
-        """Return a `face_table` with the loads of oblique walls along their own normals."""
+        """Return a `face_table` with the loads on oblique walls along the normal of the wall."""
         columns = [each for each in map(str, faces) if each.endswith("_pa_s")]
         changed = {each: self.along_normals(faces[each].to_numpy()) for each in columns}
         peaks = self.peaks_pa(faces["peak_pa"].to_numpy())
         return faces.assign(**changed, peak_pa=peaks, share=self.share)
 
     def bay_of(self, patch: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-        """Return in which bay of an oblique wall patches of faces are, -1 for in none (count,).
+        """Return the oblique-wall bay of each patch of faces, -1 for none (count,).
+
+        A patch belongs to the bay with most of its faces, if more than half lie on such a wall.
 
         Args:
             patch: The patch of each face, -1 for none (faces,).
-            count: How many patches there are.
+            count: Number of patches.
         """
         found = np.full(count, -1)
         for index in range(count):
@@ -118,14 +120,14 @@ def _add_bays(
     bay: NDArray[np.int64],
     share: FloatArray,
 ) -> None:
-    """Number the bays of a wall on from those that there are, in the order of their faces.
+    """Add the bays of a wall, numbered after the existing ones by storey, then along the wall.
 
     Args:
         table: The faces of cells.
         owners: The structure of each index; `None` for the barrier.
         wall: The wall.
-        bay: Bays of the faces, changed.
-        share: How far the faces look along the normals of their walls, changed.
+        bay: Bays of the faces, updated in place.
+        share: Cosines between the normals of faces and walls, updated in place.
     """
     parts = {i: each for i, each in enumerate(owners) if each and _is_part(each, wall)}
     of_building = np.flatnonzero(np.isin(table.structure, list(parts)) & (table.face < len(WALLS)))
@@ -159,7 +161,7 @@ def _is_part(structure: AnyStructure, wall: ObliqueWall) -> bool:
 
 
 def _edges(table: "FaceTable", faces: NDArray[np.int64], wall: ObliqueWall) -> list[Edge]:
-    """Return the sides of modules that faces of cells are on, in the plan of a building."""
+    """Return the module edge under each cell face, in the plan of a building."""
     names = [WALLS[each] for each in table.face[faces].tolist()]
     outwards = np.array([OUTWARDS[each] for each in names]).reshape(-1, 2)
     inside_m = table.centre_m[faces, :2] - 0.5 * MODULE_SIDE_M * outwards - wall.corner_m

@@ -1,6 +1,6 @@
-"""The particle engines: the paper's model on pymunk or event by event, and what a blast gives.
+"""The particle engines, the paper's model on pymunk or event by event, and their blasts.
 
-Their impulses are in simulation units; a calibration of the scenario turns them into Pa s.
+Impulses are in simulation units; a calibration of the scenario converts them to Pa s.
 """
 
 from abc import abstractmethod
@@ -46,11 +46,11 @@ PARTICLES_OVERRATE: Final = (
     " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Judge what"
     " matters with engine 'gas'."
 )
-"""Said of every evaluation with particles; measured by `python -m studies.gas judge`."""
+"""Caveat of every evaluation with particles; measured by `python -m studies.gas judge`."""
 
 
 class ParticleEngine(Engine):
-    """An engine of the particle model: it runs scenes of balls."""
+    """An engine of the particle model, which runs scenes of balls."""
 
     has_noise: ClassVar[bool] = True
     knows_heights: ClassVar[bool] = False
@@ -73,7 +73,7 @@ class ParticleEngine(Engine):
         seed: int = 0,
         charge: AnyCharge | None = None,
     ) -> "Blast":
-        """Return one blast, to be run and looked into."""
+        """Return one blast, for running and inspection."""
         return Blast(find_scenario(scenario), layout, seed, self, charge)
 
     def check(self, scenario: Scenario) -> None:
@@ -91,7 +91,7 @@ class ParticleEngine(Engine):
         return scenario.simulation.preset
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
-        """Return in a line which engine spoke, and with which presets."""
+        """Describe the engine and its presets in one line."""
         sections = [each.simulation for each in scenarios]
         presets = [each.preset + " with overrides" * bool(each.overrides) for each in sections]
         text = super().describe()
@@ -117,7 +117,7 @@ class EventEngine(ParticleEngine):
     """Runs scenes from one collision to the next, in compiled code.
 
     Attributes:
-        cell_units: Side of the cells in which neighbours are looked up; see `world_of`.
+        cell_units: Side of the cells of the neighbour search; see `world_of`.
     """
 
     step_name: ClassVar[str] = "events"
@@ -134,11 +134,11 @@ class EventEngine(ParticleEngine):
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:
-    """Return an engine of particles by its name, or the engine itself.
+    """Return a particle engine by its name, or the engine itself.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If it is no engine of particles.
+        BlastEnvError: If it is not a particle engine.
     """
     found = find_engine(engine)
     if not isinstance(found, ParticleEngine):
@@ -150,13 +150,13 @@ def find_particle_engine(engine: str | Engine) -> ParticleEngine:
 
 @dataclass(frozen=True, eq=False)
 class Blast:
-    """One blast that can be run: what `simulate` is called with.
+    """One blast of a particle engine, ready to run; see the arguments of `simulate`.
 
     Attributes:
-        scenario: The scenario; its bundled name or path will do.
+        scenario: The scenario, or its bundled name or path.
         layout: Cells of the build zone that hold a barrier module.
-        seed: Decides the charge, where the scenario leaves it open, the fan and the air.
-        engine: The engine that runs it.
+        seed: Draws the charge, where the scenario leaves it open, the fan and the air.
+        engine: The engine or its name.
         charge: The charge, instead of one drawn from the scenario.
     """
 
@@ -177,7 +177,7 @@ class Blast:
 
         Raises:
             UnknownNameError: If there is no such engine.
-            BlastEnvError: If it is no engine of particles.
+            BlastEnvError: If it is not a particle engine.
         """
         return find_particle_engine(self.engine)
 
@@ -189,7 +189,7 @@ class Blast:
         """Run the blast to its end.
 
         Args:
-            progress: Called from time to time with the share of the time limit that has passed.
+            progress: Called periodically with the elapsed share of the time limit.
         """
         run = self.start()
         limit_s = self.scene.parameters.stepping.time_limit_s
@@ -200,7 +200,7 @@ class Blast:
         return self.result(run)
 
     def result(self, run: BlastRun) -> "BlastResult":
-        """Return what happened in a run that has ended.
+        """Return the outcome of a run that has ended.
 
         Raises:
             ValueError: If the run has not ended.
@@ -223,18 +223,18 @@ class Blast:
 
 @dataclass(frozen=True, eq=False)
 class BlastResult:
-    """What happened in a blast.
+    """The outcome of a blast of a particle engine.
 
     Attributes:
-        blast: What was run.
+        blast: The blast.
         engine_name: Name of the engine.
-        engine_version: Version of the library that did the physics.
+        engine_version: Version of the library that computed the physics.
         collision_array: The collisions with modules, of `COLLISION_DTYPE` (n,).
-        obstacles: The structures and, with a layout, the barrier, with the hits they took.
-        final_balls: The balls that were left at the end.
+        obstacles: The structures and, with a layout, the barrier, with their hits.
+        final_balls: The remaining balls at the end.
         time_s: Simulated time at the end.
-        steps: Steps of the engine.
-        end_reason: Why the run ended.
+        steps: Number of steps of the engine.
+        end_reason: Reason for the end of the run.
     """
 
     blast: Blast
@@ -249,43 +249,43 @@ class BlastResult:
 
     @property
     def step_name(self) -> str:
-        """What `steps` counts: steps of time, or the events of an engine that goes by them."""
+        """The unit of `steps`: time steps, or the events of an event-driven engine."""
         return self.blast.particle_engine.step_name
 
     @cached_property
     def collisions(self) -> "pd.DataFrame":
-        """One row a collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
+        """One row per collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
         from blast_env.recording.tables import collision_table
 
         return collision_table(self.collision_array, self.obstacles)
 
     @cached_property
     def modules(self) -> "pd.DataFrame":
-        """One row a module; the columns are `recording.tables.MODULE_COLUMNS`."""
+        """One row per module; the columns are `recording.tables.MODULE_COLUMNS`."""
         from blast_env.recording.tables import module_table
 
         return module_table(self.obstacles)
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
-        """One row a structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
+        """One row per structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
         from blast_env.recording.tables import structure_table
 
         return structure_table(self.obstacles)
 
     @cached_property
     def buildings(self) -> "pd.DataFrame":
-        """One row a building, whose parts are one; see `recording.tables.BUILDING_COLUMNS`."""
+        """One row per building; the columns are `recording.tables.BUILDING_COLUMNS`."""
         from blast_env.recording.tables import building_table
 
         return building_table(self.structures, self.blast.scenario.building_names)
 
     @property
     def bays(self) -> "pd.DataFrame":
-        """There are none: particles have no pressure that could load a pane or a panel.
+        """Unavailable, since particles have no pressure to load a pane or a panel.
 
         Raises:
-            BlastEnvError: Always; the message says what does.
+            BlastEnvError: Always; the message names the alternative.
         """
         raise BlastEnvError(
             f"engine {self.engine_name!r} knows no overpressure, so no response of bays: take 'gas'"
@@ -293,10 +293,10 @@ class BlastResult:
 
     @property
     def pieces(self) -> "pd.DataFrame":
-        """There are none: particles have no pressure that could push a piece.
+        """Unavailable, since particles have no pressure to load a piece.
 
         Raises:
-            BlastEnvError: Always; the message says what does.
+            BlastEnvError: Always; the message names the alternative.
         """
         raise BlastEnvError(
             f"engine {self.engine_name!r} knows no overpressure, so no push on pieces: take 'gas'"
@@ -336,15 +336,15 @@ class BlastResult:
         return self.obstacle(structure).impulse
 
     def impulse(self, structure: str, calibration: Calibration | None = None) -> ScaledImpulse:
-        """Return the impulse per area on a structure, through a calibration.
+        """Return the impulse per area on a structure, converted by a calibration.
 
         Args:
             structure: Name of the structure.
             calibration: By default the scenario's.
 
         Returns:
-            `.psi_s`, `.pa_s`, and `.in_range` with `.notes`: whether the calibration was made
-            for this distance and charge, and the blast ran to its end.
+            `.psi_s`, `.pa_s`, and `.in_range` with `.notes`: whether this distance and charge lie
+            in the range of the calibration, and the blast ran to its end.
 
         Raises:
             UnknownNameError: If there is no structure or no calibration of that name.
@@ -397,7 +397,7 @@ class BlastResult:
     def load_unit(self) -> LoadUnit:
         """The unit of the loads in tables and pictures.
 
-        Pa s where the scenario has a calibration for the engine and anything was hit.
+        It is Pa s if the scenario has a calibration for the engine and any structure was hit.
         """
         charge = self.blast.scene.charge
         try:
@@ -409,8 +409,8 @@ class BlastResult:
     def digest(self) -> str:
         """SHA-256 of the whole outcome, as hexadecimal digits.
 
-        Two runs have the same digest exactly if all collisions, all module loads, the end and
-        all balls that were left are the same to the last bit.
+        Two runs have the same digest if and only if all collisions, module loads, remaining balls,
+        the end time and the number of steps are the same to the last bit.
         """
         state = sha256(self.collision_array.tobytes())
         loads = [
@@ -427,7 +427,7 @@ class BlastResult:
 
     @cached_property
     def run_record(self) -> "RunRecord":
-        """Everything needed to repeat the run: what was run, with which versions."""
+        """The inputs and versions needed to repeat the run, and its outcome."""
         blast, charge = self.blast, self.blast.scene.charge
         known = versions(self.engine_version)
         record: RunRecord = {

@@ -1,8 +1,8 @@
-"""Barrier pieces under a blast of gas dynamics: what pushes them, and whether they stand.
+"""Barrier pieces under a gas-dynamics blast: their loads and their stability.
 
-A piece is pushed by the difference of the mean overpressures on its two sides, across its length;
-a square one along both axes, of which the worse counts. Where another piece or a building stands
-against a side, no gas pushes there. Each piece stands alone: what neighbours hold is not counted.
+The load on a piece is the difference of the mean overpressures on its two sides, across its
+length; a square piece is loaded along both axes, of which the worse counts. A side that touches
+another piece or a building carries no load. Support by neighbouring pieces is ignored.
 """
 
 from collections.abc import Sequence
@@ -48,16 +48,16 @@ PIECE_COLUMNS: Final = (
     Column("outcome", "", "stands, slides, rocks or overturns"),
     Column("falls_in_blast", "", "whether it overturns before the blast is over"),
 )
-"""A row a piece of a barrier, or a module of one without pieces."""
+"""One row per piece of a barrier, or per module of a barrier without pieces."""
 
 
 class _Way(NamedTuple):
-    """One axis along which a piece is pushed.
+    """One axis along which a piece is loaded.
 
     Attributes:
-        piece: Its index.
-        low: The wall on the low side of the axis; the opposite one follows in `WALLS`.
-        faces: How many faces of cells one whole side has.
+        piece: Index of the piece.
+        low: Index of the wall on the low side of the axis; the opposite one follows in `WALLS`.
+        faces: Number of cell faces on one whole side.
     """
 
     piece: int
@@ -72,10 +72,10 @@ class PieceLoads:
     Attributes:
         elements: The pieces or modules with a height, in the order of the layout.
         bodies: Each as a rigid body.
-        zone: The build zone that they stand in.
-        ways: Along which axes each is pushed.
-        patches: Patch of the recorder on each piece and wall, -1 where no air is (pieces, 4).
-        recorder: The histories, a patch each.
+        zone: The build zone.
+        ways: The axes along which the pieces are loaded.
+        patches: Patch of the recorder on each piece and wall, -1 for no load (pieces, 4).
+        recorder: The histories, one per patch.
     """
 
     elements: tuple[Element, ...]
@@ -89,7 +89,7 @@ class PieceLoads:
     def begin(
         cls, run: "GasRun", scenario: Scenario, layout: Sequence[Element]
     ) -> "PieceLoads | None":
-        """Return the recorder of a run that has not begun; the run has to record it.
+        """Return the loads of a run that has not begun, to be recorded by `GasRun.record`.
 
         Args:
             run: The run.
@@ -139,7 +139,7 @@ class PieceLoads:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the pieces."""
         return tuple(
             self.zone.piece_name(each)
             if isinstance(each, Piece)
@@ -149,7 +149,7 @@ class PieceLoads:
 
     @cached_property
     def pushes(self) -> FloatArray:
-        """Mean overpressure on the low side less that on the high side (ways, steps)."""
+        """Mean overpressure on the low side minus that on the high side, Pa (ways, steps)."""
         histories = self.recorder.history_pa.astype(np.float64)
         pushes = np.zeros((len(self.ways), len(self.recorder.time_s)))
         for row, way in enumerate(self.ways):
@@ -162,13 +162,13 @@ class PieceLoads:
 
     @cached_property
     def responses(self) -> PieceResponses:
-        """What each piece does along each of its ways."""
+        """The response of each piece along each of its axes."""
         bodies = [self.bodies[way.piece] for way in self.ways]
         return piece_responses(bodies, self.recorder.time_s, self.pushes)
 
     @cached_property
     def _worst(self) -> list[int]:
-        """The way along which each piece moves most."""
+        """Index of the axis in `ways` along which each piece moves most."""
         found = self.responses
         rows: dict[int, int] = {}
         for row, way in enumerate(self.ways):
@@ -178,14 +178,14 @@ class PieceLoads:
         return [rows[piece] for piece in range(len(self.elements))]
 
     def fallen(self, end_s: float) -> tuple[Element, ...]:
-        """Return the pieces that overturn before a time."""
+        """Return the pieces that overturn by a time."""
         when_s = self.responses.overturn_s[self._worst]
         return tuple(
             each for each, at_s in zip(self.elements, when_s, strict=True) if at_s <= end_s
         )
 
     def history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressures on a piece over time: `time_s`, and a column a side.
+        """Return the mean overpressures on a piece over time: `time_s`, and one column per side.
 
         Raises:
             UnknownNameError: If there is no such piece.
@@ -201,10 +201,10 @@ class PieceLoads:
         return pd.DataFrame(columns)
 
     def table(self, end_s: float) -> "pd.DataFrame":
-        """Return one row a piece; see `PIECE_COLUMNS`.
+        """Return one row per piece; see `PIECE_COLUMNS`.
 
         Args:
-            end_s: When the blast is over.
+            end_s: End time of the blast.
         """
         rows = [self._row(piece, end_s) for piece in range(len(self.elements))]
         return table_of(rows, PIECE_COLUMNS)
@@ -236,7 +236,7 @@ class PieceLoads:
 
 
 def _ways(scenario: Scenario, elements: Sequence[Element], cell_m: float) -> list[_Way]:
-    """Return along which axes pieces are pushed: across their length, square ones along both."""
+    """Return the axes along which pieces are loaded: across their length, both if square."""
     zone, west, south = scenario.zone, WALLS.index("west"), WALLS.index("south")
     cells_a_module = round(MODULE_SIDE_M / cell_m)
     ways = []

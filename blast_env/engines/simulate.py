@@ -1,4 +1,4 @@
-"""Running blasts: pure functions of scenario, layout, seed and engine."""
+"""Functions that run blasts; results depend only on scenario, layout, seed, charge and engine."""
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -42,7 +42,7 @@ def simulate(
     cell_m: float | None = ...,
     until: str | float | None = ...,
     cells: str | None = ...,
-) -> Any: ...  # the site decides
+) -> Any: ...  # depends on the site
 
 
 @overload
@@ -86,17 +86,17 @@ def simulate(
     Args:
         scenario: The scenario, or its bundled name or path; see `load_scenario`.
         layout: (row, column) of the build-zone cells that hold a barrier module.
-        seed: Decides the charge, where the scenario leaves it open, the fan and the air.
+        seed: Draws the charge, where the scenario leaves it open, the fan and the air.
         engine: Name of an engine, or an engine: the particle engines `"pymunk"` and `"event"`, or
-            gas dynamics, `"gas"`, for which the seed does no more than draw the charge. The site
-            decides unless one is given; see `default_engine`.
+            gas dynamics, `"gas"`, for which the seed only draws the charge. The default depends
+            on the site; see `default_engine`.
         charge: The charge, instead of one drawn from the scenario.
-        progress: Called from time to time with the share of the time limit that has passed.
+        progress: Called periodically with the elapsed share of the time limit.
         cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
-        until: Loads that a blast of gas dynamics waits for: `"structures"` that are protected, all
-            `"walls"`, or the `"gauges"`; or how many seconds it lasts. Structures unless given.
-        cells: Whether cells of gas dynamics grow with the blast: `"uniform"` unless given,
-            `"coarse"` or `"fine"`; for large sites, see `GasSettings`.
+        until: Loads that a blast of gas dynamics waits for: protected `"structures"` (the
+            default), all `"walls"` or the `"gauges"`; or its duration in seconds.
+        cells: Growth of the cells of gas dynamics with the blast: `"uniform"` (the default, no
+            growth), `"coarse"` or `"fine"`; for large sites, see `GasSettings`.
 
     Returns:
         A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
@@ -109,7 +109,7 @@ def simulate(
             an engine that does not have it.
         BlastEnvError: If the seed is no integer, negative or too large.
     """
-    # Anything else is refused where it is read.
+    # Values that are not iterable are refused by the reader of the layout.
     elements = tuple(layout) if isinstance(layout, Iterable) else layout
     site = find_scenario(scenario)
     found = find_engine(default_engine(site) if engine is None else engine, cell_m, until, cells)
@@ -123,22 +123,21 @@ def simulate_many(
 ) -> list[BlastResult]:
     """Run blasts to their ends, several at a time in threads of this process.
 
-    The results are those of `Blast.run`, to the last bit, whatever the number of threads. Threads
-    pay with the compiled engines; with `pymunk` they change nothing but the order of the work.
-    The preparation of a blast and its result are Python, which one thread at a time runs.
+    The results are those of `Blast.run`, to the last bit, for any number of threads. Threads
+    shorten the work of compiled engines only; with `pymunk` they change only its order. The
+    preparation of a blast and its result are Python code, which one thread at a time executes.
 
     Args:
         blasts: The blasts.
-        threads: How many run at the same time; more than there are cores do not help.
-        progress: Called in the caller's thread with the share of the blasts that is done.
+        threads: Number of threads; more than the number of cores have no benefit.
+        progress: Called in the caller's thread with the finished share of the blasts.
 
     Returns:
         The results, in the order of the blasts.
 
     Raises:
-        BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot be
-            run; the message says which, the first one of them. Those that have not begun yet are
-            left out then.
+        BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot run;
+            the message names the first such blast.
     """
     check_workers("threads", threads)
     results: list[BlastResult] = []
@@ -152,8 +151,8 @@ def simulate_many(
 
 
 def _run_numbered(number: int, blast: Blast) -> BlastResult:
-    """Run a blast; an error of the user's says which one it was."""
+    """Run a blast; errors in its arguments name its number."""
     try:
         return blast.run()
-    except ValueError as error:  # what unusable arguments cause, `BlastEnvError` among it
+    except ValueError as error:  # from unusable arguments; includes `BlastEnvError`
         raise BlastEnvError(f"blasts[{number}]: {error}") from error
