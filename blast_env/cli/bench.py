@@ -46,12 +46,12 @@ _SITE_HEADERS: Final = (
     "site",
     "cells",
     "smallest",
-    "steps told",
+    "steps estimated",
     "steps",
-    "CPU told (s)",
+    "CPU estimated (s)",
     "CPU (s)",
     "million cell updates per CPU s",
-    "memory told (MB)",
+    "memory estimated (MB)",
     "memory (MB)",
 )
 _LARGE: Final = "large"
@@ -81,7 +81,7 @@ class BenchCommand(Command):
     environment: bool = option(True, "Also time `BlastBarrier-v0`.")
     site: tuple[str, ...] = option(
         (),
-        "What a blast by gas dynamics costs there, and what is told before, and nothing else: a "
+        "Only the cost of a blast by gas dynamics there, with its estimate before the run: a "
         "scenario, or `large` for streets; may be given several times.",
     )
     cells: tuple[str, ...] = option(

@@ -326,14 +326,14 @@ def oblique(
                     *(f"{1e3 * each:.1f}" for each in (found.stepped_m, found.told_m)),
                 )
             )
-    headers = ("turned by (degrees)", "impulse on faces (Pa s)", "as told")
+    headers = ("turned by (degrees)", "impulse on faces (Pa s)", "reported")
     peaks = (
         "mean peak of faces (kPa)",
         "largest",
-        "mean peak of bays, as told",
-        "largest, as told",
+        "mean peak of bays, reported",
+        "largest, reported",
     )
-    more = ("deflection of a component of 10 ms (mm), worst step", "as told")
+    more = ("deflection of a component of 10 ms (mm), worst step", "reported")
     print_line(markdown_table((*headers, *peaks, *more), rows))
 
 
