@@ -1,4 +1,4 @@
-"""Cases: the threats that layouts are compared on, who is told what, and which seeds are whose."""
+"""Cases for comparing layouts: threats, known or hidden charges, and disjoint seed ranges."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -27,24 +27,24 @@ from blast_env.values import checked_seed, generator
 
 @dataclass(frozen=True)
 class Threat:
-    """One blast that may happen, whatever stands in its way.
+    """One possible blast, independent of the layout.
 
-    Two layouts that meet the same threat meet the same charge, fan and air: the difference
-    between their loads is then due to the layouts alone (common random numbers).
+    Two layouts under the same threat have the same charge, fan and air, so that the difference
+    between their loads is due to the layouts alone (common random numbers).
 
-    The charge of a vehicle is the same one with either layout, at the place where that lets it
-    come: its worst place, its second worst, and so on.
+    The charge in a vehicle is the same with either layout, but its place depends on the layout:
+    the worst place that the vehicle can reach, the second worst, and so on by rank.
 
     Attributes:
-        charge: The charge.
-        seed: Decides the fan and the air.
+        charge: The charge, or the vehicle that carries it.
+        seed: Seed of the fan and the air.
     """
 
     charge: AnyCharge
     seed: int
 
     def __post_init__(self) -> None:
-        """Make the values plain Python numbers, so that a threat can be a key and be written.
+        """Convert the values to plain Python numbers, so that threats are hashable and writable.
 
         Raises:
             BlastEnvError: If the seed is not an integer of at least 0, or the charge is not a
@@ -63,21 +63,21 @@ class Threat:
         object.__setattr__(self, "charge", charge)
 
     def charge_against(self, scenario: AnyScenario, layout: Sequence[Element]) -> Charge:
-        """Return the charge where it goes off with a layout; only a vehicle's depends on that."""
+        """Return the charge at its place with a layout, which matters for vehicles only."""
         if not isinstance(self.charge, VehicleCharge):
             return self.charge
         return charge_against(find_scenario(scenario), layout, self.charge)
 
 
 def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, ...]:
-    """Return one threat a seed, its charge drawn from the scenario as `simulate` draws it.
+    """Return one threat per seed, its charge drawn from the scenario as in `simulate`.
 
-    Where several seeds draw the same vehicle, its charge is once at its worst place, once at its
-    second worst, and so on.
+    If several seeds draw the same vehicle, the first has its charge at the worst place, the next
+    at the second worst, and so on.
 
     Args:
         scenario: The scenario, or its bundled name or path.
-        seeds: At least one, none twice; each is the seed of its blast as well.
+        seeds: At least one, without repetition; each is also the seed of its blast.
 
     Raises:
         BlastEnvError: If there are no seeds, or one is repeated, negative or no integer.
@@ -96,30 +96,30 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, .
 
 
 class SeedRange(Enum):
-    """Which seeds belong to what: no blast that something was chosen by ever judges it.
+    """Disjoint seed ranges for training, search, selection and judgement.
 
-    The ranges are disjoint. A threat's seed decides its fan and air and, where it is drawn, its
-    charge.
+    No blast that influenced the choice of a layout or agent is used to judge it. The seed of a
+    threat determines its fan and air and, where the charge is drawn, its charge.
     """
 
     TRAINING = range(2**31)
-    """Episodes of the environments, and what people name by hand."""
+    """Episodes of the environments, and seeds given by users."""
     JUDGEMENT = range(2**31, 2**33)
-    """What layouts and agents are judged on in the end: league, evaluation, checks of a search."""
+    """Final judgement of layouts and agents: league, evaluation, checks of a search."""
     SEARCH = range(2**33, 2**33 + 2**31)
-    """What searches spend their blasts on."""
+    """Blasts of searches."""
     SELECTION = range(2**33 + 2**31, 2**34)
-    """What the best weights of a training are chosen by."""
+    """Choice of the best weights of a training."""
 
     def seeds(self, first: int, count: int) -> range:
         """Return consecutive seeds of the range.
 
         Args:
-            first: The first one, counted from the start of the range.
-            count: How many.
+            first: Index of the first one, from the start of the range.
+            count: Number of seeds.
 
         Raises:
-            BlastEnvError: If they are not all in the range.
+            BlastEnvError: If `count` is below 1, or they are not all in the range.
         """
         if first < 0 or count < 1 or first + count > len(self.value):
             raise BlastEnvError(
@@ -129,34 +129,32 @@ class SeedRange(Enum):
         return self.value[first : first + count]
 
     def draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.int64]:
-        """Draw seeds of the range, an array of the shape; one may come twice."""
+        """Draw an array of seeds of the range, with replacement."""
         return self.value.start + rng.integers(len(self.value), size=shape)
 
     def draw_distinct(self, rng: np.random.Generator, count: int) -> list[int]:
-        """Draw so many different seeds of the range."""
+        """Draw `count` seeds of the range, without replacement."""
         drawn = rng.choice(len(self.value), size=count, replace=False)
         return [self.value.start + int(each) for each in drawn]
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What layouts are held against each other on: a scenario and the threats that each meets.
+    """A scenario and its threats, for comparing layouts.
 
-    All layouts meet the same charges, fans and air (common random numbers), so that what differs
-    is due to the layouts.
+    All layouts are under the same charges, fans and air (common random numbers), so that
+    differences between loads are due to the layouts.
 
     Attributes:
-        scenario: The scenario; its bundled name or path will do.
-        threats: What layouts meet, at least one. With several realisations first one of each
-            charge, then another of each, and so on: threat k is of charge k modulo the number of
-            charges.
-        realisations: How many threats there are of each charge.
-        risk: How the loads of several charges become one; as the scenario's objective says
-            unless given.
-        charge: The charge, where whoever proposes a layout is told it; `None` where it is hidden.
-        name: For people.
-        seed: Decides what a search or a random layout draws.
-        practice: What a search for this case may spend its blasts on: none of `threats`.
+        scenario: The scenario, or its bundled name or path.
+        threats: At least one. With several realisations, first one of each charge, then another
+            of each, and so on: threat k has charge k modulo the number of charges.
+        realisations: Number of threats of each charge.
+        risk: Risk measure over the charges; that of the scenario's objective unless given.
+        charge: The charge, if it is known when a layout is proposed; `None` if it is hidden.
+        name: Name for display.
+        seed: Seed of the random numbers of a search or a random layout.
+        practice: Case for the blasts of a search, without any of `threats`.
 
     Raises:
         BlastEnvError: If there are no threats, they are not as many for each charge, or one of
@@ -192,25 +190,25 @@ class Case:
 
     @property
     def charges(self) -> tuple[AnyCharge, ...]:
-        """The charges, each as often as it was drawn."""
+        """The charges of one realisation; a charge that was drawn twice is included twice."""
         count = max(len(self.threats) // self.realisations, 1)
         return tuple(threat.charge for threat in self.threats[:count])
 
     def charges_against(self, layout: Sequence[Element]) -> tuple[Charge, ...]:
-        """Return the charges where they go off with a layout, each as often as it was drawn."""
+        """Return `charges` at their places with a layout."""
         threats = self.threats[: len(self.charges)]
         return tuple(each.charge_against(self.scenario, layout) for each in threats)
 
     @property
     def is_mean(self) -> bool:
-        """Whether all charges count alike."""
+        """Whether the risk measure is the mean over the charges."""
         return isinstance(self.risk or self.scenario.objective.risk, MeanRisk)
 
     def combined(self, loads: Sequence[float] | FloatArray) -> float:
-        """Return the one load that counts: the mean per charge, then the risk over the charges.
+        """Combine loads into one: the mean per charge, then the risk measure over the charges.
 
         Args:
-            loads: One a threat, in their order; at least one, perhaps only the first ones.
+            loads: One per threat, in their order; all, or only the first ones, at least one.
         """
         values = np.asarray(loads, dtype=np.float64)
         count = min(len(self.charges), len(values))
@@ -219,10 +217,10 @@ class Case:
         return risk(np.array(means))
 
     def counted(self, loads: Sequence[float] | FloatArray, layout: Sequence[Element] = ()) -> float:
-        """Return what a layout is worth by the scenario's objective, which may count its cost.
+        """Return the objective value of a layout, which may include its cost.
 
         Args:
-            loads: What counts under each threat, as for `combined`.
+            loads: The load under each threat, in the unit of the objective, as for `combined`.
             layout: The layout.
         """
         objective, combined = self.scenario.objective, self.combined(loads)
@@ -237,7 +235,7 @@ class Case:
 def visible_case(
     scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk | None = None
 ) -> Case:
-    """Return the case of a known charge: it goes off once a seed, with another fan and air."""
+    """Return the case of a known charge, with one realisation of fan and air per seed."""
     threats = tuple(Threat(charge, seed) for seed in seeds)
     return Case(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
 
@@ -249,17 +247,17 @@ def practice_visible(
     seed: int,
     risk: Risk | None = None,
 ) -> Case:
-    """Return what a search for a known charge may spend its blasts on.
+    """Return the case for the blasts of a search with a known charge.
 
     Args:
         scenario: The scenario, or its bundled name or path.
         charge: The charge.
-        realisations: How many fans and airs, at least one.
-        seed: Decides the seeds of the blasts, and what the search draws.
-        risk: As for `Case`.
+        realisations: Number of realisations of fan and air, at least 1.
+        seed: Draws the seeds of the blasts, and seeds the search.
+        risk: Same as for `Case`.
 
     Raises:
-        BlastEnvError: If there are to be none.
+        BlastEnvError: If `realisations` is below 1.
     """
     _at_least_one("realisations", realisations)
     drawn = SeedRange.SEARCH.draw_distinct(generator(seed), realisations)
@@ -269,23 +267,22 @@ def practice_visible(
 def practice_hidden(
     scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk | None = None
 ) -> Case:
-    """Return what a search for a hidden charge may spend its blasts on.
+    """Return the case for the blasts of a search with a hidden charge.
 
     Args:
-        scenario: The scenario, or its bundled name or path; the charges are drawn from where it
-            lets them be.
-        charges: How many charges, at least one.
-        realisations: How many fans and airs for each of them, at least one.
-        seed: Decides the charges, the seeds of the blasts, and what the search draws.
-        risk: As for `Case`.
+        scenario: The scenario, or its bundled name or path; it defines the possible charges.
+        charges: Number of charges, at least 1.
+        realisations: Number of realisations of fan and air for each charge, at least 1.
+        seed: Draws the charges and the seeds of the blasts, and seeds the search.
+        risk: Same as for `Case`.
 
     Returns:
-        A case whose first charge is the one in the middle of all, and each further one as far as
-        possible from those before it, so that the first few stand for all. Those of vehicles come
-        before them, the worst first.
+        A case in which the charges of vehicles come first, by rank. The most central of the other
+        charges follows, then each as far as possible from those before it, so that the first few
+        represent all.
 
     Raises:
-        BlastEnvError: If there are to be none.
+        BlastEnvError: If `charges` or `realisations` is below 1.
     """
     _at_least_one("charges", charges)
     _at_least_one("realisations", realisations)
@@ -298,9 +295,9 @@ def practice_hidden(
 
 
 def one_of_each_charge(threats: Iterable[Threat]) -> tuple[Threat, ...]:
-    """Return the first threat of each charge: without noise another one is the same blast again.
+    """Return the first threat of each charge, for engines without noise.
 
-    A vehicle's charges beyond its places are at the same places again.
+    Ranks of a vehicle beyond the number of its places repeat the same places.
     """
     first: dict[AnyCharge, Threat] = {}
     for threat in threats:
@@ -312,7 +309,7 @@ def one_of_each_charge(threats: Iterable[Threat]) -> tuple[Threat, ...]:
 
 
 def check_distinct(threats: Sequence[Threat]) -> None:
-    """Refuse a threat that is there twice: it would count as evidence twice (`BlastEnvError`)."""
+    """Refuse a repeated threat, which would count as evidence twice (`BlastEnvError`)."""
     for index, threat in enumerate(threats):
         if threat in threats[:index]:
             raise BlastEnvError(
@@ -321,9 +318,9 @@ def check_distinct(threats: Sequence[Threat]) -> None:
 
 
 def _spread_first(charges: Sequence[AnyCharge]) -> list[AnyCharge]:
-    """Return charges, each as far as possible from those before it, the middle one first.
+    """Order charges: those of vehicles by rank, then the central one, then by largest distance.
 
-    Those of vehicles come before them, by their rank.
+    Each of the latter is as far as possible from the nearest of those before it.
     """
     vehicles = [charge for charge in charges if isinstance(charge, VehicleCharge)]
     fixed = [charge for charge in charges if isinstance(charge, Charge)]

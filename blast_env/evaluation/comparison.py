@@ -1,8 +1,7 @@
-"""The one comparison: what the blast does with a barrier and without it, on the same threats.
+"""Comparison of loads with and without a barrier on the same threats.
 
-One rule for nothing: where nothing arrives without a barrier there is no reduction (NaN), and a
-comparison that is to say how good layouts are is refused for a case in which nothing arrives at all
-(`check_something_arrives`).
+A reduction is NaN where the load without a barrier is 0. A comparison of layouts is refused for a
+case in which no threat causes a load without a barrier (`check_something_arrives`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -42,18 +41,20 @@ if TYPE_CHECKING:  # takes a third of a second to import
 
 @dataclass(frozen=True)
 class Assessment:
-    """The load on the protected structures with one layout.
+    """The loads on the protected structures with one layout.
 
-    Each is the mean over the realisations of a charge, then by the risk measure over the charges.
+    Each load is the mean over the realisations of a charge, combined over the charges by the risk
+    measure.
 
     Attributes:
-        impulse_pa_s: Impulses per area of the protected structures, by weight, added up, Pa*s.
-        impulse_sim: The same in simulation units.
-        peak_pa: The largest overpressure on their walls, Pa; NaN for particles.
-        load: What the scenario's objective counts, in its unit: Pa s for impulses, Pa for peaks,
-            without a unit for both.
-        in_range: Whether the calibration was made for every one of the blasts.
-        level: Where the response of facades counts: the level of protection under every charge.
+        impulse_pa_s: Weighted sum of the impulses per area of the protected buildings, Pa*s.
+        impulse_sim: Weighted sum of the impulses of the protected structures, simulation units.
+        peak_pa: The largest overpressure on the walls of these structures, Pa; NaN for particles.
+        load: The objective value: Pa s for impulses, Pa for peaks, dimensionless for both, for a
+            response and with a target.
+        in_range: Whether all the blasts are in the range of the calibration.
+        level: The lowest level of protection under any threat; `None` unless the objective is a
+            response.
     """
 
     impulse_pa_s: float
@@ -69,17 +70,17 @@ class Assessment:
         return self.impulse_pa_s / PA_PER_PSI
 
     def reduction_from(self, unprotected: "Assessment") -> float:
-        """Return by which share what counts is below that without a barrier; NaN if that is 0."""
+        """Return the relative reduction of `load` from no barrier; NaN if that load is 0."""
         return reductions(self.load, unprotected.load).item()
 
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What layouts are worth on a case, each worked out once.
+    """The objective values of layouts on a case, each computed once.
 
     Attributes:
-        evaluator: Runs the blasts and remembers them; it has the scenario.
-        case: The threats, and how they become one number.
+        evaluator: Runs and caches the blasts; it holds the scenario.
+        case: The threats, and the rule that combines them into one number.
     """
 
     evaluator: BlastEvaluator
@@ -87,7 +88,7 @@ class Objective:
     _assessed: dict[Layout, Assessment] = field(default_factory=dict, init=False)
 
     def assess(self, layout: Sequence[Element]) -> Assessment:
-        """Return what a layout is worth; a blast for each threat, unless known.
+        """Return the loads and the objective value of a layout, at one blast per threat not cached.
 
         Args:
             layout: (row, column) of the cells that hold a module, in any order.
@@ -110,11 +111,11 @@ class Objective:
         return self._assessed[key]
 
     def paid(self, layout: Sequence[Element]) -> float:
-        """Return what a layout is worth as rewards are paid: in psi s, psi, or without a unit."""
+        """Return the objective value in the unit of rewards: psi s, psi, or dimensionless."""
         return self.case.scenario.objective.paid(self.assess(layout).load)
 
     def loads(self, layout: Sequence[Element]) -> list[BlastLoads]:
-        """Return the loads with a layout, one a threat of the case.
+        """Return the loads with a layout, one per threat of the case.
 
         Raises:
             LayoutError: If the layout does not fit the build zone.
@@ -123,32 +124,32 @@ class Objective:
         return self.evaluator.loads_of_many(pairs)
 
     def counted_loads(self, layout: Sequence[Element]) -> tuple[float, ...]:
-        """Return the load that counts with a layout, in the objective's unit, one a threat."""
+        """Return the loads with a layout in the unit of the objective, one per threat."""
         counts = self.case.scenario.objective
         return tuple(each.load(counts) for each in self.loads(layout))
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Layouts, one a case, against no barrier on the same threats.
+    """Layouts, one per case, compared with no barrier on the same threats.
 
-    Where there are several cases, each counts alike: a case's reduction is 1 - load with the
-    barrier / without it, each as the case combines its threats (the mean, unless the scenario's
-    objective says otherwise), and the intervals are those of the mean over cases. With a single
-    case they are those over its threats, and there is none for CVaR and worst. Intervals are 95 %
-    confidence intervals; they say nothing about how right the model is.
+    The reduction of a case is 1 - load with the barrier / load without it, each combined over the
+    threats by the risk measure of the case. Several cases have equal weights, and intervals are
+    those of the mean over cases. With a single case they are over its threats, and there is none
+    if its risk measure is not the mean, or its objective has a target. Intervals are 95 %
+    confidence intervals; they do not include the error of the model.
 
     Attributes:
-        cases: The cases; each has as many threats.
-        layouts: One a case.
-        loads: On the protected structures with the layouts, in the unit of the objective
+        cases: The cases, all with the same number of threats.
+        layouts: One per case.
+        loads: Loads on the protected structures with the layouts, in the unit of the objective
             (cases, threats); see `BlastLoads.load`.
         unprotected: The same without a barrier (cases, threats).
-        in_range: Whether the calibration was made for it (cases, threats); all, unless given.
+        in_range: Whether each blast is in the range of the calibration (cases, threats).
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
 
     Raises:
-        BlastEnvError: If nothing arrives at the protected structures of a case without a barrier.
+        BlastEnvError: If no load reaches the protected structures of a case without a barrier.
     """
 
     cases: tuple[Case, ...]
@@ -164,12 +165,12 @@ class Comparison:
 
     @property
     def has_one_case(self) -> bool:
-        """Whether there is but one case, so that intervals and worst are over its threats."""
+        """Whether there is a single case, so that intervals and the worst are over its threats."""
         return len(self.cases) == 1
 
     @property
     def _is_mean(self) -> bool:
-        """Whether a layout is worth the mean over the charges, and its cost does not count."""
+        """Whether the objective is the mean load over the charges, without a target."""
         return self.cases[0].is_mean and self.cases[0].scenario.objective.target is None
 
     @cached_property
@@ -189,13 +190,13 @@ class Comparison:
         return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
 
     def difference(self, other: "Comparison") -> Estimate:
-        """Return by how much the mean reduction is above another's, with its paired interval.
+        """Return the difference in mean reduction from another, with its paired interval.
 
         Args:
             other: Other layouts on the same cases.
         """
         if self.has_one_case and self._is_mean:
-            # As a reduction: of what is left if all that this takes off more is taken off.
+            # The reduction of the load without a barrier if it fell by the difference of loads.
             bare = self.unprotected[0]
             left = bare + self.loads[0] - other.loads[0]
             return reduction_estimate(left, bare)
@@ -203,9 +204,9 @@ class Comparison:
 
     @property
     def worst_reduction(self) -> float:
-        """The least reduction in any case; with a single one, under any threat.
+        """The smallest reduction in any case; with a single case, under any threat.
 
-        Threats that do nothing without a barrier are left out.
+        Threats of a single case without a load on the unprotected site are left out.
         """
         if not self.has_one_case:
             return float(self.case_reductions.min())
@@ -223,7 +224,7 @@ class Comparison:
 
     @property
     def cvar(self) -> float:
-        """Mean load of the worst cases (threats of a single one) with the layouts."""
+        """Mean load of the worst cases (of the worst threats of a single case)."""
         return conditional_value_at_risk(self._samples(self.loads), self.cvar_level)
 
     @property
@@ -232,13 +233,13 @@ class Comparison:
         return conditional_value_at_risk(self._samples(self.unprotected), self.cvar_level)
 
     def _samples(self, loads: FloatArray) -> FloatArray:
-        """Return what means and tails are over: the cases, or the threats of a single one."""
+        """Return the samples of means and tails: the cases, or the threats of a single one."""
         combined = [case.combined(row) for case, row in zip(self.cases, loads, strict=True)]
         samples: FloatArray = loads[0] if self.has_one_case else np.array(combined)
         return samples
 
     def _of_cases(self, loads: FloatArray, layouts: Sequence[Layout]) -> FloatArray:
-        """Return what layouts are worth in each case (cases,)."""
+        """Return the objective values of layouts in each case (cases,)."""
         rows = zip(self.cases, loads, layouts, strict=True)
         return np.array([case.counted(row, layout) for case, row, layout in rows])
 
@@ -252,22 +253,22 @@ def compare(
     cvar_level: float = CVAR_LEVEL,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
-    """Hold layouts against no barrier, each on the threats of its case.
+    """Compare layouts with no barrier, each on the threats of its case.
 
     Args:
-        evaluators: Run the blasts and remember them.
-        cases: At least one; each has as many threats.
-        layouts: One a case: (row, column) of the cells that hold a module, in any order.
-        processes: Worker processes; they change nothing but the time.
-        cvar_level: The worst share 1 - `cvar_level` makes the CVaR.
-        progress: Called with the share of the blasts that is done.
+        evaluators: Run and cache the blasts.
+        cases: At least one, all with the same number of threats.
+        layouts: One per case: (row, column) of the cells that hold a module, in any order.
+        processes: Number of worker processes; it changes only the time.
+        cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level`.
+        progress: Called with the finished share of the blasts.
 
     Raises:
         LayoutError: If a layout does not fit the build zone of its case.
         CalibrationError: If a scenario names no calibration, or one that was made with other
             parameters or another engine.
-        BlastEnvError: If there are no cases, a threat is there twice, `processes` or `cvar_level`
-            is out of bounds, or nothing arrives in a case even without a barrier.
+        BlastEnvError: If there are no cases, a threat is repeated, `processes` or `cvar_level` is
+            out of bounds, or no load arrives in a case even without a barrier.
     """
     check_cvar_level(cvar_level)
     if not cases:
@@ -294,10 +295,10 @@ def loads_of_both(
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]:
-    """Return the loads with a layout and without a barrier, one a threat of the case each.
+    """Return the loads with a layout and those without a barrier, each one per threat.
 
     Raises:
-        BlastEnvError: As for `compare`.
+        BlastEnvError: If a threat is repeated, or `processes` is below 1.
     """
     check_distinct(case.threats)
     pairs = [(each, threat) for threat in case.threats for each in (layout, ())]
@@ -313,7 +314,7 @@ def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> N
         unprotected: Load on the protected structures without a barrier (cases, threats).
 
     Raises:
-        BlastEnvError: If it is 0 under every threat of a case; the message says of which.
+        BlastEnvError: If it is 0 under every threat of a case, which the message names.
     """
     for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
         if not mean > 0.0:
@@ -332,7 +333,7 @@ def _both(
 ) -> Iterator[tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]]:
     """Yield the loads with and without the layout of each case.
 
-    The blasts of cases that follow each other on one scenario are run together.
+    Consecutive cases on one scenario run together.
     """
     done = 0
     for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):
@@ -389,7 +390,7 @@ def charge_values(charge: Charge) -> dict[str, object]:
 
 
 def case_table(comparison: Comparison) -> "pd.DataFrame":
-    """Return one row a case; see `CASE_COLUMNS`."""
+    """Return one row per case; see `CASE_COLUMNS`."""
     rows = []
     for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
         threat = case.threats[0]
@@ -410,7 +411,7 @@ def case_table(comparison: Comparison) -> "pd.DataFrame":
 
 
 def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
-    """Return a comparison as what JSON knows; NaN is `None`."""
+    """Return a comparison as JSON-compatible data; NaN becomes `None`."""
     cases = [
         {
             **row,
@@ -439,6 +440,6 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
 
 
 def estimate_record(estimate: Estimate) -> dict[str, float | None]:
-    """Return an estimate with its interval as what JSON knows."""
+    """Return an estimate with its interval as JSON-compatible data."""
     value, low, high = map(number_or_none, estimate)
     return {"value": value, "ci95_low": low, "ci95_high": high}

@@ -1,20 +1,21 @@
-"""What a charge does to the buildings of a site, and to the barrier before them.
+"""Consequences of charges for the buildings of a site and for the barrier.
 
-Panes, panels and levels of protection of buildings with a facade; what would become of an ordinary
-house where others stand; which pieces of the barrier slide, rock or overturn.
+They are the damage of panes and panels and the level of protection of buildings with a facade, the
+damage of an ordinary house in place of each other building, and the sliding, rocking or
+overturning of barrier pieces.
 
-Loads come from gas dynamics, a blast a charge and a layout. Other glass needs no new blast: the
-loads stay, and the response is worked out again.
+Loads come from gas dynamics, with one blast per charge and layout. Other glass needs no new blast:
+the loads stay, and only the response is computed again.
 
-The probits of the Green Book want the side-on wave. A blast has it nowhere near a building: its
-walls turn it round. So it is worked back from the most loaded wall:
+The probits of the Green Book need the side-on wave, which does not exist near a building, because
+its walls reflect it. It is therefore derived from the load on the most loaded wall:
 
     peak      P_r = 2 P_s (7 P_0 + 4 P_s) / (7 P_0 + P_s), solved for P_s (normal reflection)
     impulse   half of that on the wall
 
-In the open the first is exact, and the second within 7 % of Kingery and Bulmash's between 5 and
-15 m/kg^(1/3), and too large nearer (docs/engineers/response.md). What clears round the edges of a
-small wall is missing from both, and peaks of coarse cells are low.
+In the open the first is exact. The second is within 7 % of Kingery and Bulmash's between 5 and
+15 m/kg^(1/3), and too large nearer (docs/engineers/response.md). Both ignore the clearing of
+reflected pressure round the edges of a small wall, and coarse cells underestimate peaks.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -65,15 +66,15 @@ _BREACH: Final = "so near, walls may be breached: the response knows bending alo
 
 @dataclass(frozen=True, eq=False)
 class BuildingResponse:
-    """What one charge does to one building.
+    """The response of one building to one charge.
 
     Attributes:
-        building: Its name; structures that are parts of one building are one.
-        charge: The charge where it went off.
-        on_cells: What became of its bays by the histories on the cells, which clip peaks.
-        peak_factor: What its peaks would be multiplied by if cells did not clip them.
-        known: Whether the loads on its bays are known, by name, where that was recorded.
-        stepped: Whether a wall of it is a staircase of modules, as an oblique one is.
+        building: Name of the building.
+        charge: The charge at its place.
+        on_cells: Response of its bays to the histories on the cells, which clip peaks.
+        peak_factor: Factor on its peaks that corrects their clipping by cells.
+        known: Whether the loads on its bays are known, by bay; empty if not recorded.
+        stepped: Whether it has an oblique wall, modelled as a staircase of modules.
     """
 
     building: str
@@ -85,7 +86,10 @@ class BuildingResponse:
 
     @cached_property
     def facade(self) -> FacadeResponse:
-        """What counts: the worse of that and of larger peaks of the same impulse, bay by bay."""
+        """The response for verdicts: the worse, bay by bay, of `on_cells` and sharper peaks.
+
+        Histories with sharper peaks have the same impulse.
+        """
         found = self.on_cells
         if self.peak_factor <= 1.0:
             return found
@@ -94,7 +98,10 @@ class BuildingResponse:
 
     @cached_property
     def severity(self) -> Severity:
-        """How bad it is; its load is the mean of the positive impulses on its bays, Pa s."""
+        """Severity of the response; its load is the mean positive impulse on the bays, Pa s.
+
+        It is the integral of positive overpressures, averaged by area.
+        """
         facade = self.facade
         impulses_pa_s = np.trapezoid(np.maximum(facade.pressure_pa, 0.0), facade.time_s, axis=1)
         areas_m2 = [each.bay.area_m2 for each in facade.bays]
@@ -113,12 +120,12 @@ class Neighbour:
     """A building without a facade under one charge.
 
     Attributes:
-        building: Its name; structures that are parts of one building are one.
-        charge: The charge where it went off.
+        building: Name of the building.
+        charge: The charge at its place.
         wall: Its most loaded wall.
         peak_pa: Side-on peak overpressure there.
         impulse_pa_s: Side-on impulse there.
-        probability: How likely an ordinary masonry house would be damaged so badly.
+        probability: Probability of each grade of damage of an ordinary masonry house.
     """
 
     building: str
@@ -131,12 +138,12 @@ class Neighbour:
 
 @dataclass(frozen=True, eq=False)
 class BarrierResponse:
-    """What one charge does to the barrier.
+    """The response of the barrier to one charge.
 
     Attributes:
-        charge: The charge where it went off.
-        pieces: One row a piece; see `blast_env.engines.pieces.PIECE_COLUMNS`.
-        taken_away: Pieces that overturned before the blast was over, and were taken away for it.
+        charge: The charge at its place.
+        pieces: One row per piece; see `blast_env.engines.pieces.PIECE_COLUMNS`.
+        taken_away: Pieces that overturned during an earlier run of the blast and were removed.
     """
 
     charge: Charge
@@ -146,14 +153,14 @@ class BarrierResponse:
 
 @dataclass(frozen=True, eq=False)
 class Consequences:
-    """What charges do to the buildings of a site behind a layout.
+    """The consequences of charges for the buildings of a site behind a layout.
 
     Attributes:
-        responses: One a building with a facade and charge.
-        neighbours: One a building without and charge.
-        barriers: One a charge.
-        unchecked: A building and why the loads on it are to be distrusted, one a building and
-            charge for which that is so.
+        responses: One per charge and building with a facade.
+        neighbours: One per charge and building without a facade.
+        barriers: One per charge.
+        unchecked: A building and the reason to distrust its loads, one per charge and building
+            with such a reason.
         unjudged: Walls of buildings with a facade that no verdict covers.
     """
 
@@ -165,7 +172,7 @@ class Consequences:
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
-        """Return what several charges do, of which each has its own."""
+        """Combine the consequences of several charges."""
         every = list(parts)
         return cls(
             tuple(each for part in every for each in part.responses),
@@ -182,7 +189,7 @@ class Consequences:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks on a verdict: walls that it does not cover, oblique ones, loads not captured."""
+        """Notes on a verdict: walls not covered, oblique walls, loads out of range or not known."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
         notes = [f"{each.building}: {each.words}" for each in self.unjudged]
         notes += [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
@@ -208,7 +215,7 @@ class Consequences:
 
     @property
     def is_flagged(self) -> bool:
-        """Whether a building with a facade has a note: on its loads, or on walls without a bay."""
+        """Whether a building with a facade has a note on its loads or its walls."""
         return (
             any(building in self.buildings for building, _ in self.unchecked)
             or bool(self.unjudged)
@@ -217,27 +224,27 @@ class Consequences:
         )
 
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
-        """Return what the charges do to one building."""
+        """Return the responses of one building."""
         return tuple(each for each in self.responses if each.building == building)
 
     def level(self, building: str) -> LevelOfProtection:
-        """Return the level of protection that a building reaches under every charge."""
+        """Return the lowest level of protection of a building under any charge."""
         return min(each.facade.level_of_protection for each in self.of(building))
 
     def level_on_cells(self, building: str) -> LevelOfProtection:
-        """Return the same by the histories on the cells, which clip peaks."""
+        """Return the lowest level from the histories on the cells, which clip peaks."""
         return min(each.on_cells.level_of_protection for each in self.of(building))
 
     def level_words(self, building: str) -> str:
-        """Return the level that counts, and that on the cells where it is another one."""
+        """Return the level of a building as text, with that on the cells where it is higher."""
         level, on_cells = self.level(building), self.level_on_cells(building)
         return level.label + (f" ({on_cells.label} on the cells)" if on_cells > level else "")
 
     def worst_damage(self, scenario: Scenario) -> float:
-        """Return the worst damage that the objective counts, of what is protected, from 0 to 5.
+        """Return the worst damage of the protected buildings in the objective, from 0 to 5.
 
         Args:
-            scenario: Says what is protected, and whether panes alone count.
+            scenario: Defines the protected structures and the measure of the objective.
         """
         names = {each.building_name for each in scenario.structures if each.protected}
         own = [each.facade for each in self.responses if each.building in names]
@@ -246,21 +253,21 @@ class Consequences:
         return worst(each.worst_number for each in own)
 
     def passes_on_cells(self, target: LevelOfProtection) -> bool:
-        """Return whether all buildings reach a level by the clipped peaks on the cells."""
+        """Return whether all buildings reach a level under the clipped peaks on the cells."""
         return all(self.level_on_cells(building) >= target for building in self.buildings)
 
     def doubt(self, target: LevelOfProtection) -> str:
-        """Return why a verdict that fails rests on sharper peaks, in words; empty if it does not.
+        """Explain a failure that is due to sharper peaks alone; empty if there is none.
 
         Args:
-            target: The level that the buildings are to reach.
+            target: The required level of the buildings.
         """
         fails = not self.passes(target)
         return _CLIPPED if fails and self.passes_on_cells(target) else ""
 
     @property
     def worst_neighbours(self) -> tuple[Neighbour, ...]:
-        """Every building without a facade, under the charge that would do most to a house there."""
+        """Each building without a facade, under the charge that would damage a house there most."""
         found: dict[str, list[Neighbour]] = {}
         for each in self.neighbours:
             found.setdefault(each.building, []).append(each)
@@ -268,7 +275,7 @@ class Consequences:
 
     @property
     def worst_barrier(self) -> BarrierResponse | None:
-        """The barrier under the charge that tilts a piece most; `None` where no piece stands."""
+        """The barrier under the charge that tilts a piece most; `None` without pieces."""
         standing = [each for each in self.barriers if len(each.pieces)]
         return governing(standing, _severity_of_barrier) if standing else None
 
@@ -277,14 +284,14 @@ class Consequences:
         return all(self.level(building) >= target for building in self.buildings)
 
     def verdict(self, target: LevelOfProtection) -> str:
-        """Return in a word or two whether all buildings reach a level; see `verdict_word`."""
+        """Return the verdict on whether all buildings reach a level; see `verdict_word`."""
         return verdict_word(self.passes(target), self.is_flagged)
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
-        """Return the same with other glass in all windows; sizes and sills stay.
+        """Return the consequences with other glass in all windows of the same sizes and sills.
 
         Args:
-            glazing: The component whose glass is taken.
+            glazing: The component that provides the glass.
         """
         return replace(
             self,
@@ -316,7 +323,7 @@ def _severity_of_barrier(barrier: BarrierResponse) -> Severity:
 
 
 def other_glazing(scenario: Scenario) -> dict[str, Glazing]:
-    """Return what the windows of a scenario may be replaced by: its own and the catalogue's."""
+    """Return the possible replacement windows: those of the scenario and of the catalogue."""
     known = {**catalogue(), **scenario.components}
     return {name: each for name, each in known.items() if isinstance(each, Glazing)}
 
@@ -327,14 +334,14 @@ CASE_COLUMNS: Final = (
     Column("charge_y_m", "m", "where the charge goes off, from the lower border"),
     Column("tnt_kg", "kg", "its mass"),
 )
-"""What stands before the columns of bays and of pieces in a table of several charges."""
+"""The first columns in tables of bays and of pieces under several charges."""
 
 
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row a layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`.
+    """Return one row per layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`.
 
     Args:
-        found: What charges do, by the words for the layout.
+        found: The consequences by the name of the layout.
     """
     rows = [
         _case(name, each.charge) | row | {"known": each.known.get(str(row["bay"]), False)}
@@ -346,10 +353,10 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
 
 
 def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row a layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`.
+    """Return one row per layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`.
 
     Args:
-        found: What charges do, by the words for the layout.
+        found: The consequences by the name of the layout.
     """
     rows = [
         _case(name, each.charge) | row
@@ -375,19 +382,20 @@ def consequences(
     *,
     without_fallen: bool = False,
 ) -> Consequences:
-    """Return what charges do to the buildings behind a layout; a blast a charge.
+    """Run one blast per charge and return the consequences for the buildings behind a layout.
 
     Args:
         scenario: The scenario; some of its structures have facades.
         layout: A legal layout.
-        charges: The charges, or the vehicles that bring them.
-        engine: An engine that knows overpressures.
-        progress: Called with the share of the blasts that is done.
-        without_fallen: Whether pieces that overturn before a blast is over do not count: they are
-            taken away, and the blast is run again until no other one falls.
+        charges: The charges, or the vehicles that carry them.
+        engine: An engine that computes overpressures.
+        progress: Called with the finished share of the charges.
+        without_fallen: Whether to remove pieces that overturn before the end of a blast and to
+            repeat the blast until no other piece falls.
 
     Raises:
-        BlastEnvError: If no structure has a facade, or the engine knows no overpressure.
+        BlastEnvError: If no structure has a facade, or the engine computes no overpressure or
+            records no bays.
     """
     found = find_scenario(scenario)
     if not found.bays:
@@ -410,13 +418,13 @@ def consequences(
 def consequences_of(
     scenario: Scenario, result: "GasResult", charge: Charge, taken_away: Layout = ()
 ) -> Consequences:
-    """Return what a blast that was run does to the buildings and the barrier.
+    """Return the consequences of a finished blast for the buildings and the barrier.
 
     Args:
         scenario: The scenario.
         result: The blast.
-        charge: The charge where it went off.
-        taken_away: Pieces that were taken away for it.
+        charge: The charge at its place.
+        taken_away: Pieces that were removed for the blast.
     """
     responses: list[BuildingResponse] = []
     if result.bay_loads is not None and result.bay_loads.bays:
@@ -433,11 +441,11 @@ def consequences_of(
 
 
 def verdict_word(passes: bool, flagged: bool) -> str:
-    """Return a verdict: no bare "PASSES" rests on loads that are flagged.
+    """Return the word for a verdict, which marks a pass with notes as flagged.
 
     Args:
-        passes: Whether all that was asked for is kept.
-        flagged: Whether there is a note on the loads.
+        passes: Whether all requirements are fulfilled.
+        flagged: Whether there is a note on the loads or walls.
     """
     if not passes:
         return "FAILS"
@@ -445,9 +453,9 @@ def verdict_word(passes: bool, flagged: bool) -> str:
 
 
 def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
-    """Yield each building whose loads are to be distrusted, and why.
+    """Yield each building with doubtful loads, and the reasons.
 
-    They are outside what the engine or the response was checked for, or not captured.
+    The loads are outside the checked range of the engine or the response, or not known.
     """
     from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
 
@@ -470,7 +478,7 @@ def _blast(
     engine: Engine,
     without_fallen: bool,
 ) -> tuple[Any, Layout]:
-    """Return the result of a blast, and the pieces that were taken away for it."""
+    """Return the result of a blast, and the pieces that were removed for it."""
     fallen: Layout = ()
     result: Any = engine.blast(scenario, layout, 0, charge).run()
     if getattr(result, "bay_loads", None) is None:
@@ -492,14 +500,14 @@ def by_building(
     peak_factor: float = 1.0,
     known: Mapping[str, bool] = MappingProxyType({}),
 ) -> list[BuildingResponse]:
-    """Return what a blast does to each building with a facade.
+    """Return the response of each building with a facade to a blast.
 
     Args:
-        scenario: Says which structures are parts of one building.
-        facade: What became of all bays of the site.
-        charge: The charge where it went off.
-        peak_factor: What its peaks would be multiplied by if cells did not clip them.
-        known: Whether the loads on the bays are known, by name, where that was recorded.
+        scenario: Groups the structures into buildings.
+        facade: The response of all bays of the site.
+        charge: The charge at its place.
+        peak_factor: Factor on peaks that corrects their clipping by cells.
+        known: Whether the loads on the bays are known, by bay; empty if not recorded.
     """
     names = scenario.building_names
     stepped = stepped_buildings(scenario.structures)
@@ -517,7 +525,7 @@ def by_building(
 
 
 def side_on_peak_pa(reflected_pa: FloatArray) -> FloatArray:
-    """Return the side-on peak overpressures that reflect to others on a rigid wall (n,)."""
+    """Return the side-on peaks, Pa, whose normal reflections have given peaks (n,)."""
     reflected = np.asarray(reflected_pa, dtype=np.float64)
     linear = 14.0 * _AMBIENT_PA - reflected
     root = np.sqrt(linear**2 + 224.0 * _AMBIENT_PA * reflected)
@@ -525,17 +533,17 @@ def side_on_peak_pa(reflected_pa: FloatArray) -> FloatArray:
 
 
 def side_on_impulse_pa_s(reflected_pa_s: FloatArray) -> FloatArray:
-    """Return the side-on impulses that reflect to others on a rigid wall (n,)."""
+    """Return the side-on impulses, Pa s, whose normal reflections have given impulses (n,)."""
     return 0.5 * np.asarray(reflected_pa_s, dtype=np.float64)
 
 
 def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> list[Neighbour]:
-    """Return what a blast would do to ordinary houses where buildings without a facade stand.
+    """Return the damage of ordinary houses in place of the buildings without a facade.
 
     Args:
-        scenario: Says which structures are parts of one building, and which have a facade.
+        scenario: Groups the structures into buildings, and defines their facades.
         result: The blast.
-        charge: The charge where it went off.
+        charge: The charge at its place.
     """
     faces = result.on_walls
     walls = faces[faces["face"].isin(WALLS)]

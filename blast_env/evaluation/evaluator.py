@@ -1,4 +1,4 @@
-"""The loads of layouts under threats, each blast simulated once, and counted against a budget."""
+"""Loads of layouts under threats, with each blast simulated once, and budgets of blasts."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,36 +27,36 @@ from blast_env.scenario.placement import met_by_blasts
 
 
 class BlastEvaluator:
-    """Runs blasts of one scenario and remembers their loads.
+    """Runs blasts of one scenario and caches their loads.
 
-    What the reward, the search methods and `evaluate_layout` have in common. Loads are a pure
-    function of scenario, layout, threat and engine. The order in which a layout names its cells
-    does not matter, to the last bit: they are sorted before the blast.
+    It serves the reward, the search methods and `evaluate_layout`. Loads are a pure function of
+    scenario, layout, threat and engine. They do not depend on the order of the cells in a layout,
+    to the last bit, because cells are sorted before the blast.
 
-    It can be pickled, with what it remembers.
+    It can be pickled, with its cached loads.
 
     Args:
         scenario: The scenario, or its bundled name or path; for the particle engines it must name
             a calibration.
         engine: Name of an engine, or an engine.
-        cache_size: Most loads that the evaluator itself remembers; see `LoadsCache`.
-        cache: Asked for what it does not remember, and told all: a folder (`DiskCache`), for other
-            processes and later runs, or a cache that several evaluators share.
+        cache_size: Maximum number of loads in the evaluator's memory; see `LoadsCache`.
+        cache: Second cache, which receives all loads: a folder (`DiskCache`), for other processes
+            and later runs, or a cache that several evaluators share.
 
     Attributes:
         scenario: The scenario.
         engine: The engine.
         calibration: The scenario's calibration, checked against its parameters and the engine;
             `None` for engines without particles, which need none.
-        blasts: Number of blasts that were really simulated.
-        cache_hits: Number of loads that were asked for and needed no blast.
+        blasts: Number of simulated blasts.
+        cache_hits: Number of requested loads that needed no blast.
 
     Raises:
         CalibrationError: If the scenario names no calibration, or one that was made with other
             parameters or another engine.
         UnknownNameError: If there is no such engine or calibration.
-        BlastEnvError: If the cache size is negative, `cache` is of no use, or the scenario's
-            objective counts peaks and the engine has none.
+        BlastEnvError: If the cache size is negative, `cache` is not usable, or the scenario's
+            objective needs overpressures and the engine has none.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class BlastEvaluator:
 
     @property
     def cache_hit_rate(self) -> float:
-        """Share of the loads asked for so far that needed no blast; 0 if none were."""
+        """Share of the requested loads that needed no blast; 0 without requests."""
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
 
@@ -121,13 +121,13 @@ class BlastEvaluator:
     ) -> list[BlastLoads]:
         """Return the loads of many blasts, in the order of the pairs.
 
-        Pairs that are equal or were simulated before cost nothing. The number of processes
-        changes nothing but the time. Blasts that ended before an interruption are remembered.
+        Repeated pairs and cached blasts cost nothing. The number of processes changes only the
+        time. Blasts that ended before an interruption stay cached.
 
         Args:
             pairs: Layouts with threats.
-            processes: Worker processes.
-            progress: Called with the share of the pairs that is done.
+            processes: Number of worker processes.
+            progress: Called with the finished share of the pairs.
 
         Raises:
             BlastEnvError: If `processes` is below 1.
@@ -157,7 +157,7 @@ class BlastEvaluator:
         ]
 
     def keep(self, layout: Sequence[Element], threat: Threat, loads: BlastLoads) -> None:
-        """Remember the loads of a blast that was run elsewhere, with the same engine.
+        """Cache and count the loads of a blast that ran elsewhere, with the same engine.
 
         Raises:
             LayoutError: If the layout does not fit the build zone.
@@ -165,42 +165,42 @@ class BlastEvaluator:
         self._keep(self.key(layout, threat), loads)
 
     def key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
-        """Return the key of a blast: everything that its loads depend on."""
+        """Return the key of a blast, with all inputs of its loads."""
         cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))
-        # Without noise there is nothing to draw: a charge has one realisation.
+        # Without noise the seed has no effect: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
-        """Return loads that are remembered here or there."""
+        """Return loads from either cache; `None` if they are in neither."""
         loads = self._remembered.get(key)
         if loads is None and self._cache is not None:
             loads = self._cache.get(key)
             if loads is not None and not loads.are_for(self.scenario):
-                return None  # a cache that anybody may write to
+                return None  # anybody may write to the cache
             if loads is not None:
                 self._remember(key, loads)
         return loads
 
     def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Count and remember a blast that was run."""
+        """Count and cache a blast."""
         self.blasts += 1
         self._remember(key, loads)
         if self._cache is not None:
             self._cache.add(key, loads)
 
     def _remember(self, key: BlastKey, loads: BlastLoads) -> None:
-        loads.module_impulse_sim.flags.writeable = False  # it is given out more than once
+        loads.module_impulse_sim.flags.writeable = False  # shared by several callers
         self._remembered.add(key, loads)
 
 
 def _run(
     missing: Mapping[BlastKey, tuple[BlastEvaluator, AnyCharge]], processes: int
 ) -> Iterator[tuple[BlastKey, BlastLoads]]:
-    """Run blasts, let their evaluators keep the loads, and yield them as they come.
+    """Run blasts, cache the loads in their evaluators, and yield them in order of completion.
 
-    The charges are those of the keys, or the vehicles that bring them there.
+    The charges are those of the keys, or the vehicles that carry them.
     """
     keys = list(missing)
     work = [(each.engine, each.scenario, key, charge) for key, (each, charge) in missing.items()]
@@ -210,17 +210,17 @@ def _run(
 
 
 def _run_one(work: tuple[Engine, Scenario, BlastKey, AnyCharge]) -> BlastLoads:
-    """Run a blast, perhaps in a worker process."""
+    """Run a blast, in this process or a worker."""
     engine, scenario, key, charge = work
     return engine.loads(scenario, key.layout, charge, key.seed)
 
 
 class BlastAsked(NamedTuple):
-    """A blast that somebody will ask for.
+    """A blast that will be requested.
 
     Attributes:
         scenario: The scenario.
-        layout: What stands on the site.
+        layout: The layout.
         threat: The charge and the seed.
     """
 
@@ -234,21 +234,21 @@ _LOADS_PER_EVALUATOR: Final = 1024
 
 
 class Evaluators:
-    """The evaluators of the scenarios that were met last.
+    """The evaluators of the most recent scenarios.
 
-    A fresh site at every reset must not fill the memory: only few are kept, and the counts of
-    those that go stay.
+    Only few are kept, so that a new site at every reset does not fill the memory. The counts of
+    dropped evaluators are retained.
 
     Args:
         engine: Name of an engine, or an engine.
         cache: Folder or cache that all of them share; see `BlastEvaluator`.
-        most: How many are kept.
+        most: Maximum number of evaluators.
 
     Attributes:
         engine: The engine.
 
     Raises:
-        BlastEnvError: If the cache is of no use.
+        BlastEnvError: If the cache is not usable.
         UnknownNameError: If there is no such engine.
     """
 
@@ -267,32 +267,33 @@ class Evaluators:
 
     @property
     def blasts(self) -> int:
-        """Number of blasts that were really simulated so far."""
+        """Number of simulated blasts."""
         return self._gone_blasts + sum(each.blasts for each in self._kept.values())
 
     @property
     def cache_hits(self) -> int:
-        """Number of loads that were asked for so far and needed no blast."""
+        """Number of requested loads that needed no blast."""
         return self._gone_cache_hits + sum(each.cache_hits for each in self._kept.values())
 
     @property
     def cache_hit_rate(self) -> float:
-        """Share of the loads asked for so far that needed no blast; 0 if none were."""
+        """Share of the requested loads that needed no blast; 0 without requests."""
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
 
     def run_ahead(self, asked: Sequence[BlastAsked], processes: int = 1) -> list[bool]:
-        """Run blasts of any scenarios together, for others that have the same cache.
+        """Run blasts of any scenarios in one batch and cache their loads.
 
         Args:
-            asked: Blasts that will be asked for; those that are known already are not run.
-            processes: Worker processes; they change nothing but the time.
+            asked: Blasts that will be requested; cached ones are not run.
+            processes: Number of worker processes; it changes only the time.
 
         Returns:
-            For which of them a blast was run; of equal ones, for the first.
+            Whether each of them was run; of equal ones, only the first is marked.
 
         Raises:
-            BlastEnvError: As `BlastEvaluator.loads_of_many`.
+            LayoutError: If a layout does not fit its build zone; nothing is simulated then.
+            ScenarioError: If a charge is not clear of a structure or the border.
         """
         missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
         numbers: dict[BlastKey, int] = {}
@@ -319,7 +320,7 @@ class Evaluators:
         """
         newest = next(reversed(self._kept.values()), None)
         if newest is not None and newest.scenario is scenario:
-            return newest  # the usual case, without the time that a content hash takes
+            return newest  # the usual case, without the time for a content hash
         found = find_scenario(scenario)
         key = found.content_hash
         if key not in self._kept:
@@ -333,17 +334,17 @@ class Evaluators:
 
 
 class BudgetError(BlastEnvError):
-    """A search asks for more blasts than its budget has."""
+    """A search requests more blasts than its budget allows."""
 
 
 @dataclass(eq=False)
 class BlastMeter:
     """Counts distinct pairs of layout and threat, and refuses those beyond a budget.
 
-    What a search says of its own blasts counts nowhere.
+    It counts independently of the search.
 
     Attributes:
-        budget: Most pairs.
+        budget: Maximum number of pairs.
     """
 
     budget: int
@@ -351,14 +352,14 @@ class BlastMeter:
 
     @property
     def blasts(self) -> int:
-        """Pairs that were asked for so far; one that comes again counts once."""
+        """Number of distinct pairs requested."""
         return len(self._asked)
 
     def add(self, pairs: Iterable[tuple[Sequence[Element], Threat]]) -> None:
         """Count pairs.
 
         Raises:
-            BudgetError: If the budget does not pay for all of them; none is counted then.
+            BudgetError: If the total would exceed the budget; none is counted then.
         """
         asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
         asked |= self._asked

@@ -1,7 +1,7 @@
-"""The blast that governs among several: one rule for verdicts, reports and the page.
+"""The governing one of several blasts, by one rule for verdicts, reports and the page.
 
-Facades first, where they count: the lower level of protection, then the damage of all components.
-Equal ones are told apart by their load, as are sites without facades.
+Where facades count, the lower level of protection governs, then the larger damage of all
+components. Ties, and sites without facades, are decided by the load.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,19 +19,19 @@ from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.scenario.build_scene import build_site
 
 _STEP_M: Final = 1.0
-"""Between the points of a wall that a load in the open is a mean over."""
+"""Distance between the points of a wall over which a load in the open is averaged."""
 
 Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, order=True)
 class Severity:
-    """How bad a blast is, in the order in which that is compared.
+    """The severity of a blast, with attributes in the order of comparison.
 
     Attributes:
-        lost_levels: Levels of protection below "high" of what has a facade.
-        damage: Damage of all components together, or what the objective counts of it.
-        load: The load, in one unit for all that is compared.
+        lost_levels: Levels of protection below "high" of buildings with a facade.
+        damage: Total damage of all components, or the response in the objective.
+        load: The load, in the same unit for all compared blasts.
     """
 
     lost_levels: int = 0
@@ -40,7 +40,7 @@ class Severity:
 
     @classmethod
     def of_loads(cls, loads: BlastLoads, objective: ObjectiveSection) -> "Severity":
-        """Return how bad a blast is by what a site's objective counts.
+        """Return the severity of a blast by the objective of a site.
 
         Args:
             loads: Its loads.
@@ -53,10 +53,11 @@ class Severity:
 
     @classmethod
     def in_the_open(cls, scenario: Scenario, charge: Charge) -> "Severity":
-        """Return a guess before any blast: Kingery and Bulmash's impulse on the protected walls.
+        """Estimate the severity without a blast, by Kingery and Bulmash's impulse in the open.
 
-        On those that the charge sees, from the reflected one at right angles to the incident one
-        along the wall; on others the incident one.
+        On counted walls in sight of the charge it varies with the square of the cosine of the
+        angle of incidence, from the reflected impulse at normal incidence to the incident impulse
+        at grazing incidence. On other walls it is the incident impulse.
         """
         site = build_site(scenario, (), 0, charge)
         protected = [each for each in site.structures if each.protected]
@@ -68,13 +69,13 @@ def governing(found: Iterable[Found], severity: Callable[[Found], Severity]) -> 
 
     Args:
         found: At least one.
-        severity: How bad each is.
+        severity: Returns the severity of each.
     """
     return max(found, key=severity)
 
 
 def _open_pa_s(site: BlastSite, structure: StructureOutline) -> float:
-    """Return the mean impulse over the walls of a structure that count: incident where unseen."""
+    """Return the mean impulse in the open over the counted walls of a structure, Pa s."""
     points_m, outward = _points(site, structure)
     charge, seen = site.charge, in_sight(site, points_m, outward)
     way_m = np.array([*charge.position_m, charge.height_m]) - points_m
@@ -91,7 +92,7 @@ def _open_pa_s(site: BlastSite, structure: StructureOutline) -> float:
 
 
 def _points(site: BlastSite, structure: StructureOutline) -> tuple[FloatArray, FloatArray]:
-    """Return points on the walls that count, a step apart, and where each looks (n, 3)."""
+    """Return points on the counted walls, `_STEP_M` apart, and outward normals (n, 3)."""
     left, bottom, right, top = structure.rectangle_m
     high_m = structure.height_m or site.air_height_m
     z_m = _middles(structure.base_m, high_m)

@@ -1,4 +1,4 @@
-"""A layout against no barrier, in full: by structure, module and threat, as tables and as JSON."""
+"""Full comparison of a layout with no barrier by structure, module and threat."""
 
 import json
 from collections.abc import Callable, Iterable, Sequence
@@ -119,7 +119,7 @@ def _structure_row(
 
 
 SCHEMA_VERSION: Final = 1
-"""The version of the file that `LayoutEvaluation.to_json` writes."""
+"""Version of the file written by `LayoutEvaluation.to_json`."""
 
 
 def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
@@ -164,20 +164,20 @@ def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ThreatOutcome:
-    """What a layout does against one threat; impulses as in `BlastLoads.protected_impulse_pa_s`.
+    """Loads under one threat; impulses are those of `BlastLoads.protected_impulse_pa_s`.
 
     Attributes:
         threat: The threat.
-        charge: Its charge, where it goes off with the barrier.
-        stand_off_m: How far that is from the nearest wall that counts.
-        unprotected_stand_off_m: How far it is without the barrier; only a vehicle comes nearer.
+        charge: Its charge, at its place with the barrier.
+        stand_off_m: Distance of the charge from the nearest protected wall.
+        unprotected_stand_off_m: The same without the barrier; smaller for a vehicle only.
         impulse_pa_s: Impulse on the protected structures with the barrier, Pa*s.
         unprotected_impulse_pa_s: The same without it, Pa*s.
         peak_pa: Largest overpressure on their walls with the barrier, Pa; NaN for particles.
         unprotected_peak_pa: The same without it, Pa.
-        load: What the scenario's objective counts, with the barrier, in its unit.
+        load: Load of the protected structures with the barrier, in the unit of the objective.
         unprotected_load: The same without it.
-        in_range: Whether the calibration was made for such a threat.
+        in_range: Whether the threat is in the range of the calibration.
     """
 
     threat: Threat
@@ -194,30 +194,30 @@ class ThreatOutcome:
 
     @property
     def reduction(self) -> float:
-        """Share of the load that is gone; NaN if there is none without a barrier."""
+        """Relative reduction of the load; NaN if the load without a barrier is 0."""
         return reductions(self.load, self.unprotected_load).item()
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutEvaluation:
-    """A layout against no barrier, on the threats of one case.
+    """A layout compared with no barrier on the threats of one case.
 
-    Impulses are those of `BlastLoads.protected_impulse_pa_s`: per area, by weight, added up over
-    the protected structures. Reductions are of the load that the scenario's objective counts, which
-    is that impulse unless it says otherwise. Intervals are 95 % confidence intervals of the mean
-    over all threats that the scenario can draw; they say nothing about how right the model is.
+    Impulses are those of `BlastLoads.protected_impulse_pa_s`, weighted sums of impulses per area of
+    the protected buildings. Reductions are of the load in the scenario's objective, by default
+    that impulse. Intervals are 95 % confidence intervals of the mean over all threats of the
+    scenario; they do not include the error of the model.
 
     Attributes:
-        case: The scenario, and what both were exposed to.
+        case: The scenario and the threats.
         layout: The layout's cells, sorted.
-        loads: Loads with the layout, one a threat.
-        unprotected: Loads without any barrier, one a threat.
-        calibration: Name of what converted simulated impulses; `"none"` for gas dynamics.
+        loads: Loads with the layout, one per threat.
+        unprotected: Loads without any barrier, one per threat.
+        calibration: Name of the calibration; `"none"` for gas dynamics.
         engine: The engine.
-        cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
+        cvar_level: Level of the CVaR: 0.8 is the mean of the worst 20 %.
 
     Raises:
-        BlastEnvError: If nothing arrives at the protected structures without a barrier.
+        BlastEnvError: If no load reaches the protected structures without a barrier.
     """
 
     case: Case
@@ -238,12 +238,12 @@ class LayoutEvaluation:
 
     @property
     def threats(self) -> tuple[Threat, ...]:
-        """What layout and empty site were exposed to."""
+        """The threats of the case."""
         return self.case.threats
 
     @cached_property
     def comparison(self) -> Comparison:
-        """The loads that count, and what they come to."""
+        """The comparison of the loads in the unit of the objective."""
         counts = self.scenario.objective
         return Comparison(
             cases=(self.case,),
@@ -256,7 +256,7 @@ class LayoutEvaluation:
 
     @cached_property
     def outcomes(self) -> tuple[ThreatOutcome, ...]:
-        """What the layout does against each threat."""
+        """The loads under each threat."""
         return tuple(map(self._outcome, self.threats, self.loads, self.unprotected))
 
     def _outcome(self, threat: Threat, load: BlastLoads, bare: BlastLoads) -> ThreatOutcome:
@@ -280,12 +280,12 @@ class LayoutEvaluation:
 
     @property
     def reduction(self) -> Estimate:
-        """1 - load with the barrier / without; see `Comparison` and `reduction_estimate`."""
+        """1 - load with the barrier / load without it; see `Comparison`, `reduction_estimate`."""
         return self.comparison.reduction
 
     @property
     def load(self) -> float:
-        """What the scenario's objective makes of all threats, with the barrier, in its unit."""
+        """The objective value over all threats with the barrier, in the objective's unit."""
         return self.case.counted(self.comparison.loads[0], self.comparison.layouts[0])
 
     @property
@@ -295,7 +295,7 @@ class LayoutEvaluation:
 
     @property
     def mean_reduction(self) -> float:
-        """The value of `reduction`: 0 changes nothing, 1 keeps everything off."""
+        """The value of `reduction`: 0 for an unchanged load, 1 for none."""
         return self.reduction.value
 
     @property
@@ -305,7 +305,7 @@ class LayoutEvaluation:
 
     @property
     def impulse_pa_s(self) -> Estimate:
-        """Mean impulse with the barrier, Pa*s, whatever the objective counts."""
+        """Mean impulse with the barrier, Pa*s, for any objective."""
         return mean_estimate(_impulses_pa_s(self.loads))
 
     @property
@@ -315,7 +315,7 @@ class LayoutEvaluation:
 
     @cached_property
     def worst(self) -> ThreatOutcome:
-        """The threat with the largest load in spite of the barrier."""
+        """The threat with the largest load behind the barrier."""
         return max(self.outcomes, key=lambda outcome: outcome.load)
 
     @property
@@ -330,20 +330,20 @@ class LayoutEvaluation:
 
     @cached_property
     def table(self) -> "pd.DataFrame":
-        """One row a structure; see `STRUCTURE_COLUMNS`."""
+        """One row per structure; see `STRUCTURE_COLUMNS`."""
         return self._by_name(lambda loads: loads.structures)
 
     @cached_property
     def building_table(self) -> "pd.DataFrame":
-        """One row a building, whose parts are one; the columns are those of `table`.
+        """One row per building, with the columns of `table`.
 
-        Impulses are means over the area of protected parts, as rewards count them; the peak is
-        the largest.
+        Impulses are means over the area of the protected parts, as in rewards; the peak is the
+        largest of the parts.
         """
         return self._by_name(lambda loads: on_buildings(loads.structures))
 
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
-        """Return a row for each of the loads that are made of those of a blast."""
+        """Return one row per load in the result of `loads_of`."""
         loads, bare = (
             zip(*map(loads_of, blasts), strict=True) for blasts in (self.loads, self.unprotected)
         )
@@ -351,7 +351,7 @@ class LayoutEvaluation:
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":
-        """One row a module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
+        """One row per module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
         from blast_env.recording.tables import module_table
 
         threat = self.threats[0]
@@ -367,7 +367,7 @@ class LayoutEvaluation:
 
     @cached_property
     def threat_table(self) -> "pd.DataFrame":
-        """One row a threat; see `THREAT_COLUMNS`."""
+        """One row per threat; see `THREAT_COLUMNS`."""
         rows = [
             {"seed": each.threat.seed, **charge_values(each.charge), **vars(each)}
             | {"reduction": each.reduction}
@@ -377,12 +377,12 @@ class LayoutEvaluation:
 
     @property
     def in_range(self) -> bool:
-        """Whether the calibration was made for every threat and protected structure."""
+        """Whether all threats to protected structures are in the range of the calibration."""
         return all(outcome.in_range for outcome in self.outcomes)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What the particle model cannot say, and what the calibration was not made for."""
+        """The caveats of the engine, and the threats outside its checked or calibrated range."""
         notes = [self.engine.caveat] if self.engine.caveat else []
         notes += [] if self.engine.knows_heights else self.scenario.height_notes
         checked = self.engine.checked_for
@@ -398,9 +398,9 @@ class LayoutEvaluation:
         return tuple(notes)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data: what was asked, with which versions, and the answer.
+        """Return the inputs, the versions and the results as plain data.
 
-        The same arguments and versions give the same data; numbers that do not exist are `None`.
+        The same arguments and versions give the same data; NaN becomes `None`.
         """
         scenario = self.scenario
         return {
@@ -452,25 +452,25 @@ def evaluate_layout(
     cell_m: float | None = None,
     cells: str | None = None,
 ) -> LayoutEvaluation:
-    """Return how much a layout takes off the protected structures, and how sure that is.
+    """Estimate the load reduction of a layout on the protected structures, with its uncertainty.
 
-    Every seed draws a threat from the scenario; the layout and the empty site meet the same
-    threats. Use seeds that the layout was not chosen on: on the others it looks better than it is.
+    Every seed draws a threat from the scenario; the layout and the empty site are under the same
+    threats. Use seeds other than those of the layout's search, on which it is overrated.
 
     Args:
         scenario: The scenario, or its bundled name or path; for the particle engines it must name
             a calibration.
         layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
-        seeds: At least one, none twice; 16 or more for an interval worth having.
-        processes: Worker processes; they change nothing but the time.
-        engine: Name of an engine, or an engine: gas dynamics unless told otherwise.
+        seeds: At least one, without repetition; 16 or more for a useful interval.
+        processes: Number of worker processes; it changes only the time.
+        engine: Name of an engine, or an engine; gas dynamics by default. There, a seed only draws
+            the charge, a charge has one realisation, and no calibration is needed.
         threats: Used instead of threats drawn with `seeds`.
-        cvar_level: The worst share 1 - `cvar_level` of the threats makes the CVaR.
-        cache: Folder or cache of blasts that were run before; see `BlastEvaluator`.
-        progress: Called with the share of the blasts that is done.
-        cell_m: Side of the cells of gas dynamics, 0.5 m unless given. A seed then only draws the
-            charge: a charge has one realisation, and no calibration is needed.
-        cells: Whether those grow with the blast, see `GasSettings`.
+        cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level` of the threats.
+        cache: Folder or cache of earlier blasts; see `BlastEvaluator`.
+        progress: Called with the finished share of the blasts.
+        cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
+        cells: Growth of these cells with the blast; see `GasSettings`.
 
     Raises:
         LayoutError: If the layout does not fit the build zone.
@@ -479,7 +479,7 @@ def evaluate_layout(
         UnknownNameError: If there is no such engine.
         ScenarioError: If a threat's charge is not clear of a structure or the border.
         BlastEnvError: If there are no seeds or threats, one is repeated or a seed is negative, if
-            `processes` or `cvar_level` is out of bounds, or if nothing arrives at the protected
+            `processes` or `cvar_level` is out of bounds, or if no load reaches the protected
             structures even without a barrier.
     """
     evaluator = BlastEvaluator(scenario, find_engine(engine, cell_m, cells=cells), cache=cache)
@@ -498,20 +498,20 @@ def evaluate_against(
     cvar_level: float = CVAR_LEVEL,
     progress: Callable[[float], None] | None = None,
 ) -> LayoutEvaluation:
-    """Return what `evaluate_layout` returns, with blasts that an evaluator may remember.
+    """Evaluate a layout as in `evaluate_layout`, with the cached blasts of an evaluator.
 
-    For several layouts on the same threats: the empty site is simulated only once.
+    For several layouts on the same threats, the empty site is simulated only once.
 
     Args:
-        evaluator: Runs the blasts.
-        layout: As for `evaluate_layout`.
-        threats: At least one, none twice.
-        processes: As for `evaluate_layout`.
-        cvar_level: As for `evaluate_layout`.
-        progress: As for `evaluate_layout`.
+        evaluator: Runs and caches the blasts.
+        layout: Same as for `evaluate_layout`.
+        threats: At least one, without repetition.
+        processes: Same as for `evaluate_layout`.
+        cvar_level: Same as for `evaluate_layout`.
+        progress: Same as for `evaluate_layout`.
 
     Raises:
-        BlastEnvError: As for `evaluate_layout`.
+        BlastEnvError: Same as for `evaluate_layout`.
     """
     check_cvar_level(cvar_level)
     scenario = evaluator.scenario

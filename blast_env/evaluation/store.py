@@ -1,4 +1,4 @@
-"""What is remembered of blasts: in memory, and in a folder for others and for later."""
+"""Caches of blast loads, in memory and in a folder for other processes and later runs."""
 
 import dataclasses
 import json
@@ -24,12 +24,12 @@ from blast_env.response.damage import BayDamage
 
 
 class BlastKey(NamedTuple):
-    """All that the loads of a blast depend on.
+    """All inputs that determine the loads of a blast.
 
     Attributes:
         scenario_hash: Content hash of the scenario.
         layout: The layout's cells, sorted.
-        charge: The charge, at the place where it goes off.
+        charge: The charge at its place.
         seed: Seed of fan and air.
         engine: The engine with its version; see `engine_text`.
         calibration: Digest of the calibration, for the loads in psi*s.
@@ -46,24 +46,24 @@ class BlastKey(NamedTuple):
 
 
 class BlastCache(Protocol):
-    """Remembers the loads of blasts.
+    """The interface of caches of blast loads.
 
-    It may forget, but what it gives is what was added.
+    A cache may drop loads, but must return them unchanged.
     """
 
     def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast, or `None` if they are not there (any more)."""
+        """Return the loads of a blast, or `None` if they are not cached."""
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Remember the loads of a blast; others may have to go for them."""
+        """Cache the loads of a blast, which may displace others."""
 
 
 class LoadsCache:
-    """Keeps the loads that were asked for last, in the memory of this process.
+    """Keeps the most recently used loads in the memory of this process.
 
     Args:
-        size: Most loads that are kept; 0 keeps none. One takes 8 bytes a module and about a
-            kilobyte beside.
+        size: Maximum number of loads; 0 for none. Each takes 8 bytes per module plus about a
+            kilobyte.
 
     Raises:
         BlastEnvError: If the size is negative.
@@ -79,14 +79,14 @@ class LoadsCache:
         return len(self._loads)
 
     def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast, or `None` if they are not there (any more)."""
+        """Return the loads of a blast, or `None` if they are not cached."""
         loads = self._loads.get(key)
         if loads is not None:
             self._loads.move_to_end(key)
         return loads
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Keep the loads of a blast; the ones that were asked for longest ago may have to go."""
+        """Cache the loads of a blast, which may displace the least recently used ones."""
         self._loads[key] = loads
         self._loads.move_to_end(key)
         if len(self._loads) > self.size:
@@ -94,9 +94,9 @@ class LoadsCache:
 
 
 def engine_text(engine: Engine) -> str:
-    """Return an engine for a key: its class, name and version, and its fields if it has some.
+    """Return the text of an engine in a key: class, name, version and any dataclass fields.
 
-    Two engines of one class, name and version without fields (dataclass) count as the same.
+    Engines of one class, name and version that are not dataclasses count as equal.
     """
     kind = f"{type(engine).__module__}.{type(engine).__qualname__}"
     fields = repr(engine) if dataclasses.is_dataclass(engine) else ""
@@ -104,30 +104,30 @@ def engine_text(engine: Engine) -> str:
 
 
 def calibration_digest(calibration: Calibration) -> str:
-    """Return the SHA-256 of a calibration: one of the same name may be made anew."""
+    """Return the SHA-256 of a calibration, which distinguishes versions of the same name."""
     return sha256(calibration.model_dump_json().encode()).hexdigest()
 
 
 SUFFIX: Final = ".loads"
-"""Files with this suffix belong to the cache; it touches no others."""
+"""Suffix of the files of the cache, which touches no others."""
 
 MOST_BYTES: Final = 256_000_000
-"""Size of a cache unless an argument says otherwise; a blast in the courtyard takes 2 kB."""
+"""Default maximum size of a cache; a blast in the courtyard takes 2 kB."""
 
 
 class DiskCache:
-    """Keeps loads in files of a folder, for other processes and the next run; see `FolderStore`.
+    """Keeps loads in the files of a folder, for other processes and later runs; see `FolderStore`.
 
-    Where the folder cannot be used (any more), a warning says so and the work goes on. A loss of
-    power may cost the last blasts, which would be simulated again: to wait for the device after
-    each would take as long as a blast of the particle model does.
+    If the folder becomes unusable, a warning is issued and the work continues. A loss of power may
+    lose the last blasts, which are then simulated again. Files are not flushed to the device after
+    each blast, because that takes as long as a blast of the particle model.
 
     Args:
-        folder: The folder; it is made if need be.
-        most_bytes: Most that the files take together.
+        folder: The folder; created if necessary.
+        most_bytes: Maximum total size of the files.
 
     Raises:
-        BlastEnvError: If the folder cannot be made, or `most_bytes` is negative.
+        BlastEnvError: If the folder cannot be created, or `most_bytes` is negative.
     """
 
     def __init__(self, folder: str | Path, most_bytes: int = MOST_BYTES) -> None:
@@ -140,22 +140,22 @@ class DiskCache:
 
     @property
     def damaged(self) -> int:
-        """Number of damaged files that this object has found."""
+        """Number of damaged files found by this object."""
         return self._store.damaged
 
     def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast, or `None` if they are not there in one piece."""
+        """Return the loads of a blast, or `None` if they are missing or damaged."""
         return self._store.read(json.dumps(key), _decoded)
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Keep the loads of a blast; the ones that were asked for longest ago may have to go."""
+        """Cache the loads of a blast, which may displace the least recently used ones."""
         try:
             self._store.put(json.dumps(key), _encoded(loads))
         except BlastEnvError as error:
             warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
 
     def items(self) -> Iterator[tuple[BlastKey, BlastLoads]]:
-        """Yield all blasts that are there in one piece, always in the same order."""
+        """Yield all undamaged blasts, always in the same order."""
         for text, content in self._store.items():
             with suppress(ValueError):
                 yield _KEY.validate_python(json.loads(text)), _decoded(content)
@@ -171,7 +171,7 @@ def find_cache(value: str | Path | BlastCache | None) -> BlastCache | None:
         value: A folder for a `DiskCache`, a cache, or `None` for none.
 
     Raises:
-        BlastEnvError: If the folder cannot be made, or the object is no cache.
+        BlastEnvError: If the folder cannot be created, or the object is not a cache.
     """
     if isinstance(value, str | Path):
         return DiskCache(value)
@@ -184,7 +184,7 @@ _KEY: Final = TypeAdapter(BlastKey)
 
 
 def _encoded(loads: BlastLoads) -> bytes:
-    """Return a line of JSON, and the impulses on the modules."""
+    """Encode loads as a line of JSON, followed by the impulses on the modules."""
     header = {
         "structures": [asdict(load) for load in loads.structures],
         "bays": [asdict(bay) for bay in loads.bays],
@@ -202,7 +202,7 @@ _HEADER: Final = TypeAdapter(_Header)
 
 
 def _decoded(content: bytes) -> BlastLoads:
-    """Return the loads."""
+    """Decode the result of `_encoded`."""
     line, _, impulses = content.partition(b"\n")
     header = _HEADER.validate_json(line)
     modules = np.frombuffer(impulses, dtype="<f8").astype(np.float64)

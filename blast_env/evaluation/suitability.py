@@ -1,4 +1,4 @@
-"""What a sound scenario is good for, and what not: which commands refuse it, and what misleads."""
+"""Uses and limits of a valid scenario: commands that refuse it, and sources of error."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ _PRESETS_NOT_FOR_DESIGN: Final = {
 
 @dataclass(frozen=True)
 class Suitability:
-    """What a scenario is good for.
+    """Uses and limits of a scenario.
 
     Attributes:
-        uses: What it can be used for, a phrase each.
-        limits: What it is not good for, a sentence each, with what to do about it.
+        uses: Possible uses, one phrase each.
+        limits: Limits with their remedies, one sentence each.
     """
 
     uses: tuple[str, ...]
@@ -30,13 +30,13 @@ class Suitability:
 
 
 def suitability(scenario: AnyScenario) -> Suitability:
-    """Return what a scenario is good for; nothing is run.
+    """Return the uses and limits of a scenario, without running a blast.
 
     Args:
         scenario: The scenario, or its bundled name or path.
 
     Raises:
-        ScenarioError: If it cannot be used at all.
+        ScenarioError: If the scenario is invalid.
     """
     found = find_scenario(scenario)
     refusals = {engine: _refusal(found, engine) for engine in CALIBRATED_ENGINES}
@@ -51,7 +51,7 @@ def suitability(scenario: AnyScenario) -> Suitability:
 
 
 def _refusal(scenario: Scenario, engine: str) -> str:
-    """Return why loads by an engine of particles cannot be had in Pa s; empty if they can."""
+    """Return why a particle engine cannot give loads in Pa s; empty if it can."""
     try:
         scenario_calibration(scenario, engine)
     except BlastEnvError as error:
@@ -120,7 +120,7 @@ def _charge_limits(scenario: Scenario) -> Iterator[str]:
 
 
 def _speed_limits(scenario: Scenario) -> Iterator[str]:
-    """Yield what is not known of how fast vehicles are, and of what that breaks."""
+    """Yield limits due to missing speeds of vehicles and missing crash ratings."""
     if any(source.motion is None for source in scenario.vehicles):
         yield (
             "a vehicle without a speed: whatever stops vehicles stops it, however heavy and fast "
