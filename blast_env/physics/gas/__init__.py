@@ -1,1 +1,1 @@
-"""Gas dynamics: the compressible Euler equations in three dimensions, around solid cells."""
+"""Gas dynamics: the compressible Euler equations in three dimensions around solid cells."""

@@ -1,8 +1,8 @@
-"""What a blast by gas dynamics costs, told before it begins.
+"""Estimates of the cost of a gas-dynamics blast before it begins.
 
-A small model of the solver: the cells that the front has reached, if the charge is in the middle,
-the steps until the loads are known, and how many cells a core moves on in a second.
-docs/howto/app.md holds it against blasts that were run.
+They come from a small model of the solver: the number of cells behind the front of a charge in the
+middle of the site, the number of steps until the loads are known, and the number of cells that a
+core updates per second. docs/howto/app.md compares estimates with measured costs.
 """
 
 from dataclasses import dataclass
@@ -16,20 +16,20 @@ from blast_env.physics.scene import BlastSite
 
 MOST_BYTES: Final = 8 * 2**30
 MOST_S: Final = 6 * 3600.0
-"""Memory and time on a core beyond which a blast is refused."""
+"""Limits on the memory and the core time of a blast; costlier ones are refused."""
 
 _STEP_S_PER_M: Final = (0.68e-3, 1.32e-3)
-"""Time step over the side of a cell: as the sound in hot products allows it, and afterwards."""
+"""Ratio of time step to cell side while the products are hot, and after they have settled."""
 
 _AHEAD_M: Final = 12.0
 _AHEAD_AFTER_S: Final = 0.01
-"""How far the front of 100 kg gets ahead of sound that began with it, and how soon."""
+"""Final lead of the front of 100 kg over sound from the detonation, and its time constant."""
 
 _AFTER_S: Final = 0.01
-"""How long a run of 100 kg lasts on after sound has come to all that it waits for."""
+"""Duration of a run of 100 kg after sound has reached all the places that it waits for."""
 
 _PARTS: Final = 100
-"""Of a run, in which what moves is counted."""
+"""Number of intervals of a run in which updated cells are counted."""
 
 _CELLS_PER_S: Final = 15e6
 _BYTES_PER_CELL: Final = 28.0
@@ -38,13 +38,13 @@ _PROCESS_BYTES: Final = 270e6
 
 @dataclass(frozen=True)
 class CostGuess:
-    """What one blast costs, about.
+    """Estimated cost of one blast.
 
     Attributes:
-        cells: The smallest cells that there are, those around the site included.
-        steps: Steps until the loads are known.
+        cells: Number of smallest cells, including those around the site.
+        steps: Number of steps until the loads are known.
         memory_bytes: Memory of the process.
-        moved: Cells that are moved on, in all steps together.
+        moved: Number of cell updates, summed over all steps.
     """
 
     cells: int
@@ -54,14 +54,14 @@ class CostGuess:
 
     @property
     def seconds(self) -> float:
-        """Time on a busy or old core, without films; a fast one takes half to four fifths of it."""
+        """Time on a busy or old core, without films; a fast core takes half to 80 % of it."""
         return self.moved / _CELLS_PER_S
 
     def check(self, settings: GasSettings) -> None:
         """Refuse a blast that costs too much.
 
         Raises:
-            BlastEnvError: If it needs more memory or time than `MOST_BYTES` and `MOST_S`.
+            BlastEnvError: If it needs more memory than `MOST_BYTES` or more time than `MOST_S`.
         """
         what = f"{self.cells:,} {settings.cell_words} and {self.steps:,} steps"
         instead = "take larger cells" + (", or cells='coarse'" * (not settings.is_growing))
@@ -78,12 +78,12 @@ class CostGuess:
 
 
 def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0) -> CostGuess:
-    """Return what a blast by gas dynamics costs, about; nothing is built for it.
+    """Return the estimated cost of a gas-dynamics blast, without building its grid.
 
     Args:
-        settings: How it is run.
-        site: What stands where.
-        response_s: How long the run goes on at least after the last load was reached.
+        settings: The settings of the run.
+        site: The structures, the barrier, the charge and the gauges.
+        response_s: Minimum duration of the run after the last load has arrived.
     """
     scale = cbrt(site.charge.tnt_kg / 100.0)
     watched = watched_structures(site, settings.until)
@@ -108,15 +108,15 @@ def cost_of_run(settings: GasSettings, site: BlastSite, response_s: float = 0.0)
 def _cells_in(
     sides_m: tuple[float, float, float], cell_m: float, settings: GasSettings, *, margin: bool
 ) -> tuple[int, ...]:
-    """Return how many cells fill a site and what is around it, along x, y and z.
+    """Return the number of cells in a site and its surroundings, along x, y and z.
 
     Args:
         sides_m: Width, depth and height of the air of the site.
         cell_m: Side of a cell.
-        settings: How the blast is run.
-        margin: Whether those outside of all, which are not moved on, count too.
+        settings: The settings of the run.
+        margin: Whether to include the outermost cells, which are not updated.
     """
-    # Here, because both import Numba, and whoever asks for the cost may never run a blast.
+    # Imported here, because both import Numba, and an estimate may not be followed by a blast.
     from blast_env.physics.gas.grid import layers_to
     from blast_env.physics.gas.state import MARGIN
 

@@ -1,10 +1,10 @@
-"""A run of the gas whose cells become twice as large when its front has passed.
+"""A run of the gas whose cells are doubled when the front has run far enough.
 
-A front wants cells that are small beside what it has behind it, and that grows with the way that it
-has run. So a blast begins with small cells around the charge, where they are few; when the front is
-far enough away, the whole grid goes over to cells of twice the side, in steps of twice the length.
-Mass, momentum and energy stay what they are. Whoever looks at the gas sees the grid of the smallest
-cells all the time.
+A front needs cells that are small compared with the length of its wave, which grows with the
+distance from the charge. A blast therefore begins with small cells, of which few are needed near
+the charge. When the front is far enough away, the whole grid changes to cells of twice the side,
+with time steps of twice the length. Mass, momentum and energy are conserved. Recorders see the grid
+of the smallest cells throughout.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from blast_env.physics.gas.solver import GasSolver, Recorder
 from blast_env.physics.gas.state import Reals
 
 _HALF: Final = 4
-"""Of eight cells: solid ones that make one of twice the side solid."""
+"""Number of solid cells, out of eight, that make a cell of twice the side solid."""
 
 
 class DoublingSolver:
@@ -30,13 +30,13 @@ class DoublingSolver:
 
     Args:
         solver: The solver of the smallest cells; its recorders become those of the whole run.
-        doubled_s: When cells are doubled, in order.
+        doubled_s: Times of doubling, in ascending order.
 
     Attributes:
         grid: The grid of the smallest cells.
         faces: The faces on it.
-        recorders: What looks at the gas.
-        current: What moves the gas on now.
+        recorders: The recorders of the run.
+        current: The current solver.
     """
 
     def __init__(self, solver: GasSolver, doubled_s: Sequence[float]) -> None:
@@ -52,22 +52,22 @@ class DoublingSolver:
 
     @property
     def time_s(self) -> float:
-        """Simulated time so far."""
+        """Simulated time."""
         return self.current.time_s
 
     @property
     def steps(self) -> int:
-        """Steps so far."""
+        """Number of steps."""
         return self.current.steps
 
     @property
     def cell_updates(self) -> int:
-        """Cells moved on so far, see `GasSolver`."""
+        """Number of cell updates; see `GasSolver`."""
         return self.current.cell_updates
 
     @property
     def lifted(self) -> int:
-        """Cells that had to be lifted to the floor of density or pressure so far."""
+        """Number of cells raised to the floor of density or pressure."""
         return self.current.lifted
 
     @property
@@ -82,7 +82,7 @@ class DoublingSolver:
         return pressure if self._of_face is None else pressure[self._of_face]
 
     def overpressure_at(self, cells: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the overpressures in some of the smallest cells, x, y and z (n, 3)."""
+        """Return the overpressures in some of the smallest cells, given as x, y and z (n, 3)."""
         own = np.stack([self._cells[axis][cells[:, axis]] for axis in range(3)], axis=1)
         if self._nearest_air is not None:
             own = self._nearest_air[:, own[:, 0], own[:, 1], own[:, 2]].T
@@ -94,12 +94,12 @@ class DoublingSolver:
         return plane[np.ix_(*(self._cells[other] for other in range(3) if other != axis))]
 
     def advance(self, until_s: float) -> None:
-        """Go on until the simulated time is at least `until_s`."""
+        """Continue until the simulated time is at least `until_s`."""
         while self.time_s < until_s:
             self.step()
 
     def step(self) -> None:
-        """Make one time step; double the cells before it if it is time."""
+        """Make one time step, after doubling the cells if that is due."""
         while self._doubled_s and self.time_s >= self._doubled_s[0]:
             del self._doubled_s[0]
             self._double()
@@ -122,12 +122,12 @@ class DoublingSolver:
 
 
 def shape_to_double(shape: tuple[int, int, int], skirt: int, times: int) -> tuple[int, int, int]:
-    """Return a shape that can be doubled so often, of the same cells or some more at high ends.
+    """Extend a shape at its high ends so that its cells can be doubled `times` times.
 
     Args:
-        shape: Cells along x, y and z of a grid with the ground below and open borders else.
-        skirt: Layers around them; each doubling takes one.
-        times: How often.
+        shape: Cells along x, y and z of a grid with ground below and otherwise open borders.
+        skirt: Layers of the skirt; each doubling takes one.
+        times: Number of doublings.
     """
     ends = (2, 2, 1) if skirt else (0, 0, 0)
     nx, ny, nz = (n + (2 * taken - n) % 2**times for n, taken in zip(shape, ends, strict=True))
@@ -135,9 +135,9 @@ def shape_to_double(shape: tuple[int, int, int], skirt: int, times: int) -> tupl
 
 
 def with_double_cells(grid: GasGrid) -> GasGrid:
-    """Return a grid of cells of twice the side, solid where half of what they hold is.
+    """Return a grid of cells of twice the side, solid if at least half of their volume is.
 
-    The first layer of a skirt is as thick as they are, and becomes one of theirs.
+    The first layer of a skirt is as thick as these cells, and becomes a layer of the grid.
     """
     nx, ny, nz = (n // 2 for n in grid.shape)
     eighths = grid.solid.reshape(nx, 2, ny, 2, nz, 2).sum(axis=(1, 3, 5))
@@ -157,7 +157,7 @@ def with_double_cells(grid: GasGrid) -> GasGrid:
 def nearest_faces(
     faces: Faces, grid: GasGrid, others: Faces, other_grid: GasGrid
 ) -> NDArray[np.int64]:
-    """Return for each face the nearest one that looks the same way among those of another grid."""
+    """Return the index of the nearest face of another grid with the same normal (faces,)."""
     nearest = np.zeros(len(faces), dtype=np.int64)
     centres_m, other_centres_m = faces.centres_m(grid), others.centres_m(other_grid)
     for axis in range(3):

@@ -1,15 +1,15 @@
-"""When a blast by gas dynamics is over: as soon as its loads are known.
+"""The end of a gas-dynamics blast, as soon as its loads are known.
 
 A load is the largest value of a running impulse (`blast_env.physics.gas.probes`). It is known when
 
-1. sound has had the time to come from the charge to every corner of what the run waits for, and
+1. sound has had the time to travel from the charge to every corner of the watched structures, and
 2. the running impulse has fallen by a tenth of its largest value; for the load of a wall, on nine
    tenths of its area.
 
-Later waves are weaker than the ones that came first, and have to make up for that tenth before they
-count. `python -m studies.gas ending` compares with runs four times as long. A wall in a corner may
-keep its overpressure; a run that waits for it ends by a limit of time, and its load is not known.
-Without Numba: estimates of cost follow from it, too.
+Later waves are weaker than the first ones, and must make up for that tenth before they affect a
+load. `python -m studies.gas ending` compares with runs four times as long. A wall in a corner may
+retain its overpressure; a run that waits for it ends at the time limit, and its load is not known.
+The module does not import Numba, because estimates of cost use it.
 """
 
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.physics.scene import BlastSite
 
 FALLEN: Final = 0.1
-"""Share of its largest value by which a running impulse has fallen where the load is known."""
+"""Fall of a running impulse from its largest value, relative to it, for a known load."""
 
 AREA: Final = 0.9
-"""Share of its area on which that has happened where the load of a wall is known."""
+"""Share of the area of a wall that must have known loads for the load of the wall to be known."""
 
 SOUND_M_S: Final = 340.0
 
@@ -34,41 +34,44 @@ _MOST_AFTER_S: Final = 0.15  # for 100 kg; grows with the cube root of the mass
 
 
 def is_known(impulse_pa_s: FloatArray | float, net_impulse_pa_s: FloatArray | float) -> BoolArray:
-    """Return whether loads are known from their running impulses, where sound has come.
+    """Return whether loads are known from their running impulses, once sound has arrived.
 
     Args:
-        impulse_pa_s: Largest values so far, Pa s (n,).
-        net_impulse_pa_s: Values now, Pa s (n,).
+        impulse_pa_s: Largest values up to now, Pa s (n,).
+        net_impulse_pa_s: Current values, Pa s (n,).
     """
     impulse = np.asarray(impulse_pa_s)
     return np.asarray((impulse > 0.0) & (net_impulse_pa_s <= (1.0 - FALLEN) * impulse))
 
 
 def sound_s(site: BlastSite, places_m: Sequence[tuple[float, ...]]) -> float:
-    """Return when sound has come from the charge to all of some places in plan, s."""
+    """Return the longest travel time of sound from the charge to places in plan, s."""
     x_m, y_m = site.charge.position_m
     return max((hypot(x - x_m, y - y_m) for x, y, *_ in places_m), default=0.0) / SOUND_M_S
 
 
 def limit_s(site: BlastSite, travel_s: float) -> float:
-    """Return when a run ends at the latest.
+    """Return the time limit of a run, s.
 
     Args:
-        site: What stands where.
-        travel_s: When sound has come to all that it waits for.
+        site: The site with its charge.
+        travel_s: Longest travel time of sound to the places that the run waits for.
     """
     return _MOST_TRAVEL_TIMES * travel_s + _MOST_AFTER_S * cbrt(site.charge.tnt_kg / 100.0)
 
 
 def watched_structures(site: BlastSite, until: str | float) -> list[int]:
-    """Return the structures that a run waits for: those protected, or else all but the barrier."""
+    """Return the indices of the structures that a run waits for.
+
+    They are the protected ones, or all without the barrier if none is or if `until` is "walls".
+    """
     structures = [k for k, outline in enumerate(site.structures) if outline.cells is None]
     protected = [k for k in structures if site.structures[k].protected]
     return structures if until == "walls" else protected or structures
 
 
 def corners_m(site: BlastSite, structures: Sequence[int]) -> list[tuple[float, float]]:
-    """Return the corners of some structures in plan."""
+    """Return the corners of structures in plan."""
     return [
         (x, y)
         for left, bottom, right, top in (site.structures[k].rectangle_m for k in structures)

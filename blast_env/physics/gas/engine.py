@@ -1,9 +1,9 @@
-"""The gas engine: what a layout really does, in three dimensions and without any randomness.
+"""The gas engine: deterministic blasts in three dimensions.
 
-The site becomes a grid of cubes: structures, barrier and ground are solid. Around the site and
-above it cells grow outwards, to open borders far away. The charge expands with spherical symmetry
-until its front reaches the first structure or the build zone, then the solver takes over, until the
-loads on the structures are known.
+The site becomes a grid of cubic cells, in which structures, barrier and ground are solid. Around
+and above the site, cells grow outwards to distant open borders. The charge expands with spherical
+symmetry until its front reaches the first structure or the build zone. Then the solver takes over
+until the loads on the structures are known.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,8 +43,8 @@ from blast_env.physics.gas.source import (
 from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
-_HOTTEST: Final = 4.0  # that settled products are at most, in units of still air's temperature
-_LOOK_EVERY: Final = 4  # steps between two looks at the loads
+_HOTTEST: Final = 4.0  # temperature limit of settled products, in units of still air's
+_LOOK_EVERY: Final = 4  # steps between two checks of the loads
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
 
@@ -55,10 +55,10 @@ def _none(_: GasGrid) -> Sequence[Recorder]:
 
 @dataclass(frozen=True, eq=False)
 class FaceTable:
-    """The faces of structures and barrier, a cell's each.
+    """The cell faces of structures and barrier.
 
     Attributes:
-        faces: For the solver (n,).
+        faces: The faces for the solver (n,).
         structure: Index into the site's structures (n,).
         row: Row of the module in its structure (n,).
         column: Column of the module (n,).
@@ -75,27 +75,27 @@ class FaceTable:
 
 
 class GasRun:
-    """One blast on its way.
+    """One blast in progress.
 
     Attributes:
-        site: What stands where.
-        settings: How it is run.
-        cost: Estimate of its cost before it began.
+        site: The structures, the barrier, the charge and the gauges.
+        settings: The settings of the run.
+        cost: Estimate of its cost.
         grid: The grid.
         solver: The solver.
         charge: The charge.
-        handover_radius_m: Where the charge's front was when the grid took over: at the first
-            structure, the ground below a charge in the air, or the build zone, whatever stands in
-            it; and at least where `least_clearance_m` says, in or beside the zone too. So all
-            layouts of a scenario have the same one for a charge.
+        handover_radius_m: Radius of the front at which the grid takes over: the distance to the
+            first structure, to the ground below a charge in the air, or to the build zone, with or
+            without a barrier in it; at least `least_clearance_m`. It is the same for all layouts
+            of a scenario with the same charge.
         table: The faces on which loads are recorded.
         loads: The loads on them.
         gauges: The gauges, `None` without any.
-        response_s: How long it goes on at least after the last load was reached, for facades to
+        response_s: Minimum duration of the run after the last load has arrived, for facades to
             peak and rebound.
-        limit_s: When it ends at the latest.
-        end_reason: Why the run has ended; None while it has not.
-        notes: Why the result is to be distrusted, a sentence each.
+        limit_s: Time limit of the run.
+        end_reason: Reason for the end of the run; `None` before it.
+        notes: Reasons to distrust the result, one sentence each.
     """
 
     def __init__(
@@ -144,12 +144,12 @@ class GasRun:
 
     @property
     def time_s(self) -> float:
-        """Simulated time so far."""
+        """Simulated time."""
         return self.solver.time_s
 
     @property
     def steps(self) -> int:
-        """Steps so far."""
+        """Number of steps."""
         return self.solver.steps
 
     def record(self, recorder: Recorder) -> None:
@@ -163,9 +163,9 @@ class GasRun:
         self.solver.recorders = (*self.solver.recorders, recorder)
 
     def advance(self, until_s: float) -> None:
-        """Go on until the simulated time is at least `until_s`, or the run has ended.
+        """Continue until the simulated time is at least `until_s`, or the run has ended.
 
-        How a run is cut into calls does not change it.
+        The division of a run into calls does not change its results.
         """
         while self.end_reason is None and self.solver.time_s < until_s:
             self.solver.step()
@@ -176,11 +176,14 @@ class GasRun:
                 self._look()
 
     def has_come(self, index: int) -> bool:
-        """Return whether sound has come from the charge to all of a structure, by its index."""
+        """Return whether sound has reached all corners of a structure in plan, by its index."""
         return self.solver.time_s >= sound_s(self.site, corners_m(self.site, [index]))
 
     def is_known(self, index: int) -> bool:
-        """Return whether the loads on the walls of a structure that count are known."""
+        """Return whether the loads on the counted walls of a structure are known, by its index.
+
+        With `until` of "walls", all its faces are included.
+        """
         groups = _groups(self.table, self.site, self.settings.until, [index])
         return not groups or (self.has_come(index) and self._are_known(groups))
 
@@ -194,7 +197,7 @@ class GasRun:
         return known & (self.solver.time_s >= come_s)
 
     def _look(self) -> None:
-        """End the run if its loads are known, and facades have had the time to respond to them."""
+        """End the run if its loads are known and facades have had the time to respond."""
         if self._end_s is None and self.solver.time_s >= self._travel_s:
             gauges = not self._watches_gauges or bool(self.gauges_known.all())
             if gauges and self._are_known(self._groups):
@@ -203,18 +206,18 @@ class GasRun:
             self.end_reason = EndReason.LOADS_KNOWN
 
     def _reached_s(self) -> float:
-        """Return when the last of the known loads that the run waits for was reached."""
+        """Return the time of the last known load on the walls that the run waits for, s."""
         known = is_known(self.loads.impulse_pa_s, self.loads.net_impulse_pa_s)
         reached_s = np.where(known, self.loads.impulse_time_s, 0.0)
         return max((float(reached_s[faces].max()) for faces in self._groups), default=0.0)
 
     def _are_known(self, walls: Sequence[NDArray[np.int64]]) -> bool:
-        """Return whether the loads on walls are known, from the faces of each."""
+        """Return whether the loads on all walls are known, given the faces of each."""
         on_faces = is_known(self.loads.impulse_pa_s, self.loads.net_impulse_pa_s)
         return all(on_faces[faces].mean() >= AREA for faces in walls)
 
     def _notes(self) -> tuple[str, ...]:
-        """Return why the source was not checked for such a blast."""
+        """Return the reasons why this blast is outside the checked range of the source."""
         clear, least = (
             clearance_m(self.grid, self.charge),
             least_clearance_m(self.grid, self.charge),
@@ -235,14 +238,18 @@ class GasRun:
 
 
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
-    """Return the scaled distance of a structure's nearest point in plan, m/kg^(1/3)."""
+    """Return the scaled distance of a structure, m/kg^(1/3).
+
+    It combines the distance of the nearest point in plan with the larger of the heights of the
+    charge above the ground and of the structure's base above the charge.
+    """
     distance_m = structure.rectangle_m.distance_to(site.charge.position_m)
     up_m = max(site.charge.height_m, structure.base_m - site.charge.height_m)
     return hypot(distance_m, up_m) / cbrt(site.charge.tnt_kg)
 
 
 def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
-    """Return the grid with what is solid in it."""
+    """Return the grid with its solid cells."""
     cell_m = settings.smallest_m
     margin = ceil(settings.margin_m / cell_m)
     low = np.array([site.site_m.left, site.site_m.bottom])
@@ -289,9 +296,9 @@ def _modules_at(
 
 
 def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
-    """Return where the modules of an outline begin and end (2, rows, columns).
+    """Return the heights of the base and the top of each module of an outline (2, rows, columns).
 
-    Where there is no module, anything.
+    Values without a module are arbitrary.
     """
     ends_m = np.empty((2, outline.rows, outline.columns))
     both = (outline.base_m, outline.bases_m), (outline.height_m, outline.heights_m)
@@ -314,7 +321,7 @@ def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
         own = (rows[behind[:2]] >= 0) & (base_m <= z_m) & (z_m < top_m)
         structure[own] = index
         row[own], column[own] = (each[behind[:2]][own] for each in (rows, columns))
-    # West, east, south, north by axis and side; what looks up is the roof, or else the underside.
+    # West, east, south, north by axis and side; upward faces are roofs, downward ones undersides.
     upright = 2 * faces.axis + (faces.side > 0)
     face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
     return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
@@ -323,7 +330,7 @@ def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
 def _groups(
     table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
 ) -> list[NDArray[np.int64]]:
-    """Return the faces of each wall whose load a run waits for: those that count, or all."""
+    """Return the faces of each wall that a run waits for: counted walls, or all of them."""
     groups = (
         np.flatnonzero((table.structure == index) & (table.face == FACE_NAMES.index(name)))
         for index in watched
@@ -340,7 +347,7 @@ def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
 
 
 def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge, radius_m: float) -> None:
-    """Add what gauges within a radius had before the grid took over."""
+    """Add the histories of gauges within a radius before the grid took over."""
     centres_m = np.array(grid.origin_m) + grid.cell_m * (gauges.cells + 0.5)
     x_m, y_m, z_m = charge.position_m
     centre_m = np.array([x_m, y_m, 0.0 if charge.on_ground else z_m])

@@ -17,7 +17,7 @@ class Faces:
     Attributes:
         air: The air cell before each face (n, 3).
         axis: Axis that the face is normal to (n,).
-        side: Where the air is, seen from the solid: -1 or 1 (n,).
+        side: Direction along the axis from the solid to the air: -1 or 1 (n,).
     """
 
     air: NDArray[np.int64]
@@ -40,16 +40,16 @@ class Faces:
         return np.asarray(grid.origin_m) + grid.cell_m * middle
 
     def kernel_table(self, grid: GasGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the faces as the kernels look them up, line by line.
+        """Return the faces in the order of the kernels, line by line.
 
-        A face is kept under the cell on its high side. A line is a row of cells along x, for faces
-        along x first, then along y and z.
+        A face is indexed by the cell on its high side. A line is a row of cells along x. Lines of
+        faces normal to x come first, then those normal to y and z.
 
         Args:
             grid: The grid.
 
         Returns:
-            Cell along x, and number of the face (n, 2); first entry of each line (lines + 1,).
+            Cell along x and index of the face (n, 2); first entry of each line (lines + 1,).
         """
         nx, ny, nz = grid.array_shape
         high = np.maximum(self.air, self.solid) + grid.lead
@@ -70,7 +70,10 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
 
     Args:
         grid: The grid.
-        cells: Which cells are chosen (nx, ny, nz); they must be solid.
+        cells: Mask of the chosen cells (nx, ny, nz), all solid.
+
+    Raises:
+        BlastEnvError: If `cells` has another shape than the grid, or holds cells of air.
     """
     if cells.shape != grid.shape:
         raise BlastEnvError(f"cells has shape {cells.shape}, but the grid {grid.shape}")
@@ -95,7 +98,7 @@ def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
 
 
 def ground_faces(grid: GasGrid) -> Faces:
-    """Return the faces of the ground below air, for a grid whose low end of z is a mirror."""
+    """Return the faces of the ground below air, for a grid with a mirror at the low end of z."""
     columns = np.argwhere(~grid.solid[:, :, 0])
     air = np.concatenate((columns, np.zeros((len(columns), 1), dtype=np.int64)), axis=1)
     return Faces(air, np.full(len(air), 2), np.ones(len(air), dtype=np.int64))

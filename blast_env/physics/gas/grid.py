@@ -1,9 +1,9 @@
-"""The grid of the gas: cubic cells, some of them solid, and what lies beyond its six faces.
+"""The grid of the gas: cubic cells, some of them solid, and the boundaries at its six faces.
 
-An open face reflects a little of what reaches it, and lets the mean pressure of what it encloses
-drift. So it should be far away. A skirt takes it there for little: layers of cells outside the
-grid, each thicker than the one before. They belong to the gas, but to nothing else: nobody looks at
-them, and no wave is resolved there.
+An open face partly reflects waves, and lets the mean pressure in the grid drift. It should
+therefore be far away. A skirt achieves this at low cost: layers of cells outside the grid, each
+thicker than the one before. They are part of the gas, but no recorder sees them, and they resolve
+no waves.
 """
 
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ from blast_env.physics.gas.state import AIR, MARGIN, MIRROR, OPEN
 FACE_NAMES: Final = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
 
 SKIRT_GROWTH: Final = 2.0
-"""Thickness of a layer of the skirt over that of the one before."""
+"""Ratio of the thickness of a layer of the skirt to that of the one before."""
 
 
 def layers_to(cells: float) -> int:
-    """Return how many layers a skirt needs to be as thick as so many cells."""
+    """Return the number of layers of a skirt at least as thick as a number of cells."""
     inner = 1.0 + cells * (SKIRT_GROWTH - 1.0) / SKIRT_GROWTH
     return ceil(round(log(inner) / log(SKIRT_GROWTH), 9))
 
 
 class FaceKind(StrEnum):
-    """What lies beyond a face of the grid."""
+    """The boundary at a face of the grid."""
 
     OPEN = "open"
     MIRROR = "mirror"
@@ -42,12 +42,19 @@ class GasGrid:
 
     Attributes:
         cell_m: Side of a cell.
-        solid: Which cells are solid (nx, ny, nz).
+        solid: Mask of the solid cells (nx, ny, nz).
         origin_m: Low corner of the first cell: x, y, z.
-        x_low: What lies beyond the face at the low end of x; the others likewise. The lowest one
-            is the ground.
-        skirt: Layers of growing cells beyond each open face; what is solid at the face goes on in
-            them, the rest is air.
+        x_low: Boundary at the low end of x.
+        x_high: Boundary at the high end of x.
+        y_low: Boundary at the low end of y.
+        y_high: Boundary at the high end of y.
+        z_low: Boundary at the low end of z, by default the ground.
+        z_high: Boundary at the high end of z.
+        skirt: Layers of growing cells beyond each open face; solids at the face extend through
+            them, and the rest is air.
+
+    Raises:
+        BlastEnvError: If one of them is out of bounds.
     """
 
     cell_m: float
@@ -112,7 +119,7 @@ class GasGrid:
 
     @property
     def skirts(self) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
-        """Layers of the skirt below and above the grid along x, y and z; none beyond a mirror."""
+        """Layers of the skirt at the low and the high end of x, y and z; 0 at a mirror."""
         x, y, z = (
             (self._skirt(FACE_NAMES[2 * axis]), self._skirt(FACE_NAMES[2 * axis + 1]))
             for axis in range(3)
@@ -124,12 +131,12 @@ class GasGrid:
 
     @property
     def lead(self) -> NDArray[np.int64]:
-        """Where the grid begins in the arrays of the kernels, along x, y and z (3,)."""
+        """First cell of the grid in the arrays of the kernels, along x, y and z (3,)."""
         return np.array([MARGIN + low for low, _ in self.skirts])
 
     @property
     def array_shape(self) -> tuple[int, int, int]:
-        """Cells of the kernels' arrays along x, y and z: with the skirt, and their margin."""
+        """Cells of the kernels' arrays along x, y and z, with the skirt and the margin."""
         nx, ny, nz = (
             n + low + high + 2 * MARGIN
             for n, (low, high) in zip(self.shape, self.skirts, strict=True)
@@ -138,14 +145,14 @@ class GasGrid:
 
     @property
     def inner(self) -> tuple[slice, slice, slice]:
-        """The grid in the arrays of the kernels, along z, y and x."""
+        """Slices of the grid in the arrays of the kernels, along z, y and x."""
         x, y, z = (
             slice(int(lead), int(lead) + n) for lead, n in zip(self.lead, self.shape, strict=True)
         )
         return z, y, x
 
     def narrowness(self, axis: int) -> NDArray[np.float64]:
-        """Return the side of a cell over the width of each in the kernels' arrays (n,)."""
+        """Return the ratio of the cell side to the width of each array cell along an axis (n,)."""
         low, high = self.skirts[axis]
         own = np.ones(self.shape[axis] + 2 * MARGIN)
         grown = SKIRT_GROWTH ** -np.arange(1.0, self.skirt + 1.0)
@@ -153,7 +160,7 @@ class GasGrid:
         return np.pad(wide, MARGIN, mode="edge")
 
     def codes(self) -> NDArray[np.int8]:
-        """Return what each cell is to the kernels, skirt and margin included (z, y, x)."""
+        """Return the codes of the cells for the kernels, with skirt and margin (z, y, x)."""
         codes = np.full(self.array_shape, OPEN, dtype=np.int8)
         inner = slice(MARGIN, -MARGIN)
         solid = np.pad(self.solid, self.skirts, mode="edge")

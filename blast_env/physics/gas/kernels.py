@@ -2,17 +2,17 @@
 
 There are two passes over the state. `advance_planes` moves the gas along x and y together, with all
 fluxes from one time level, so that a quarter turn of the scene turns the result. `advance_columns`
-moves it along z. A step is half of itself in planes, the whole in columns, and the other half in
-planes, which keeps second order in time (Strang).
+moves it along z. A step consists of a half step in planes, a whole step in columns, and another
+half step in planes, which is second-order accurate in time (Strang).
 
 All arithmetic is done on rows of cells along x, which the compiler turns into vector instructions.
-That takes three habits. Rows live in one flat workspace at constant distances (`PITCH`), so that
-the compiler knows that they do not overlap. Loops count from 0, so that no index can be negative.
-Where cells differ (solid or air, which side of the wave) values are selected, not branched to.
+That requires three conventions. Rows lie in one flat workspace at constant distances (`PITCH`), so
+that the compiler knows that they do not overlap. Loops count from 0, so that no index can be
+negative. Where cells differ (solid or air, side of the wave), values are selected without branches.
 
-A cell beside a solid one sees its own mirror image there, beside an open face its own copy.
-Everything here works in the precision of the state. It is one file because Numba keeps what it has
-compiled until the file of the function that Python calls has changed, whatever others it calls.
+The ghost state of a cell is its mirror image beside a solid cell, and its copy beside an open face.
+All arithmetic is in the precision of the state. All kernels are in one file, because Numba's cache
+is invalidated by changes of the file of the function called from Python, and by no others.
 """
 
 from typing import Any, Final
@@ -36,34 +36,34 @@ from blast_env.physics.gas.state import (
 )
 
 LANES: Final = 8
-"""Rows are worked on in so many cells at once; what is done beyond their end is not used."""
+"""Number of cells of a row processed at once; results beyond the end of the row are not used."""
 
 TILE: Final = 136
-"""Most cells of a row that are worked on at once, without the margins."""
+"""Maximum number of cells in a tile of a row, without the margins."""
 
 PITCH: Final = 160
-"""Distance of rows in the workspace: a tile, its margins, and what is beyond the end.
+"""Distance of rows in the workspace: a tile, its margins, and the excess beyond the end.
 
-No multiple of 64, which the cache would not like.
+It is not a multiple of 64, to avoid cache conflicts.
 """
 
 _LIMIT: Final = 2.0
 """Steepest slope in units of the smaller difference (van Leer's monotonised central limiter)."""
 
 _LEAST_SHARE: Final = 0.1
-"""Where reconstructed density or pressure is below this share of the cell's, the cell is taken as
-constant for that pass."""
+"""Share of the cell's density or pressure below which reconstructed values are discarded, and the
+cell is treated as constant for that pass."""
 
 EDGE_SIZE: Final = 12
-"""Length of a row of what tiles keep for the next one: two cells of six variables."""
+"""Length of a row of values kept for the next tile: two cells of six variables."""
 
 _FLOOR: Final = 1e-6
-"""Of density and pressure, in units of those of still air."""
+"""Floor of density and pressure, in units of those of still air."""
 
 _STILL: Final = (0.0, 1e-12, 1e-12, 1e-12, 0.0, 1e-24)
-"""Momentum and fuel up to this count as none, in units of still air. Ahead of a wave they fall off
-without end, to numbers that a processor is slow with, where density and energy are still long
-since."""
+"""Thresholds of momentum and fuel, in units of still air, up to which they are set to 0. Ahead of a
+wave these decay to subnormal numbers, on which processors are slow, while density and energy are
+already those of still air."""
 
 # Rows of a variable follow each other: density, velocities along x, y and z, pressure, fuel share.
 _VARIABLES: Final = 6
@@ -72,7 +72,7 @@ _V: Final = 2 * PITCH
 _W: Final = 3 * PITCH
 _P: Final = 4 * PITCH
 _Y: Final = 5 * PITCH
-# The three rows around the one that is worked on: "low" and "high" are neighbours across.
+# The current row ("mid") and its neighbours across, "low" and "high".
 _LOW: Final = 0
 _MID: Final = _LOW + _VARIABLES * PITCH
 _HIGH: Final = _MID + _VARIABLES * PITCH
@@ -87,7 +87,7 @@ _ALONG: Final = _ABOVE_LOW + _VARIABLES * PITCH
 _CHANGE: Final = _ALONG + _VARIABLES * PITCH
 _ACROSS: Final = _CHANGE + _VARIABLES * PITCH
 _ACROSS_LOW: Final = _ACROSS + _VARIABLES * PITCH
-# Codes of the cells, and the fastest signals so far.
+# Codes of the cells, and the running maxima of the signal speeds.
 _CODE_LOW: Final = _ACROSS_LOW + _VARIABLES * PITCH
 _CODE_MID: Final = _CODE_LOW + PITCH
 _CODE_HIGH: Final = _CODE_MID + PITCH
@@ -110,7 +110,7 @@ def _slope(back: Any, ahead: Any, limit: Any, half: Any, zero: Any) -> Any:
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _whole(n: int) -> int:
-    """Return a number of cells rounded up: single cells at the end would cost as much as eight."""
+    """Round a number of cells up to `LANES`, because a few cells cost as much as all lanes."""
     return (n + LANES - 1) & -LANES
 
 
@@ -128,7 +128,7 @@ def _load_row(
     """Set the row "high" to density, velocity and pressure of n cells from x on.
 
     Returns:
-        How many of them had too little density or pressure, and were lifted to the floor.
+        Number of cells with too little density or pressure, which were raised to the floor.
     """
     bad = _convert_row(state, work, z, y, x, n)
     if bad > 0:
@@ -143,7 +143,7 @@ def _load_row(
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _place(state: Reals, k: int, z: int, y: int, x: int) -> int:
-    """Return where a cell lies in memory, in numbers."""
+    """Return the flat index of an entry of the state."""
     return ((k * state.shape[1] + z) * state.shape[2] + y) * state.shape[3] + x
 
 
@@ -187,7 +187,7 @@ def _convert_row(state: Reals, work: Reals, z: int, y: int, x: int, n: int) -> i
 
 @njit(error_model="numpy", fastmath=FUSED)
 def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
-    """Give the cells of a row at least the floor's density and pressure; motion stays."""
+    """Raise the density and pressure of the cells of a row to the floor, at the same velocity."""
     real = state.dtype.type
     half, floor = real(0.5), real(_FLOOR)
     per_pressure = real(1.0 / (GAMMA - 1.0))
@@ -208,7 +208,7 @@ def _lift_row(state: Reals, z: int, y: int, x: int, n: int) -> None:
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _predict_plane_row(work: Reals, n: int, ratio: Any, along: Reals, x: int, across: Any) -> None:
-    """Set the states at the four upright faces of n cells from x on, half a step on."""
+    """Set the states at the four vertical faces of n cells from x on, half a step later."""
     real = work.dtype.type
     zero, half, gamma = real(0.0), real(0.5), real(GAMMA)
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
@@ -257,7 +257,7 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any, along: Reals, x: int, ac
         ahead = select(air_n, get(work, _HIGH + _P + 1 + i), p)
         py = _slope(p - back, ahead - p, limit, half, zero)
 
-        # In units of the cell's own sides; where those are 1, not a bit changes.
+        # In units of the cell's own widths; bit-identical where those are 1.
         per_x = get(along, x + i)
         fast_u, fast_v = u * per_x, v * across
         spread = ux * per_x + vy * across
@@ -306,7 +306,7 @@ def _predict_plane_row(work: Reals, n: int, ratio: Any, along: Reals, x: int, ac
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _predict_column_row(work: Reals, n: int, ratio: Any) -> None:
-    """Set the states at the lower and the upper faces of n cells, half a step on."""
+    """Set the states at the lower and the upper faces of n cells, half a step later."""
     real = work.dtype.type
     zero, half, gamma = real(0.0), real(0.5), real(GAMMA)
     limit, least = real(_LIMIT), real(_LEAST_SHARE)
@@ -374,7 +374,7 @@ def _hllc_row(
 ) -> None:
     """Set the fluxes through n faces from the states on their two sides.
 
-    Wave speeds by Einfeldt. A wall gets the pressure that turns the gas round, and nothing else.
+    Wave speeds are by Einfeldt. The flux at a wall is only the pressure that turns the gas round.
     """
     real = work.dtype.type
     zero, half, one, gamma = real(0.0), real(0.5), real(1.0), real(GAMMA)
@@ -400,7 +400,7 @@ def _hllc_row(
         wr = select(air_r, wr0, wl0)
         pr = select(air_r, pr0, pl0)
 
-        # Few divisions and roots: they take most of the time.
+        # Divisions and roots are few, because they take most of the time.
         per_both = gamma / (rl * rr)
         sound2_l = pl * rr * per_both
         sound2_r = pr * rl * per_both
@@ -448,7 +448,7 @@ def _hllc_row(
 
 @njit(error_model="numpy", fastmath=FUSED)
 def _predict_plane_fuel(work: Reals, n: int, ratio: Any, along: Reals, x: int, across: Any) -> None:
-    """Set the share of fuel at the four upright faces of n cells from x on, half a step on."""
+    """Set the share of fuel at the four vertical faces of n cells from x on, half a step later."""
     real = work.dtype.type
     zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
     for i in range(_whole(n)):
@@ -472,7 +472,7 @@ def _predict_plane_fuel(work: Reals, n: int, ratio: Any, along: Reals, x: int, a
 
 @njit(error_model="numpy", fastmath=FUSED)
 def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
-    """Set the share of fuel at the lower and the upper faces of n cells, half a step on."""
+    """Set the share of fuel at the lower and the upper faces of n cells, half a step later."""
     real = work.dtype.type
     zero, half, limit = real(0.0), real(0.5), real(_LIMIT)
     for i in range(_whole(n)):
@@ -489,7 +489,7 @@ def _predict_column_fuel(work: Reals, n: int, ratio: Any) -> None:
 
 @njit(error_model="numpy", fastmath=FUSED)
 def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
-    """Set the fluxes of fuel from those of mass; what comes in through open faces has none."""
+    """Set the fluxes of fuel from those of mass, with the share of fuel on the upwind side."""
     zero = work.dtype.type(0.0)
     for i in range(_whole(n)):
         mass = get(work, out + i)
@@ -499,7 +499,7 @@ def _fuel_row(work: Reals, n: int, left: int, right: int, out: int) -> None:
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _shift_rows(work: Reals, count: int, n: int) -> None:
-    """Go on to the next row: what was high is now in the middle, what was there is low."""
+    """Advance to the next row: "high" becomes "mid", and "mid" becomes "low"."""
     _copy_rows(work, count, _MID, _LOW, n)
     _copy_rows(work, count, _HIGH, _MID, n)
     _copy_rows(work, count, _ABOVE, _ABOVE_LOW, n)
@@ -518,7 +518,7 @@ def _record_walls(
     x: int,
     n: int,
 ) -> None:
-    """Copy the pressures that act on the recorded faces of a row of n cells from x on."""
+    """Copy the pressures on the recorded faces of a row of n cells from x on."""
     for k in range(first[line], first[line + 1]):
         i = walls[k, 0] - x
         if 0 <= i < n:
@@ -533,7 +533,7 @@ def _forget_signals(work: Reals) -> None:
 
 @njit(error_model="numpy", fastmath=FUSED)
 def _fastest(work: Reals, n: int) -> float:
-    """Return the fastest signal of the first n cells of the rows loaded since."""
+    """Return the fastest signal of the first n cells in the rows since `_forget_signals`."""
     fastest = 0.0
     for i in range(n):
         fastest = max(fastest, get(work, _SIGNAL + i))
@@ -557,23 +557,23 @@ def advance_planes(
     first: NDArray[np.int32],
     notes: NDArray[np.float64],
 ) -> None:
-    """Move the gas along x and y in the planes from z_from to z_to, those of others left alone.
+    """Move the gas along x and y in the planes from z_from to z_to, and in no others.
 
     Args:
-        state: The state (5 or 6, z, y, x), changed.
+        state: The state (5 or 6, z, y, x), updated in place.
         code: Codes of the cells (z, y, x).
         work: A workspace (WORK_SIZE,).
         edges: A workspace (y, 2 * 6).
-        box: First and last + 1 cells along z, y and x outside which the air is still (6,).
+        box: First and last + 1 cells along z, y and x of the box outside which air is still (6,).
         z_from: First plane.
         z_to: Last plane + 1.
-        ratio: Time step over cell side.
-        along: Cell side over the width of each cell along x (nx + 8,).
+        ratio: Ratio of time step to cell side.
+        along: Ratio of cell side to the width of each cell along x (nx + 8,).
         across: The same along y (ny + 8,).
-        pressure: Pressures on the recorded faces, changed.
-        walls: Cell beyond the face along x, and number of the face, row by row (k, 2).
-        first: First entry of a row among `walls`, for faces along x and then along y.
-        notes: Fastest signal so far, cells lifted to the floor so far; changed.
+        pressure: Pressures on the recorded faces, updated in place.
+        walls: Cell along x on the high side, and index of the face, row by row (k, 2).
+        first: First entry of each row in `walls`, for faces normal to x, then to y and z.
+        notes: Fastest signal and number of cells raised to the floor; updated in place.
     """
     y0, y1, x0, x1 = box[2], box[3], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE
@@ -588,8 +588,8 @@ def advance_planes(
             n = xb - xa + 2 * MARGIN
             _forget_signals(work)
             for y in range(y0 - 2, y1 + 2):
-                # Rows up to y are loaded, those up to y - 1 get their states at the faces, and
-                # those up to y - 2 are done.
+                # Rows up to y are loaded, those up to y - 1 have states at the faces, and those
+                # up to y - 2 are finished.
                 _shift_rows(work, count, n)
                 lifted += _load_row(state, code, work, z, y, xa - MARGIN, n)
                 _join_tiles(work, edges, y, tile, xb - xa)
@@ -649,7 +649,7 @@ def advance_planes(
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
 def _join_tiles(work: Reals, edges: Reals, y: int, tile: int, width: int) -> None:
-    """Give the row the cells of the tile before as they were, and keep those for the next one."""
+    """Restore the old edge cells of the tile before, and keep those for the next tile."""
     for k in range(_VARIABLES):
         for i in range(MARGIN):
             at = _HIGH + k * PITCH + i
@@ -718,7 +718,7 @@ def advance_columns(
 ) -> None:
     """Move the gas along z in the rows from y_from to y_to; see `advance_planes`.
 
-    `upright` is the cell side over the height of each cell along z (nz + 8,).
+    `upright` is the ratio of cell side to the height of each cell along z (nz + 8,).
     """
     z0, z1, x0, x1 = box[0], box[1], box[4], box[5]
     tiles = (x1 - x0 + TILE - 1) // TILE

@@ -1,7 +1,7 @@
-"""What the compiler needs to turn a loop into vector instructions.
+"""Intrinsics that let the compiler turn a loop into vector instructions.
 
-Numba makes branches of Python's conditional expressions, and lets negative indices count from the
-end. Both are in the way, and the compiler does not always see that it can do without.
+Numba compiles Python's conditional expressions to branches, and lets negative indices count from
+the end. Both prevent vectorisation where the compiler cannot prove that they are unnecessary.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ _lane: Final[Callable[[Callable[..., Any]], Callable[..., Any]]] = intrinsic
 
 @_lane
 def select(_context: Any, condition: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return one if the condition holds, else the other; both are worked out."""
+    """Return one if the condition holds, else the other; both are evaluated."""
 
     def build(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.select(*args)
@@ -27,7 +27,7 @@ def select(_context: Any, condition: Any, one: Any, other: Any) -> tuple[Any, Ca
 
 @_lane
 def root(_context: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return the square root, without a call of the C library."""
+    """Return the square root, without a call to the C library."""
 
     def build(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         function = builder.module.declare_intrinsic("llvm.sqrt", [args[0].type])
@@ -38,7 +38,7 @@ def root(_context: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
 
 @_lane
 def smaller(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return the smaller of two reals, the other one where they do not compare."""
+    """Return the smaller of two reals; the second one if either is NaN."""
 
     def build(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.select(builder.fcmp_ordered("<", *args), *args)
@@ -50,7 +50,7 @@ def smaller(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any
 
 @_lane
 def larger(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return the larger of two reals, the other one where they do not compare."""
+    """Return the larger of two reals; the second one if either is NaN."""
 
     def build(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return builder.select(builder.fcmp_ordered(">", *args), *args)
@@ -62,7 +62,7 @@ def larger(_context: Any, one: Any, other: Any) -> tuple[Any, Callable[..., Any]
 
 @_lane
 def get(_context: Any, array: Any, index: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return an entry of an array as it lies in memory; the index must be right."""
+    """Return an entry of an array by its position in memory, without a check of bounds."""
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.load(_place(context, builder, signature, args))
@@ -72,7 +72,7 @@ def get(_context: Any, array: Any, index: Any) -> tuple[Any, Callable[..., Any]]
 
 @_lane
 def put(_context: Any, array: Any, index: Any, value: Any) -> tuple[Any, Callable[..., Any]]:
-    """Set an entry of an array as it lies in memory; the index must be right."""
+    """Set an entry of an array by its position in memory, without a check of bounds."""
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         builder.store(args[2], _place(context, builder, signature, args))

@@ -1,7 +1,7 @@
-"""What happened before the grid took a blast over: its first, spherical stage, seen again.
+"""The first, spherical stage of a blast before the grid takes over.
 
-The solver's recorders begin when the charge is laid onto the grid, with its front already some way
-off. Whoever was nearer to the charge has missed the front by then.
+The solver's recorders begin when the charge is mapped onto the grid, with its front already at
+some distance. They miss the front at points nearer to the charge.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ class Opening:
 
     Attributes:
         centre_m: Centre of the blast: x, y, and height above the ground.
-        end_s: When the grid takes over.
-        front_m: Where the front is then.
+        end_s: Time at which the grid takes over.
+        front_m: Radius of the front at that time.
         time_s: Times (steps,).
         radius_m: Distances, from the surface of the charge to the front (n,).
         overpressure_pa: Overpressures (steps, n).
@@ -39,24 +39,24 @@ class Opening:
     overpressure_pa: Floats
 
     def at(self, time_s: float, distance_m: ArrayLike) -> Floats:
-        """Return the overpressures at some distances at a time, 0 beyond the front.
+        """Return the overpressures at distances at a time, Pa, 0 beyond the front.
 
-        Within the charge it is the pressure at its surface.
+        Within the charge they are those at its surface.
         """
         step = max(int(np.searchsorted(self.time_s, time_s, side="right")) - 1, 0)
         return self._over_distance(self.overpressure_pa[step], distance_m)
 
     def overpressures_pa(self, distance_m: ArrayLike) -> Floats:
-        """Return the overpressures over time at some distances (steps, n)."""
+        """Return the overpressures over time at distances, Pa (steps, n)."""
         distances_m = np.atleast_1d(np.asarray(distance_m, dtype=np.float64))
         return np.stack([self._over_distance(row, distances_m) for row in self.overpressure_pa])
 
     def peak_pa(self, distance_m: ArrayLike) -> Floats:
-        """Return the largest overpressures so far, 0 where the front has not been."""
+        """Return the largest overpressures of the stage at distances, Pa, 0 beyond the front."""
         return self._over_distance(self.overpressure_pa.max(axis=0, initial=0.0), distance_m)
 
     def impulses_pa_s(self, distance_m: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the running impulses at the end of the stage, and their largest values before."""
+        """Return the running impulses at the end of the stage and their maxima in it, Pa s."""
         step_s = np.diff(self.time_s, append=self.end_s)
         running = np.cumsum(step_s[:, np.newaxis] * self.overpressure_pa, axis=0)
         return (
@@ -70,11 +70,11 @@ class Opening:
 
 @lru_cache(maxsize=4)
 def opening_of(charge: GasCharge, radius_m: float) -> Opening:
-    """Return the first stage of a blast; it takes a good part of a second.
+    """Compute the first stage of a blast, in somewhat less than a second.
 
     Args:
         charge: The charge.
-        radius_m: Where the front is when the grid takes the blast over.
+        radius_m: Radius of the front at which the grid takes over.
     """
     profile = charge.profile(radius_m)
     surface_m = charge.least_radius_m * (1.0 + 1e-9)

@@ -1,16 +1,16 @@
-"""What is recorded while the gas moves: loads on faces, gauges, maps of the ground, pictures.
+"""Recorders of the gas: loads on faces, gauges, ground maps and snapshots.
 
-The load of a point is its **peak specific impulse**, Pa s: the largest value that the integral of
-the overpressure since the detonation reaches, suction included. For a single pulse it is the
-impulse of Kingery and Bulmash; for several pulses it is the largest value of the impulse history,
-which shock codes print. Later pulses count only where they push the history above what it was: the
-sum of all positive phases, which grows with every echo for as long as a run lasts, is no measure of
-what a wall has to take up. `positive_phases` has that sum and the first phase, from a history.
+The load at a point is its **peak specific impulse**, Pa s: the largest value of the integral of the
+overpressure since the detonation, suction included. For a single pulse it is the impulse of Kingery
+and Bulmash; for several pulses it is the largest value of the impulse history, which shock codes
+print. Later pulses count only where they raise the history above its previous maximum. The sum of
+all positive phases grows with every echo during a run, and is no measure of the load on a wall.
+`positive_phases` returns that sum and the first phase of a history.
 
-On a wall, the pressure of a step is the momentum that the wall took from the gas in it: the flux
-that turned the gas round. No estimate from cells is exact in that sense; the pressure of the cell
-before the wall lags behind it by half a cell, and clips its peak. A gauge in the air is the
-pressure of its cell.
+On a wall, the pressure in a step is the momentum that the wall took from the gas, the flux that
+turned the gas round. No estimate from cells is exact in that sense: the pressure of the cell before
+the wall lags by half a cell, and its peak is clipped. A gauge in the air records the pressure of
+its cell.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.solver import Gas
 
 ARRIVAL_PA: Final = 1000.0
-"""Overpressure at which a wave has arrived, unless said otherwise."""
+"""Default overpressure at which a wave counts as arrived."""
 
 # Columns of a table of loads.
 _ARRIVAL, _PEAK, _PEAK_TIME, _NET, _IMPULSE, _IMPULSE_TIME = 0, 1, 2, 3, 4, 5
@@ -47,7 +47,7 @@ def _add_step(
     """Add a step that ended at `time_s` to a table of loads.
 
     Args:
-        loads: The table (n, columns), changed.
+        loads: The table (n, columns), updated in place.
         overpressure: Mean overpressures of the step, or those at its end (n,).
         time_s: End of the step.
         step_s: Length of the step.
@@ -77,7 +77,7 @@ def _add_step(
 
 
 class LoadTable:
-    """Loads on a number of points, whose overpressures are added step by step.
+    """Loads at points, accumulated from overpressures step by step.
 
     Args:
         count: Number of points.
@@ -99,14 +99,14 @@ class LoadTable:
 
     @property
     def arrival_s(self) -> NDArray[np.float64]:
-        """Time at which the overpressure first reached the threshold, nan before (n,)."""
+        """Time at which the overpressure first reached the threshold, NaN before arrival (n,)."""
         return self._loads[:, _ARRIVAL].copy()
 
     @property
     def steepest_s(self) -> NDArray[np.float64]:
-        """Time of the steepest rise, nan before arrival (n,).
+        """Time of the steepest rise, NaN before arrival (n,).
 
-        A shock is some cells wide, and its foot is ahead of it; its middle is where it belongs.
+        A computed shock is some cells wide. Its foot is early, while its middle is in place.
         """
         arrived = np.isfinite(self._loads[:, _ARRIVAL])
         return np.where(arrived, self._loads[:, _RISE_TIME], np.nan)
@@ -123,12 +123,12 @@ class LoadTable:
 
     @property
     def impulse_pa_s(self) -> NDArray[np.float64]:
-        """Peak specific impulse so far (n,)."""
+        """Peak specific impulse up to now (n,)."""
         return self._loads[:, _IMPULSE].copy()
 
     @property
     def impulse_time_s(self) -> NDArray[np.float64]:
-        """Time at which it was reached (n,)."""
+        """Time of the peak specific impulse (n,)."""
         return self._loads[:, _IMPULSE_TIME].copy()
 
     @property
@@ -143,7 +143,7 @@ class LoadTable:
 
 
 class FaceLoads(LoadTable):
-    """Recorder of the loads on the faces that the solver was given."""
+    """Recorder of the loads on the faces of the solver."""
 
     def __init__(self, count: int, arrival_pa: float = ARRIVAL_PA) -> None:
         super().__init__(count, arrival_pa, is_mean=True)
@@ -157,12 +157,12 @@ class PatchHistories:
     """Recorder of the mean overpressure on patches of wall: bays, the sides of barrier pieces.
 
     Args:
-        patch: Which patch each of the solver's faces belongs to, -1 for none (faces,).
+        patch: Index of the patch of each of the solver's faces, -1 for none (faces,).
         count: Number of patches; each has at least one face.
-        share: How much each face counts; all as much unless given (faces,).
+        share: Weight of each face in the mean, 1 unless given (faces,).
 
     Attributes:
-        faces: How many faces each patch has (patches,).
+        faces: Number of faces of each patch (patches,).
 
     Raises:
         BlastEnvError: If a patch has no face.
@@ -183,7 +183,7 @@ class PatchHistories:
         self._history: list[NDArray[np.float32]] = []
 
     def record(self, solver: Gas, step_s: float) -> None:
-        """Add a step: the mean over its time, in its middle."""
+        """Add a step: the mean over its time, at its midpoint."""
         over = solver.wall_pressure[self._members] - 1.0
         sums = np.bincount(self._patch, weights=self._share * over, minlength=len(self.faces))
         self._times.append(solver.time_s - 0.5 * step_s)
@@ -192,17 +192,17 @@ class PatchHistories:
 
     @property
     def time_s(self) -> NDArray[np.float64]:
-        """Middles of the steps so far (steps,)."""
+        """Midpoints of the steps, s (steps,)."""
         return np.array(self._times)
 
     @property
     def step_s(self) -> NDArray[np.float64]:
-        """Lengths of the steps so far (steps,)."""
+        """Lengths of the steps, s (steps,)."""
         return np.array(self._steps)
 
     @property
     def history_pa(self) -> NDArray[np.float32]:
-        """Mean overpressures of the steps (patches, steps)."""
+        """Mean overpressures of the steps, Pa (patches, steps)."""
         return np.array(self._history, dtype=np.float32).reshape(-1, len(self.faces)).T
 
 
@@ -222,10 +222,10 @@ class Phases(NamedTuple):
     """Impulses of the phases of a history, Pa s.
 
     Attributes:
-        first_pa_s: Of the first positive phase.
-        positive_pa_s: Of all positive phases together.
-        negative_pa_s: Of all negative phases together, 0 or below.
-        first_end_s: End of the first positive phase; the last time if it is not over.
+        first_pa_s: Impulse of the first positive phase.
+        positive_pa_s: Sum over all positive phases.
+        negative_pa_s: Sum over all negative phases, 0 or below.
+        first_end_s: End of the first positive phase; the last time if it has not ended.
     """
 
     first_pa_s: float
@@ -239,7 +239,7 @@ def positive_phases(
     overpressure_pa: NDArray[np.float64],
     arrival_pa: float = ARRIVAL_PA,
 ) -> Phases:
-    """Return the impulses of the phases of one history, for comparison with other work.
+    """Return the impulses of the phases of one history, for comparison with other codes.
 
     Args:
         time_s: Times (steps,).
@@ -267,6 +267,9 @@ class Gauges(LoadTable):
         grid: The grid.
         cells: The cells, x, y and z (n, 3).
         arrival_pa: Overpressure at which a wave has arrived.
+
+    Raises:
+        BlastEnvError: If a cell is solid or outside the grid.
     """
 
     def __init__(
@@ -286,7 +289,7 @@ class Gauges(LoadTable):
         self._history: list[NDArray[np.float64]] = []
 
     def add_before(self, time_s: NDArray[np.float64], overpressure_pa: NDArray[np.float64]) -> None:
-        """Add what came before the first step, at its times (steps,): (steps, n)."""
+        """Add the history before the first step: times (steps,), overpressures (steps, n)."""
         steps_s = np.diff(time_s, prepend=0.0)
         for time, step_s, overpressure in zip(time_s, steps_s, overpressure_pa, strict=True):
             if step_s > 0.0:
@@ -303,12 +306,12 @@ class Gauges(LoadTable):
 
     @property
     def time_s(self) -> NDArray[np.float64]:
-        """Ends of the steps so far (steps,)."""
+        """Ends of the steps, s (steps,)."""
         return np.array(self._times)
 
     @property
     def history_pa(self) -> NDArray[np.float64]:
-        """Overpressures at the ends of the steps (steps, n)."""
+        """Overpressures at the ends of the steps, Pa (steps, n)."""
         return np.array(self._history).reshape(len(self._times), len(self.cells))
 
 
@@ -339,12 +342,12 @@ class GroundMap:
 
     @property
     def peak_pa(self) -> NDArray[np.float64]:
-        """Largest overpressures, nan in solid cells (nx, ny)."""
+        """Largest overpressures, Pa, NaN in solid cells (nx, ny)."""
         return self._trimmed(self._peak)
 
     @property
     def impulse_pa_s(self) -> NDArray[np.float64]:
-        """Peak specific impulses, nan in solid cells (nx, ny)."""
+        """Peak specific impulses, Pa s, NaN in solid cells (nx, ny)."""
         return self._trimmed(self._impulse)
 
     def _trimmed(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -356,8 +359,8 @@ class Snapshot:
     """Overpressure in a plane at a time.
 
     Attributes:
-        time_s: End of the first step that reached the time asked for.
-        overpressure_pa: Along the two axes that span the plane, nan in solid cells.
+        time_s: End of the first step that reached the requested time.
+        overpressure_pa: Values along the two axes that span the plane, NaN in solid cells.
     """
 
     time_s: float
@@ -371,7 +374,7 @@ class Snapshots:
         grid: The grid.
         axis: Axis that the plane is normal to: 2 for a plan, 0 or 1 for a section.
         layer: The layer of cells along that axis.
-        times_s: When.
+        times_s: Times of the snapshots.
     """
 
     def __init__(self, grid: GasGrid, axis: int, layer: int, times_s: Sequence[float]) -> None:
@@ -385,7 +388,7 @@ class Snapshots:
         self._solid = np.take(grid.solid, layer, axis=axis)
 
     def record(self, solver: Gas, step_s: float) -> None:  # noqa: ARG002
-        """Take a picture if it is time; one picture of a step stands for all times in it."""
+        """Take a snapshot if one is due; a single one covers all due times in a step."""
         due = 0
         while due < len(self._times) and self._times[due] <= solver.time_s:
             due += 1

@@ -1,4 +1,4 @@
-"""What a run of gas dynamics can be told, and what its results are made of; without Numba."""
+"""Settings of a gas-dynamics run and terms of its results; does not import Numba."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,24 +14,24 @@ from blast_env.values import finite_number
 ROOF: Final = "roof"
 UNDERSIDE: Final = "underside"
 FACE_NAMES: Final = (*WALLS, ROOF, UNDERSIDE)
-"""The faces of a structure; those of `FaceTable.face` count through them."""
+"""The faces of a structure; `FaceTable.face` indexes them."""
 
 CHECKED_SCALED_DISTANCE: Final = (1.7, 8.6)
-"""Where the source was checked, m/kg^(1/3) (docs/engineers/gas.md)."""
+"""Scaled distances at which the source was checked, m/kg^(1/3) (docs/engineers/gas.md)."""
 CHECKED_CELLS: Final = 9.2
-"""Least cells per cube root of the charge's mass in kg with which it was checked, times 1 m."""
+"""Least number of cells per m/kg^(1/3) with which the source was checked."""
 
 UNIFORM: Final = "uniform"
 
 
 @dataclass(frozen=True)
 class _Growth:
-    """How cells grow (docs/engineers/gas.md).
+    """Growth of cells (docs/engineers/gas.md).
 
     Attributes:
-        smallest_m: Side of the cells that a blast begins with.
-        run: How many cells the front runs before they are doubled.
-        largest_m: Side of the last ones.
+        smallest_m: Side of the first cells.
+        run: Path of the front before cells are doubled, in cells.
+        largest_m: Side of the last cells.
     """
 
     smallest_m: float
@@ -43,7 +43,7 @@ _GROWING: Final[Mapping[str, _Growth]] = MappingProxyType(
     {"coarse": _Growth(0.5, 90.0, 1.0), "fine": _Growth(0.25, 130.0, 0.5)}
 )
 CELLS: Final = (UNIFORM, *_GROWING)
-"""What cells can be."""
+"""Values of `GasSettings.cells`."""
 
 Cells: TypeAlias = float | str
 """Side of cells in m, or "coarse" or "fine" for cells that grow."""
@@ -55,23 +55,24 @@ _LEAST_CELL_M: Final = 0.001
 
 @dataclass(frozen=True)
 class GasSettings:
-    """How finely and how long a blast is run as compressible gas.
+    """Resolution and duration of a gas-dynamics blast.
 
     Attributes:
         cell_m: Side of a cell; a module's side must be a whole number of them.
-        cells: "uniform", or how cells grow with the blast: until its front has run so many of them,
-            then they are twice as large. "coarse", for search on large sites, goes from 0.5 to 1 m,
-            "fine", for final statements there, from 0.25 to 0.5 m; from `cell_m` if that is less.
-        margin_m: How far the cells keep their size outside the site.
-        border_m: How far the open borders are beyond that, and above the air, at least; the cells
-            between grow outwards.
-        settled_s: When the products of 100 kg are no more than hot gas, see `Settling`; grows with
-            the cube root of the mass. Infinite where they never are.
-        threads: Threads that share a blast; they change nothing but the time.
-        until: Whose loads have to be known before a run ends: those of the walls that count of each
-            protected structure ("structures"), of every wall and roof on the site ("walls"), or of
-            the protected structures and every gauge ("gauges"); or how long it lasts in seconds,
-            also as text.
+        cells: "uniform", or the growth of cells with the blast: they are doubled each time the
+            front has run a certain number of them. "coarse", for search on large sites, grows from
+            0.5 to 1 m, "fine", for final results there, from 0.25 to 0.5 m; both begin at `cell_m`
+            if that is smaller.
+        margin_m: Width of the strip of cells of constant size outside the site.
+        border_m: Least distance of the open borders from that strip, and from the top of the air;
+            the cells between grow outwards.
+        settled_s: Time from which the products of 100 kg are treated as hot gas, see `Settling`;
+            grows with the cube root of the mass. Infinite for never.
+        threads: Number of threads that share a blast; it changes only the time.
+        until: The loads to be known before a run ends: those on the counted walls of each protected
+            structure ("structures"), on every wall and roof of the site ("walls"), or at the
+            protected structures and every gauge ("gauges"); or the duration in seconds, also as
+            text.
 
     Raises:
         BlastEnvError: If one of them is out of bounds.
@@ -107,10 +108,10 @@ class GasSettings:
 
     @classmethod
     def with_cells(cls, cells: Cells) -> Self:
-        """Return settings with cells of one side in m, or with those that "coarse" or "fine" name.
+        """Return settings with cells of one side in m, or with "coarse" or "fine" cells.
 
         Raises:
-            BlastEnvError: If it is neither.
+            BlastEnvError: If the name is unknown or the side is out of bounds.
         """
         return cls(cells=cells) if isinstance(cells, str) else cls(cell_m=cells)
 
@@ -128,7 +129,7 @@ class GasSettings:
 
     @property
     def doubled_m(self) -> tuple[float, ...]:
-        """How far the front has run in the open when cells become twice as large."""
+        """Path of the front in the open at each doubling of cells; empty for uniform cells."""
         if not self.is_growing:
             return ()
         growth = _GROWING[self.cells]
@@ -137,21 +138,21 @@ class GasSettings:
 
     @property
     def cell_words(self) -> str:
-        """Its cells, for people."""
+        """Description of the cells for display."""
         kind = f"{self.cells} cells from" if self.is_growing else "cells of"
         return f"{kind} {self.smallest_m:g} m"
 
     @property
     def until_s(self) -> float | None:
-        """How long a run lasts; `None` where it waits for loads."""
+        """Duration of a run; `None` if it waits for loads."""
         return None if isinstance(self.until, str) else self.until
 
 
 def _seconds(until: object) -> float:
-    """Return how long a run lasts.
+    """Return the duration of a run.
 
     Raises:
-        BlastEnvError: If it says neither that nor what a run waits for.
+        BlastEnvError: If it is not a number of seconds above 0.
     """
     try:
         seconds = float(until) if isinstance(until, str) else finite_number("until", until)

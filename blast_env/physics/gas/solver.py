@@ -1,4 +1,4 @@
-"""A run of the gas on a grid: state, time steps, still air left out, and what is recorded."""
+"""The solver of the gas on a grid: state, time steps, recorders; still air is skipped."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,17 +19,17 @@ AIR_PRESSURE_PA: Final = 101_325.0
 AIR_DENSITY_KG_M3: Final = 1.225
 
 COURANT: Final = 0.45
-"""Of half a step, in x and y by the mean of both; the scheme is stable to 0.5."""
+"""Courant number of half a step, by the mean speed along x and y; the scheme is stable to 0.5."""
 
 _FIRST_STEPS: Final = 10
 _FIRST_SHARE: Final = 0.2
-"""Share of the full step at the first one; grows evenly over the first steps."""
+"""Share of the full time step at the first one; increases linearly over the first steps."""
 
 _COOL_EVERY: Final = 4
-"""Steps from one look for gas that is too hot to the next."""
+"""Number of steps between two searches for gas that is too hot."""
 
 _CELLS_PER_CALL: Final = 1_000_000
-"""That compiled code moves on before Python hears of signals: a tenth of a second."""
+"""Cells updated in one call of compiled code, a tenth of a second, before Python checks signals."""
 
 _DTYPES: Final = {"single": np.float32, "double": np.float64}
 
@@ -40,7 +40,7 @@ def state_bytes(
     *,
     with_fuel: bool = False,
 ) -> int:
-    """Return how much memory the state of a grid takes; nothing else grows with all its cells."""
+    """Return the memory of the state and the codes of a grid, the only full arrays, in bytes."""
     nx, ny, nz = grid.array_shape
     per_cell = np.dtype(_DTYPES[precision]).itemsize * (6 if with_fuel else 5) + 1
     return nx * ny * nz * per_cell
@@ -52,7 +52,7 @@ class Totals(NamedTuple):
     Attributes:
         mass_kg: Mass.
         momentum_kg_m_s: Momentum along x, y and z.
-        energy_j: Energy, that of still air included.
+        energy_j: Energy, including that of still air.
         fuel_kg: Mass of the passive scalar.
     """
 
@@ -63,11 +63,11 @@ class Totals(NamedTuple):
 
 
 class Burning(NamedTuple):
-    """How the passive scalar burns: a constant share in time, wherever it is.
+    """Burning of the passive scalar at a constant relative rate, everywhere.
 
     Attributes:
-        time_s: Time in which all but 1/e of it has burnt.
-        heat_j_kg: Energy that its mass sets free.
+        time_s: Time constant, after which 1/e of the scalar remains.
+        heat_j_kg: Energy released per mass.
     """
 
     time_s: float
@@ -75,15 +75,16 @@ class Burning(NamedTuple):
 
 
 class Settling(NamedTuple):
-    """From when the products of a charge are nothing but hot gas.
+    """Treatment of the products of a charge as hot gas of limited temperature.
 
-    Euler's equations keep them as hot as they were, up to 20 times still air, while real ones mix
-    with air and cool. That does nothing to their pressure, hence little to any load, but the time
-    step follows from the sound in them.
+    Under the Euler equations they stay hot, up to 20 times as hot as still air, while real products
+    mix with air and cool. The temperature does not affect their pressure, and hence hardly any
+    load, but their speed of sound limits the time step.
 
     Attributes:
-        time_s: When the rest of the passive scalar burns at once, and hot gas begins to get mass.
-        hottest: Temperature that it has at most from then on, in units of still air's.
+        time_s: Time at which the rest of the passive scalar burns at once. From then on, mass is
+            added to gas above `hottest`.
+        hottest: Limit of the temperature, in units of still air's.
     """
 
     time_s: float
@@ -91,7 +92,7 @@ class Settling(NamedTuple):
 
 
 class Gas(Protocol):
-    """A gas on its way, as those see it who look at it; see `GasSolver` for what everything is."""
+    """The interface of a gas to recorders and runs; see `GasSolver` for its members."""
 
     grid: GasGrid
     faces: Faces
@@ -100,19 +101,19 @@ class Gas(Protocol):
 
     @property
     def time_s(self) -> float:
-        """Simulated time so far."""
+        """Simulated time."""
 
     @property
     def steps(self) -> int:
-        """Steps so far."""
+        """Number of steps."""
 
     @property
     def cell_updates(self) -> int:
-        """Cells moved on so far."""
+        """Number of cell updates."""
 
     @property
     def lifted(self) -> int:
-        """Cells that had to be lifted to the floor so far."""
+        """Number of cells raised to the floor."""
 
     @property
     def wall_pressure(self) -> Reals:
@@ -122,7 +123,7 @@ class Gas(Protocol):
         """Make a time step."""
 
     def advance(self, until_s: float) -> None:
-        """Go on until the simulated time is at least `until_s`."""
+        """Continue until the simulated time is at least `until_s`."""
 
     def wall_overpressure_pa(self) -> NDArray[np.float64]:
         """Return the mean overpressures on the faces during the last step (n,)."""
@@ -135,30 +136,34 @@ class Gas(Protocol):
 
 
 class Recorder(Protocol):
-    """Something that looks at the gas after every step."""
+    """The interface of objects that read the gas after every step."""
 
     def record(self, solver: Gas, step_s: float) -> None:
-        """Look at the gas after a step of `step_s`."""
+        """Read the gas after a step of `step_s`."""
 
 
 class GasSolver:
-    """A gas in a grid, at rest until `set_state` says otherwise.
+    """A gas in a grid, at rest until `set_state` is called.
 
-    Inside, the state is in units of still air: its density, its pressure, and the velocity that
-    follows from both. Outside, everything is in SI units.
+    Internally, the state is in units of still air: its density, its pressure, and the velocity
+    derived from both. The interface is in SI units.
 
     Attributes:
         grid: The grid.
-        faces: Faces on which the pressure is known after every step, see `wall_pressure`.
-        time_s: Simulated time so far.
-        steps: Steps so far.
-        cell_updates: Cells moved on so far, twice by each step: along x and y in its halves, along
-            z for both at once. Cells of air that was left out as still do not count.
-        state: The state in the solver's units (5 or 6, z, y, x), margin included.
+        faces: Faces on which the pressure is known after every step; see `wall_pressure`.
+        time_s: Simulated time.
+        steps: Number of steps.
+        cell_updates: Number of cell updates, two per cell and step: one in each half step along x
+            and y, while the pass along z adds none. Cells of still air, which are skipped, do not
+            count.
+        state: The state in the solver's units (5 or 6, z, y, x), including the margin.
         wall_pressure: Mean pressures on `faces` during the last step, in the solver's units (n,).
-            These are the fluxes of momentum, so that an impulse from them is exactly the momentum
-            that the wall took up.
+            They are the fluxes of momentum, so that their integral is exactly the momentum taken
+            up by the wall.
         box: Cells of `state` outside which the air is still: first and last + 1 along z, y and x.
+
+    Raises:
+        BlastEnvError: If an argument is out of bounds.
     """
 
     def __init__(
@@ -237,7 +242,7 @@ class GasSolver:
 
     @property
     def lifted(self) -> int:
-        """Cells that had to be lifted to the floor of density or pressure so far."""
+        """Number of cells raised to the floor of density or pressure."""
         return self._lifted
 
     def set_state(
@@ -249,9 +254,12 @@ class GasSolver:
         fuel_kg_m3: ArrayLike = 0.0,
         start: tuple[int, int, int] | None = None,
     ) -> None:
-        """Set the gas in the air cells, from arrays over x, y and z or values for all of them.
+        """Set the gas in the air cells, from arrays over x, y and z or scalars.
 
-        Arrays may be of a part of the grid, of which `start` is the first cell; the rest is still.
+        Arrays may cover a part of the grid with `start` as its first cell; the rest is still air.
+
+        Raises:
+            BlastEnvError: If a density or a pressure in the air is not above 0.
         """
         if start is not None:
             self.state[:] = self._still[:, None, None, None]
@@ -282,13 +290,13 @@ class GasSolver:
             state.tighten(self.state, self._still, self.box, max(self._code.shape))
 
     def advance(self, until_s: float, *, land: bool = False) -> None:
-        """Go on until the simulated time is at least `until_s`.
+        """Continue until the simulated time is at least `until_s`.
 
-        Without `land`, how a run is cut into calls does not change it.
+        Without `land`, the division of a run into calls does not change its results.
 
         Args:
             until_s: Simulated time.
-            land: Shorten the last step so that it ends at `until_s`.
+            land: Whether to shorten the last step so that it ends at `until_s`.
         """
         while self.time_s < until_s:
             self.step(until_s - self.time_s if land else np.inf)
@@ -321,11 +329,11 @@ class GasSolver:
             recorder.record(self, step_s)
 
     def on_double_cells(self, grid: GasGrid, faces: Faces) -> "GasSolver":
-        """Return a solver that goes on with this gas on cells of twice the side.
+        """Return a solver that continues with this gas on cells of twice the side.
 
         Args:
-            grid: What `with_double_cells` makes of this one's.
-            faces: Faces on it.
+            grid: The result of `with_double_cells` for the grid of this solver.
+            faces: Faces on that grid.
         """
         other = GasSolver(
             grid,
@@ -372,7 +380,7 @@ class GasSolver:
         return self.pressure_pa * (GAMMA - 1.0) * inner
 
     def fuel(self) -> NDArray[np.float64]:
-        """Return the density of the passive scalar, kg/m^3 (nx, ny, nz); 0 once it has settled."""
+        """Return the density of the passive scalar, kg/m^3 (nx, ny, nz); 0 after settling."""
         if len(self.state) <= state.FUEL:
             return np.zeros(self.grid.shape)
         return self.density_kg_m3 * self._get(state.FUEL)
@@ -392,7 +400,7 @@ class GasSolver:
         return self.pressure_pa * self._excess(np.take(inner, layer, axis=3 - axis)).T
 
     def largest_overpressure_pa(self) -> float:
-        """Return the largest distance from the pressure of still air, anywhere in the gas."""
+        """Return the largest absolute overpressure in the gas."""
         return self.pressure_pa * float(state.largest_excess(self.state, self.box))
 
     def totals(self) -> Totals:
@@ -465,13 +473,13 @@ class GasSolver:
             heat = real(self._burning.heat_j_kg / self.velocity_m_s**2)
             state.burn(self.state, self.box, real(1.0), heat)
             self._burning = None
-            # Without a scalar the gas is a sixth less to move.
+            # Without a scalar the state is smaller by a sixth.
             self.state, self._still = self.state[: state.FUEL], self._still[: state.FUEL]
         if self.steps % _COOL_EVERY == 0:
             state.cool(self.state, self.box, real(settling.hottest))
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
-        """Give each thread its part of the layers from first to end, then leave still air out."""
+        """Split layers from first to end among the threads, then remove still air from the box."""
         count, broken_off = self._threads, Event()
         bounds = [first + (end - first) * k // count for k in range(count + 1)]
         layers = max(_CELLS_PER_CALL * max(end - first, 1) // max(self._cells_in_box(), 1), 1)
@@ -487,7 +495,7 @@ class GasSolver:
             in_parts(0)
             for other in others:
                 other.result()
-        finally:  # of Ctrl-C too: the others need not go on
+        finally:  # also after Ctrl-C: stop the other threads
             broken_off.set()
         if self._skip:
             state.tighten(self.state, self._still, self.box, 2)
@@ -497,7 +505,7 @@ class GasSolver:
         return int((z1 - z0) * (y1 - y0) * (x1 - x0))
 
     def _widen(self, sides: tuple[int, ...]) -> None:
-        """Let the box grow by as many cells as a pass can carry something."""
+        """Extend sides of the box by the range of a pass, 2 cells."""
         if self._skip and self.box[1] > self.box[0]:
             for side in sides:
                 low = side % 2 == 0
@@ -511,7 +519,7 @@ class GasSolver:
         return box
 
     def _excess(self, values: Reals) -> NDArray[np.float64]:
-        """Return the pressure above that of still air, exactly 0 in still air, from the state."""
+        """Return the overpressure in units of still air's pressure, exactly 0 in still air."""
         real = self.state.dtype.type
         motion = values[1] * values[1] + values[2] * values[2] + values[3] * values[3]
         inner = values[ENERGY] - real(0.5) * motion / values[state.DENSITY]
@@ -524,7 +532,7 @@ class GasSolver:
         part: tuple[slice, ...],
         solid: NDArray[np.bool_],
     ) -> None:
-        """Set a component in the air cells of a part; solid cells keep still air."""
+        """Set a component in the air cells of a part; solid cells hold still air."""
         inner = self.state[(component, *self.grid.inner)].T[part]
         inner[:] = np.where(solid, float(self._still[component]), values)
 

@@ -1,12 +1,12 @@
 """The charge of the gas: TNT from its detonation products to a state of the grid.
 
 A charge burns and expands with spherical symmetry (`SphericalBlast`) until its front reaches the
-first obstacle, or where one could stand. Then density, momentum, energy and unburnt fuel are laid
-onto the grid, and the solver goes on, fuel burning with the same time constant.
+first obstacle, or the place of a possible one. Then density, momentum, energy and unburnt fuel are
+mapped onto the grid, and the solver continues, with fuel burning at the same time constant.
 
-One run, for 1 kg in free air, serves all charges: lengths and times grow with the cube root of the
-mass (Hopkinson-Cranz), the time constant of afterburning too. `python -m studies.gas source` shows
-what speaks for the numbers of `TNT`.
+One run, for 1 kg in free air, serves all charges: lengths and times, including the time constant of
+afterburning, scale with the cube root of the mass (Hopkinson-Cranz). `python -m studies.gas source`
+gives the evidence for the values of `TNT`.
 """
 
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ from blast_env.physics.gas.spherical import PRODUCTS, Floats, SphericalBlast
 from blast_env.physics.gas.state import GAMMA
 
 LEAST_RADIUS_CELLS: Final = 2
-"""Cells that the front must have run before it is laid onto a grid."""
+"""Least radius of the front, in cells, at which it is mapped onto a grid."""
 
 _RADIUS_RATIO: Final = 1.03
-"""Of the fronts of two stored profiles that follow each other."""
+"""Ratio of the radii of the fronts of consecutive stored profiles."""
 
 _SAMPLES_PER_RADIUS: Final = 32
 _LEAST_SAMPLES: Final = 4
@@ -38,16 +38,16 @@ _MOST_SAMPLES: Final = 16
 
 @dataclass(frozen=True)
 class Explosive:
-    """What a kilogram of an explosive gives to the air.
+    """An explosive as a source of energy in air.
 
     Attributes:
         density_kg_m3: Density of the charge.
-        prompt_j_kg: Energy that the products have when they begin to expand.
-        later_j_kg: Energy that they release by burning with air.
-        later_s_kg: Time constant of that, of 1 kg in free air; grows with the cube root of the
-            mass.
-        ground_factor: Kilograms in free air that make the same blast as 1 kg on the ground. 2
-            would be a mirror; a real ground takes up some of the energy, in a crater and in waves.
+        prompt_j_kg: Energy of the products at the beginning of their expansion.
+        later_j_kg: Energy released by their burning with air.
+        later_s_kg: Time constant of the burning of 1 kg in free air; grows with the cube root of
+            the mass.
+        ground_factor: Mass in free air, kg, with the same blast as 1 kg on the ground. A mirror
+            has 2; real ground absorbs some of the energy in a crater and in waves.
     """
 
     density_kg_m3: float
@@ -61,7 +61,7 @@ class Explosive:
         return cbrt(3.0 * charge_kg / (4.0 * pi * self.density_kg_m3))
 
     def in_free_air(self, charge_kg: float, gauges_m: ArrayLike = ()) -> SphericalBlast:
-        """Return the blast of a sphere of it, about to expand, with gauges at radii."""
+        """Return the blast of a sphere of the explosive before its expansion, with gauges."""
         return SphericalBlast(
             charge_kg,
             self.density_kg_m3,
@@ -79,19 +79,19 @@ TNT: Final = Explosive(
     later_s_kg=1.0e-3,
     ground_factor=1.8,
 )
-"""The one source of this engine: fitted, within what is known of TNT.
+"""The source of this engine, fitted within the known range of the properties of TNT.
 
-What the products do at once is below the heat of detonation (4.2 to 4.5 MJ/kg), because they stay
-hot; a part of the heat of burning with air (about 10 MJ/kg) comes later. 1.8 is the ratio between
-Kingery and Bulmash's own curves for charges on the ground and in free air, within 0.5 % in both
+The prompt energy is below the heat of detonation (4.2 to 4.5 MJ/kg), because the products stay hot;
+a part of the heat of burning with air (about 10 MJ/kg) is released later. 1.8 is the ratio between
+Kingery and Bulmash's curves for charges on the ground and in free air, within 0.5 % in both
 impulses.
 
-Sources that meet the reflected impulse have too little incident impulse close to the charge, and
-the other way round (`python -m studies.gas source`). This one keeps the reflected impulse. Over the
-curves it has for 20, 100 and 1000 kg with cells of 0.5 m, 0.25 m for 20 kg
-(`python -m studies.gas kingery-bulmash`): reflected impulse 0.94 to 1.06 at Z = 1.7 to 8.7,
-incident impulse 0.89 to 0.94 at 2.7 to 8.6, but 0.88 at 2.1 and 0.84 at 1.7; arrival 0.96 to 1.03.
-Peaks are 0.39 to 0.83: they need finer cells.
+Sources with the right reflected impulse have too little incident impulse close to the charge;
+those with the right incident impulse have too much reflected impulse (`python -m studies.gas
+source`). This one matches the reflected impulse. Its ratios to the curves for 20, 100 and 1000 kg
+with cells of 0.5 m, 0.25 m for 20 kg, (`python -m studies.gas kingery-bulmash`) are: reflected
+impulse 0.94 to 1.06 at Z = 1.7 to 8.7 m/kg^(1/3), incident impulse 0.89 to 0.94 at 2.7 to 8.6, but
+0.88 at 2.1 and 0.84 at 1.7; arrival 0.96 to 1.03. Peaks are 0.39 to 0.83: they need finer cells.
 """
 
 
@@ -99,14 +99,16 @@ Peaks are 0.39 to 0.83: they need finer cells.
 class GasCharge:
     """A charge at a place.
 
-    A charge whose centre is not higher than its own radius lies on the ground: it is then taken as
-    a half sphere with its centre in the ground's surface, and part of its energy goes into the
-    ground.
+    A charge whose centre is not higher than its radius lies on the ground: it is treated as a half
+    sphere with its centre in the ground's surface, and part of its energy goes into the ground.
 
     Attributes:
         mass_kg: Mass of the charge.
         position_m: Its centre: x, y, and height above the ground.
-        explosive: What it is made of.
+        explosive: Its explosive.
+
+    Raises:
+        BlastEnvError: If the mass is not above 0, or the position is not finite or below ground.
     """
 
     mass_kg: float
@@ -127,27 +129,27 @@ class GasCharge:
 
     @property
     def on_ground(self) -> bool:
-        """Whether it lies on the ground."""
+        """Whether the charge lies on the ground."""
         return self.position_m[2] <= self.explosive.radius_m(self.mass_kg)
 
     @property
     def free_air_kg(self) -> float:
-        """Mass that makes the same blast in free air."""
+        """Mass with the same blast in free air."""
         return self.mass_kg * (self.explosive.ground_factor if self.on_ground else 1.0)
 
     @property
     def burning(self) -> Burning:
-        """How its products burn in the solver."""
+        """The burning of its products in the solver."""
         time_s = self.explosive.later_s_kg * cbrt(self.free_air_kg)
         return Burning(time_s, self.explosive.later_j_kg)
 
     @property
     def least_radius_m(self) -> float:
-        """The least radius of the front."""
+        """The least radius of the front, that of a sphere of `free_air_kg`."""
         return self.explosive.radius_m(self.free_air_kg)
 
     def profile(self, radius_m: float) -> "RadialProfile":
-        """Return the blast when its front is at a radius, or up to 3 % before it.
+        """Return the blast with its front at a radius, or up to 3 % before it.
 
         Raises:
             BlastEnvError: If the radius is within the charge.
@@ -167,7 +169,7 @@ class RadialProfile:
 
     Attributes:
         time_s: Time since detonation.
-        front_m: Radius of the front; beyond is still air.
+        front_m: Radius of the front, beyond which the air is still.
         shell_m: Thickness of a shell.
         state: Density, radial momentum, energy and unburnt fuel in each shell, per volume (4, n).
     """
@@ -178,14 +180,14 @@ class RadialProfile:
     state: Floats
 
     def scaled(self, mass: float) -> "RadialProfile":
-        """Return the blast of a charge so many times as heavy, when it looks the same."""
+        """Return the same profile for a charge of `mass` times the mass, at its scaled time."""
         length = cbrt(mass)
         return RadialProfile(
             self.time_s * length, self.front_m * length, self.shell_m * length, self.state
         )
 
     def totals(self) -> Floats:
-        """Return mass, energy and fuel, less the still air's (3,), kg, J and kg."""
+        """Return mass, energy and fuel in excess of still air, kg, J and kg (3,)."""
         edges = self.shell_m * np.arange(self.state.shape[1] + 1.0)
         volumes = 4.0 / 3.0 * pi * np.diff(edges**3)
         still = np.array([AIR_DENSITY_KG_M3, AIR_PRESSURE_PA / (GAMMA - 1.0), 0.0])
@@ -193,16 +195,17 @@ class RadialProfile:
 
 
 def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = None) -> None:
-    """Set off a charge in a gas at rest: state and time of the solver.
+    """Set the state and the time of a solver, with gas at rest, to those of an expanded charge.
 
     Args:
-        solver: Made `with_fuel` and with `burning=charge.burning`.
+        solver: Created with `with_fuel=True` and `burning=charge.burning`.
         charge: The charge.
-        radius_m: Where the front is then, `largest_radius_m` by default. Loads depend on it (by
-            some per cent), so take one for all runs that are to be compared.
+        radius_m: Radius of the front, `largest_radius_m` by default. Loads depend on it (by some
+            per cent), so use the same for all runs in a comparison.
 
     Raises:
-        BlastEnvError: If the charge is outside the grid or in a solid cell.
+        BlastEnvError: If the radius is within the charge, or, without one, the charge is outside
+            the grid or in a solid cell.
     """
     grid = solver.grid
     if radius_m is None:
@@ -224,18 +227,17 @@ def set_charge(solver: GasSolver, charge: GasCharge, radius_m: float | None = No
 def largest_radius_m(
     grid: GasGrid, charge: GasCharge, kept_clear: NDArray[np.bool_] | None = None
 ) -> float:
-    """Return how far the front of a charge can run before it meets a solid cell or the ground.
+    """Return the radius of the front at the first solid cell or the ground, m.
 
-    Or leaves the grid, where that has a skirt.
-
-    At least `least_clearance_m`. Below that the ground does not count: what has passed through it
-    is laid onto the grid as its mirror image.
+    In a grid with a skirt, it is also at most the distance to the nearest open face. It is at least
+    `least_clearance_m`, even if the ground is nearer: the part of the blast below the ground is
+    mapped onto the grid as its mirror image. It is at most the distance to the farthest corner.
 
     Args:
         grid: The grid.
         charge: The charge.
-        kept_clear: Further cells that count as solid here (nx, ny, nz): where something could
-            stand. The charge may be among them.
+        kept_clear: Further cells to treat as solid (nx, ny, nz), the possible places of a barrier.
+            The charge may be among them.
 
     Raises:
         BlastEnvError: If the charge is outside the grid or in a solid cell.
@@ -252,12 +254,12 @@ def largest_radius_m(
 
 
 def clearance_m(grid: GasGrid, charge: GasCharge) -> float:
-    """Return the distance from a charge to the nearest solid cell, infinite if there is none.
+    """Return the distance from a charge to the nearest solid cell, m, infinite if there is none.
 
     Raises:
         BlastEnvError: If the charge is outside the grid or in a solid cell.
     """
-    grid.cell_at(charge.position_m)  # says what is wrong outside the grid
+    grid.cell_at(charge.position_m)  # raises the error outside the grid
     clear = _distance_to(grid.solid, grid, _centre(charge))
     if clear <= 0.0:
         raise BlastEnvError(
@@ -267,10 +269,10 @@ def clearance_m(grid: GasGrid, charge: GasCharge) -> float:
 
 
 def least_clearance_m(grid: GasGrid, charge: GasCharge) -> float:
-    """Return the distance to solid cells that a charge should have: 2 cells, and its own radius.
+    """Return the least distance of a charge from solid cells: 2 cells or its radius, m.
 
-    A charge that is closer is laid onto the grid all the same, when its front has run so far; what
-    would then be in solid cells is lost, so that such a result is to be distrusted.
+    A closer charge is nevertheless mapped onto the grid with its front at that distance. The part
+    in solid cells is lost, so that such a result is unreliable.
     """
     return max(charge.least_radius_m, LEAST_RADIUS_CELLS * grid.cell_m)
 
@@ -278,16 +280,16 @@ def least_clearance_m(grid: GasGrid, charge: GasCharge) -> float:
 def lay(
     profile: RadialProfile, grid: GasGrid, charge: GasCharge
 ) -> tuple[tuple[int, int, int], tuple[Floats, Floats, Floats, Floats]]:
-    """Return a blast as means over the cells of a grid that it has reached.
+    """Map a blast onto the cells of a grid that it has reached, as means over each cell.
 
-    Each mean is over points spread evenly in the cell, at least 4 along each edge and 16 where the
-    front has run two cells. Mirror images of a scene give the same numbers to the last bit if
-    centre and cells are exact in binary.
+    Each mean is over evenly spaced points in the cell, at least 4 along each edge, and 16 for a
+    front at two cells. Mirror images of a scene give the same values to the last bit if centre and
+    cells are exact in binary.
 
     Returns:
         The first of those cells; density, momentum along x, y and z, energy and unburnt fuel, per
-        volume: (nx, ny, nz), (3, nx, ny, nz), (nx, ny, nz) and (nx, ny, nz). Still air in solid
-        cells.
+        volume: (nx, ny, nz), (3, nx, ny, nz), (nx, ny, nz) and (nx, ny, nz). Solid cells hold
+        still air.
     """
     wanted = _SAMPLES_PER_RADIUS * grid.cell_m / profile.front_m
     samples = 2 ** ceil(log2(min(max(wanted, _LEAST_SAMPLES), _MOST_SAMPLES)))
@@ -322,7 +324,7 @@ def _centre(charge: GasCharge) -> tuple[float, float, float]:
 def _distance_to(
     cells: NDArray[np.bool_], grid: GasGrid, point: tuple[float, float, float]
 ) -> float:
-    """Return the distance to the nearest of some cells, infinite if there is none."""
+    """Return the distance to the nearest of chosen cells, infinite if there is none."""
     chosen = np.argwhere(cells)
     if len(chosen) == 0:
         return inf
@@ -332,7 +334,7 @@ def _distance_to(
 
 
 def _nearest_face(grid: GasGrid, point: tuple[float, float, float]) -> float:
-    """Return the distance to the nearest open face."""
+    """Return the distance to the nearest open face with a skirt."""
     low = np.array(grid.origin_m)
     ways = np.stack((point - low, low + grid.cell_m * np.array(grid.shape) - point), axis=1)
     return float(np.where(np.array(grid.skirts) > 0, ways, inf).min())
@@ -345,7 +347,7 @@ def _farthest_corner(grid: GasGrid, point: tuple[float, float, float]) -> float:
 
 
 class _Profiles:
-    """Profiles of 1 kg in free air, at fronts that follow each other in equal ratios."""
+    """Profiles of 1 kg in free air, with radii of the front in a geometric sequence."""
 
     def __init__(self, explosive: Explosive) -> None:
         self._later_s = explosive.later_s_kg
@@ -354,12 +356,12 @@ class _Profiles:
         self._lock = Lock()
 
     def before(self, radius_m: float) -> RadialProfile:
-        """Return the last profile whose front is at most at a radius."""
+        """Return the last profile with its front at or before a radius."""
         first = self._profiles[0].front_m
         wanted = int(log(radius_m / first) / log(_RADIUS_RATIO) + 1e-9) if radius_m > first else 0
         with self._lock:
             while len(self._profiles) <= wanted:
-                # The front stands in the shell that it has reached, hence a shell less.
+                # `front_m` is the outer radius of the shell that the front has reached, hence -1.
                 radius = first * _RADIUS_RATIO ** len(self._profiles)
                 self._blast.advance(until_front_m=radius - self._blast.shell_m)
                 self._profiles.append(self._now())
@@ -390,8 +392,8 @@ def _lay(
 ) -> None:
     """Add the means of a blast over the air cells; lengths are in cells.
 
-    Points on the two sides of the centre are summed apart, outwards from it, and then put
-    together, so that a mirrored scene makes the same sums.
+    Points on either side of the centre are summed separately, outwards from it, before the sums are
+    added, so that a mirrored scene has the same sums.
     """
     halves = np.empty((8, 6))
     for a, b, c in np.ndindex(solid.shape):

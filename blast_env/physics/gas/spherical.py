@@ -1,8 +1,9 @@
-"""A blast with spherical symmetry: the Euler equations along a radius, on a grid that grows.
+"""A blast with spherical symmetry: the Euler equations along a radius, on a growing grid.
 
-MUSCL-Hancock with HLLC in shells of equal thickness. Whenever the front comes near the last shell,
-shells are merged in pairs and as much still air is added outside, so that the front always has
-between half of all shells and all of them behind it, from the charge's radius to any distance.
+The scheme is MUSCL-Hancock with HLLC in shells of equal thickness. Whenever the front approaches
+the last shell, shells are merged in pairs, and the same number of shells of still air is added
+outside. The front thus always has between half of all shells and all of them behind it, at any
+distance from the charge.
 """
 
 from math import inf, pi, sqrt
@@ -19,10 +20,10 @@ from blast_env.physics.gas.state import GAMMA
 Floats = NDArray[np.float64]
 
 SHELLS: Final = 800
-"""Shells of the grid, an even number."""
+"""Number of shells of the grid, even."""
 
 CHARGE_SHELLS: Final = 40
-"""Shells within the charge at the beginning."""
+"""Number of shells within the charge at the beginning."""
 
 COURANT: Final = 0.5
 
@@ -30,13 +31,13 @@ DENSITY, MOMENTUM, ENERGY, PRODUCTS = 0, 1, 2, 3
 """Components of the state, each per volume."""
 
 _FRONT_SHARE: Final = 1e-3
-"""The front is where pressure first differs from that of still air by this share of it."""
+"""Least relative deviation from still air's pressure at the front."""
 
 _STILL_SHARE: Final = 1e-12
-"""Beyond the last shell whose pressure differs by this share from still air's, none is moved."""
+"""Relative deviation from still air's pressure up to which outer shells are not updated."""
 
 _SPARE_SHELLS: Final = 4
-"""Shells of still air that there must be outside."""
+"""Least number of shells of still air outside."""
 
 _FIRST_STEPS: Final = 20
 _LEAST_SHARE: Final = 0.05
@@ -47,24 +48,27 @@ _BATCH: Final = 4096
 class SphericalBlast:
     """A sphere of compressed gas that expands into still air.
 
-    The gas of the sphere, "products", may release more energy while it expands: of a kilogram,
-    `later_j_kg * (1 - exp(-t / later_s))` by the time t.
+    The gas of the sphere, the "products", may release more energy during its expansion: per
+    kilogram, `later_j_kg * (1 - exp(-t / later_s))` by the time t.
 
     Attributes:
         shell_m: Thickness of a shell.
         state: Density, radial momentum, energy and products in each shell, per volume (4, n).
-        time_s: Time since the sphere was let go.
-        front_m: Outer radius of the outermost shell that is not still.
-        steps: Time steps so far.
+        time_s: Time since the release of the sphere.
+        front_m: Outer radius of the shell that the front has reached.
+        steps: Number of time steps.
 
     Args:
         mass_kg: Mass of the sphere.
         density_kg_m3: Its density.
-        prompt_j_kg: Energy of a kilogram beyond that of the air in its place.
-        later_j_kg: Energy that a kilogram releases later.
+        prompt_j_kg: Energy per kilogram in excess of that of the air in its place.
+        later_j_kg: Energy per kilogram released later.
         later_s: Time constant of that release.
-        gauges_m: Radii where the pressure is recorded, outside the sphere.
-        shells: Shells of the grid, an even number.
+        gauges_m: Radii at which the pressure is recorded, outside the sphere.
+        shells: Number of shells of the grid, even.
+
+    Raises:
+        BlastEnvError: If an argument is out of bounds, or a gauge is inside the sphere.
     """
 
     def __init__(
@@ -122,15 +126,19 @@ class SphericalBlast:
 
     @property
     def history(self) -> Floats:
-        """Time and overpressure at each gauge, s and Pa, before every step (steps, 1 + gauges)."""
+        """Time, s, and overpressure at each gauge, Pa, before every step (steps, 1 + gauges)."""
         if not self._history:
             return np.zeros((0, 1 + len(self._gauges_m)))
         return np.concatenate(self._history)
 
     def advance(self, *, until_s: float = inf, until_front_m: float = inf) -> None:
-        """Go on until a time or a radius of the front is reached, whichever comes first.
+        """Continue until a time or a radius of the front is reached, whichever is first.
 
-        It ends with the first step at or beyond it: how a run is cut into calls does not change it.
+        It ends with the first step at or beyond it, so that the division of a run into calls does
+        not change its results.
+
+        Raises:
+            BlastEnvError: If neither is given.
         """
         if until_s == inf and until_front_m == inf:
             raise BlastEnvError("a blast without a bound in time or space never ends")
@@ -160,7 +168,7 @@ class SphericalBlast:
         return np.asarray((GAMMA - 1.0) * (self.state[ENERGY] - motion))
 
     def _merge_shells(self) -> None:
-        """Make one shell of every two, and add still air outside."""
+        """Merge shells in pairs, and add still air outside."""
         shells = self.state.shape[1]
         volumes = self.volumes_m3
         merged = (self.state * volumes).reshape(4, shells // 2, 2).sum(axis=2)
@@ -184,11 +192,11 @@ def _march(
     gauges_m: Floats,
     record: Floats,
 ) -> tuple[int, float, int, int]:
-    """Make steps until a bound is reached, the grid or the record is full.
+    """Make steps until a bound is reached, or the grid or the record is full.
 
     Returns:
-        The number of steps, the time, the shell where the front is, and the outermost one that is
-        not quite still.
+        The number of steps, the time, the shell of the front, and the outermost shell that is not
+        still.
     """
     shells = state.shape[1]
     edges = np.arange(shells + 1) * shell_m
@@ -199,7 +207,7 @@ def _march(
     inner = np.zeros((4, shells))
     outer = np.zeros((4, shells))
     flux = np.zeros((4, shells + 1))
-    last = shells - 1 - _SPARE_SHELLS  # outermost shell that is not quite still
+    last = shells - 1 - _SPARE_SHELLS  # outermost shell that is not still
     steps = 0
     while True:
         end = min(shells, last + 1 + _SPARE_SHELLS)  # all shells in the first round
@@ -227,7 +235,7 @@ def _march(
             ratio = step_s / volumes[i]
             for k in range(4):
                 state[k, i] -= ratio * (areas[i + 1] * flux[k, i + 1] - areas[i] * flux[k, i])
-            # What the pressure on the sides of a cone pushes outwards.
+            # Outward push of the pressure on the sides of the conical element.
             sides = 0.5 * (inner[2, i] + outer[2, i])
             state[1, i] += ratio * sides * (areas[i + 1] - areas[i])
             state[2, i] += released * state[3, i]
@@ -237,7 +245,7 @@ def _march(
 
 @njit(error_model="numpy")
 def _outermost(gas: Floats, end: int, share: float) -> int:
-    """Return the outermost shell whose pressure differs from still air's by a share of it."""
+    """Return the outermost shell whose pressure differs from still air's by more than a share."""
     for i in range(end - 1, -1, -1):
         if abs(gas[2, i] - AIR_PRESSURE_PA) > share * AIR_PRESSURE_PA:
             return i
@@ -246,7 +254,7 @@ def _outermost(gas: Floats, end: int, share: float) -> int:
 
 @njit(error_model="numpy")
 def _primitive(state: Floats, gas: Floats, end: int) -> float:
-    """Set density, velocity, pressure and share of products; return the fastest signal."""
+    """Set density, velocity, pressure and share of products; return the largest signal speed."""
     fastest = 0.0
     for i in range(end):
         density = state[0, i]
@@ -304,7 +312,7 @@ def _reconstruct(
 
 @njit(error_model="numpy")
 def _fluxes(inner: Floats, outer: Floats, flux: Floats, end: int) -> None:
-    """Set the fluxes through the outer faces of the shells (HLLC); none through the centre."""
+    """Set the fluxes through the outer faces of the shells by HLLC; that at the centre stays 0."""
     for i in range(1, end + 1):
         left = outer[:, i - 1]
         right = inner[:, i] if i < end else left

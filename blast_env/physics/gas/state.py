@@ -1,4 +1,4 @@
-"""The state of the gas as compiled code has it, and what is done to it cell by cell.
+"""The state of the gas for compiled code, and its operations cell by cell.
 
 The state is an array (5 or 6, z, y, x) in units of still air, with a margin of cells around it.
 """
@@ -13,24 +13,24 @@ from numpy.typing import NDArray
 Reals = NDArray[Any]
 
 GAMMA: Final = 1.4
-"""Ratio of the heats, of air and of the products alike."""
+"""Ratio of specific heats, for both air and products."""
 
 MARGIN: Final = 2
-"""Layers of cells around the grid that belong to the arrays, but not to the gas."""
+"""Layers of cells around the grid that are in the arrays, but not in the gas."""
 
 DENSITY, X_MOMENTUM, Y_MOMENTUM, Z_MOMENTUM, ENERGY, FUEL = 0, 1, 2, 3, 4, 5
 """Components of the state, each per volume."""
 
 AIR, MIRROR, OPEN = 0, -1, 1
-"""Codes of cells: gas, solid (normal velocity changes its sign), beyond an open face."""
+"""Codes of cells: gas, solid (the normal velocity changes sign), beyond an open face."""
 
 FUSED: Final = {"contract"}
-"""Products and sums in one instruction: a quarter faster, and nothing is reordered."""
+"""Fused multiply-add: a quarter faster, without reordering of operations."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
-    """Turn a share of the fuel in every cell of a box into energy, so much per mass."""
+    """Convert a share of the fuel in every cell of a box to energy, `heat` per mass."""
     for z in range(box[0], box[1]):
         for y in range(box[2], box[3]):
             for x in range(box[4], box[5]):
@@ -41,9 +41,9 @@ def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def cool(state: Reals, box: NDArray[np.int64], hottest: Any) -> None:
-    """Add mass to gas that is hotter than so many times still air, until it is not.
+    """Add mass to gas hotter than `hottest` times still air, down to that temperature.
 
-    Energy and momentum stay.
+    Energy and momentum are unchanged.
     """
     real = state.dtype.type
     half, one, zero, gamma_1 = real(0.5), real(1.0), real(0.0), real(GAMMA - 1.0)
@@ -62,7 +62,10 @@ def cool(state: Reals, box: NDArray[np.int64], hottest: Any) -> None:
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def fastest_signal(state: Reals) -> float:
-    """Return what the time step follows from: sound, and motion, of x and y the mean."""
+    """Return the largest signal speed, which limits the time step.
+
+    It is the speed of sound plus the speed along z, or the mean of those along x and y.
+    """
     fastest = 0.0
     for z in range(state.shape[1]):
         for y in range(state.shape[2]):
@@ -79,7 +82,7 @@ def fastest_signal(state: Reals) -> float:
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
-    """Return the largest distance of the pressure from that of still air in a box."""
+    """Return the largest absolute overpressure in a box, in units of still air's pressure."""
     largest = 0.0
     for z in range(box[0], box[1]):
         for y in range(box[2], box[3]):
@@ -94,7 +97,7 @@ def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
-    """Take layers of still air off the six sides of a box, at most so many from each."""
+    """Remove layers of still air from the six sides of a box, at most `most` from each."""
     for side in range(6):
         for _ in range(most):
             axis = side // 2
@@ -134,15 +137,14 @@ def merge(
     y_start: NDArray[np.int64],
     x_start: NDArray[np.int64],
 ) -> None:
-    """Set cells of air to the means over the air of the smaller ones that they hold.
+    """Set larger cells of air to the means over the air in the smaller cells within them.
 
     Args:
         fine: State of the smaller cells.
-        fine_code: Their codes.
-        coarse: State of the larger ones, changed; those that hold no air stay as they are.
-        coarse_code: Their codes.
-        z_start: Which layer of the smaller cells each one of the larger ones begins with, one more
-            than there are (nz + 1,).
+        fine_code: Codes of the smaller cells.
+        coarse: State of the larger cells, updated in place; cells without air are unchanged.
+        coarse_code: Codes of the larger cells.
+        z_start: First layer of smaller cells in each layer of larger cells, and the end (nz + 1,).
         y_start: The same along y.
         x_start: The same along x.
     """
