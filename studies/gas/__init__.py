@@ -1,1 +1,1 @@
-"""What was checked about the gas engine: docs/engineers/gas.md has the results."""
+"""Checks of the gas engine, with results in docs/engineers/gas.md."""

@@ -1,4 +1,4 @@
-"""The tables and figures of docs/engineers/gas.md: what was checked about the gas engine."""
+"""Tables and figures of docs/engineers/gas.md on the checks of the gas engine."""
 
 from collections.abc import Callable
 from functools import partial
@@ -46,7 +46,7 @@ from studies.gas.refinement import refined_blast
 from studies.gas.sources import source_ratios, trade_off_figure
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
-"""With which cells a charge is held against Kingery and Bulmash, by its mass in kg."""
+"""Side of the cells in comparisons with Kingery and Bulmash, by the mass of the charge in kg."""
 PEAK_CHARGE_KG: Final = 100.0
 PEAK_DISTANCE_M: Final = 12.5
 YARD: Final = "yard"
@@ -57,7 +57,7 @@ app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=F
 
 
 def _numbers(text: str) -> list[float]:
-    """Return the numbers of a list separated by commas; none for an empty one."""
+    """Parse a list of numbers separated by commas; an empty text has none."""
     try:
         return [float(part) for part in text.split(",") if part]
     except ValueError as error:
@@ -66,9 +66,9 @@ def _numbers(text: str) -> list[float]:
 
 @app.command()
 def source(cell: Cell = 0.5, out: Path = Path("out/gas_source.png")) -> None:
-    """Print and draw what the charge could be: sources against Kingery and Bulmash.
+    """Print and draw possible sources for the charge against Kingery and Bulmash.
 
-    100 kg on the ground. No source meets the incident and the reflected impulse at once.
+    The charge is 100 kg on the ground. No source matches both incident and reflected impulses.
     """
     with user_errors():
         make_folder(out.parent)
@@ -99,9 +99,9 @@ def kingery_bulmash(
         str, typer.Option(help="m, for 100 kg at 12.5 m; empty: leave that table out.")
     ] = "1,0.5,0.25",
 ) -> None:
-    """Hold the waves of charges on the ground against Kingery and Bulmash.
+    """Compare the waves of charges on the ground with Kingery and Bulmash.
 
-    Impulses of the first positive phase, arrival and peak over the curves; then the reflected peak
+    Peak specific impulses, arrivals and peaks over the curves; then the reflected impulse and peak
     by the size of the cells.
     """
     headers = ("charge (kg)", "cell (m)", "", "Z (m/kg^(1/3))", "impulse", "arrival", "peak")
@@ -137,9 +137,9 @@ def air_height(
     all_layouts: Annotated[bool, typer.Option(help="Also the wall near the charge.")] = False,
     cell: Cell = 0.5,
 ) -> None:
-    """Print how loads depend on how high the air is, above which cells grow.
+    """Print how loads depend on the height of the air, above which cells grow.
 
-    With real heights. The others are compared with the last of the heights.
+    Structures have real heights. Loads are compared with those at the last height of the air.
     """
     rows, wanted = [], _numbers(heights_m)
     with user_errors():
@@ -162,9 +162,9 @@ def handover(
     until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.09,
     cell: Cell = 0.5,
 ) -> None:
-    """Print how loads depend on where the front is when the grid takes a charge over.
+    """Print how loads depend on the radius of the front at which the grid takes over.
 
-    Without a barrier, with real heights. Layouts of a scenario never differ in that.
+    Without a barrier, with real heights. The radius is the same for all layouts of a scenario.
     """
     with user_errors():
         blast = GasBlast(with_heights(load_scenario(scenario)), engine=GasEngine(cell_m=cell))
@@ -186,9 +186,10 @@ def settling(
     until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.18,
     cell: Cell = 0.5,
 ) -> None:
-    """Print how loads depend on when the products settle: never, in the last column by default.
+    """Print how loads depend on the time at which the products settle.
 
-    A settled gas has a bound on its temperature, which lengthens the time step.
+    By default they never settle in the last column. A settled gas has a bound on its temperature,
+    which lengthens the time step.
     """
     with user_errors():
         loaded, wanted = load_scenario(scenario), _numbers(times_s)
@@ -201,12 +202,12 @@ def settling(
 
 
 def _against_last(loads: list[float]) -> list[str]:
-    """Return loads in Pa s, with how far they are from the last one."""
+    """Return loads in Pa s as text, with their relative differences from the last one."""
     return [f"{load:.1f} ({100.0 * (load / loads[-1] - 1.0):+.2f} %)" for load in loads]
 
 
 def _rule_layouts(scenario: Scenario) -> dict[str, Layout]:
-    """Return no barrier and the two walls by rule, for the charge of seed 0."""
+    """Return the layouts of no barrier and the two rules, for the charge of seed 0."""
     charge = draw_charge(scenario, 0)
     return {
         "no barrier": (),
@@ -229,7 +230,7 @@ def endings(
     processes: Processes = 1,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Print the loads that runs miss: against runs several times as long, two layouts a site."""
+    """Print the loads that runs miss, against longer runs, for two layouts per site."""
     with user_errors(), running_on(cluster):
         jobs = {
             (title, name): GasBlast(site, layout, engine=engine)
@@ -304,10 +305,10 @@ def oblique(
     until: Annotated[str, typer.Option(help="What a blast waits for.")] = "structures",
     cell: Cell = 0.5,
 ) -> None:
-    """Print the loads on a facade of 12 m that is turned against the grid, and looks at the charge.
+    """Print the loads on a facade of 12 m that is turned against the grid and faces the charge.
 
-    By faces of cells and steps, and as tables and responses have it: by bays of 3 m along the
-    facade's own normal.
+    Loads are those on cell faces and steps, and those in tables and responses, on bays of 3 m along
+    the normal of the facade.
     """
     rows = []
     with user_errors():
@@ -345,9 +346,9 @@ def refinement(
     ] = "0.02,0.05,0.1,0.2",
     every: Annotated[float, typer.Option(help="When blocks are counted, s.")] = 0.01,
 ) -> None:
-    """Print what perfect refinement in blocks of 4 x 4 x 4 cells would cost, without overhead.
+    """Print the cost of perfect refinement in blocks of 4 x 4 x 4 cells, without overhead.
 
-    Blocks at protected walls are always refined, once the blast has reached them.
+    Blocks at protected walls are always refined once the blast has reached them.
     """
     with user_errors():
         blast = refined_blast(load_scenario(scenario), _numbers(thresholds), every)
@@ -373,7 +374,7 @@ def growing(
     ),
     until: Annotated[float | None, typer.Option(help="When blasts end, s.")] = None,
 ) -> None:
-    """Print what cells that grow with the blast change and cost, against the last choice."""
+    """Print the errors and costs of growing cells, relative to the last choice."""
     with user_errors():
         site = load_scenario(scenario) if scenario else street(length)
         charge = draw_charge(site, 0)
@@ -420,7 +421,7 @@ def cells(
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
-    """Print whether smaller cells change loads, reductions and the order of layouts."""
+    """Print the effect of cell size on loads, reductions and the order of layouts."""
     with user_errors(), running_on(cluster):
         site = _cells_site(scenario, endless)
         for seed in range(charges):
@@ -522,7 +523,7 @@ def corners(
 
 
 def _within(gauges: FloatArray, band: ExperimentalBand) -> str:
-    """Return how many gauges are within a band."""
+    """Return the number of gauges within a band as text."""
     low, high = band.bounds
     return f"{((gauges >= low) & (gauges <= high)).sum()} of {len(gauges)}"
 
@@ -541,7 +542,7 @@ def judge(
 ) -> None:
     """Judge the presets of the particle model by gas dynamics: order, overstatement, regret.
 
-    Random layouts and the two walls by rule, each under charges that the scenario draws.
+    Layouts are random ones and the two walls by rule, under charges drawn from the scenario.
     """
     with user_errors(), running_on(cluster):
         chosen = load_scenario(scenario)

@@ -1,4 +1,4 @@
-"""Whether smaller cells would change what a layout is worth, and the order of layouts."""
+"""Effect of cell size on the reductions of layouts and on their order."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class CellLoads:
     """Loads of layouts with one choice of cells.
 
     Attributes:
-        cells: The choice, for people.
+        cells: The choice, for display.
         unprotected_pa_s: Impulse without a barrier.
         impulse_pa_s: Impulse with each layout (layouts,).
         cpu_s: Mean CPU time of a blast.
@@ -36,20 +36,20 @@ class CellLoads:
 
     @property
     def reduction(self) -> FloatArray:
-        """What each layout takes off (layouts,)."""
+        """Relative reduction of the impulse by each layout (layouts,)."""
         without = np.full_like(self.impulse_pa_s, self.unprotected_pa_s)
         return reductions(self.impulse_pa_s, without)
 
 
 @dataclass(frozen=True)
 class CellDifference:
-    """How far loads with coarse cells are from those with fine ones.
+    """Differences between loads with coarse and with fine cells.
 
     Attributes:
-        impulse: Mean of the coarse impulse over the fine one less 1, all layouts and none.
-        reduction: Mean difference of the reductions, coarse less fine.
-        largest: Largest difference of a reduction.
-        rank: Rank correlation of the impulses of the layouts; NaN below 3 layouts.
+        impulse: Mean of coarse over fine impulse minus 1, over the layouts and no barrier.
+        reduction: Mean difference of the reductions, coarse minus fine.
+        largest: Difference of the reductions with the largest magnitude.
+        rank: Rank correlation of the impulses of the layouts; NaN for fewer than 3 layouts.
     """
 
     impulse: float
@@ -73,10 +73,10 @@ def cell_loads(
         scenario: The scenario.
         layouts: The layouts.
         charge: The charge.
-        engine: Has the cells.
-        until_s: When loads are looked at; at the end of the run unless given.
-        processes: Worker processes.
-        progress: Called with the share of the blasts that is done.
+        engine: The engine with the choice of cells.
+        until_s: Time at which loads are read; the end of the run unless given.
+        processes: Number of worker processes.
+        progress: Called with the finished share of the blasts.
     """
     run = partial(_load, scenario, charge, engine, until_s)
     loads, times_s = np.array(run_all(run, [(), *layouts], processes, progress)).T
@@ -95,7 +95,7 @@ def _load(
 
 
 def difference(coarse: CellLoads, fine: CellLoads) -> CellDifference:
-    """Return how far two choices are apart, on the layouts that both have (the first ones)."""
+    """Return the differences between two choices on their common layouts, the first ones."""
     count = min(len(coarse.impulse_pa_s), len(fine.impulse_pa_s))
     one, other = coarse.impulse_pa_s[:count], fine.impulse_pa_s[:count]
     off = np.append(one / other, coarse.unprotected_pa_s / fine.unprotected_pa_s) - 1.0

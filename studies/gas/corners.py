@@ -1,8 +1,8 @@
-"""What gets round a block: the first wave on its sides and its back, over the free field's.
+"""Waves round a block: loads on its sides and its back over those in the free field.
 
-A charge on the ground before the middle of a face of a block. A gauge is a module of a wall at
-the ground, its load the mean over the module's faces. The free field is along the ground beside a
-mirror, which is a wall parallel to the flow, at the same path length.
+A charge lies on the ground before the middle of a face of a block. A gauge is a module of a wall at
+the ground; its load is the mean over the module's faces. The free field is along the ground at the
+same path length, beside a mirror, which represents a wall parallel to the flow.
 """
 
 from collections.abc import Mapping
@@ -23,10 +23,10 @@ from studies.gas.loads import with_heights
 from studies.gas.reference import free_field_gauges
 
 _MARGIN_M: Final = 10.0
-"""Open ground around the block; its size does not matter, the borders being open."""
+"""Width of the open ground around the block; it has no effect, because the borders are open."""
 
 Region = Literal["one_corner", "one_corner_near", "one_corner_far", "two_corners"]
-"""All gauges of the sides, the third of them at the front, the third at the back; the back."""
+"""All gauges of the sides, the front third, the back third of them; the gauges of the back."""
 
 REGIONS: Final[tuple[Region, ...]] = (
     "one_corner",
@@ -37,14 +37,14 @@ REGIONS: Final[tuple[Region, ...]] = (
 
 
 class ExperimentalBand(NamedTuple):
-    """A measured share of the free-field impulse, and how far from it still agrees with it."""
+    """A measured share of the free-field impulse with its tolerance."""
 
     value: float
     tolerance: float
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Lower and upper end."""
+        """Lower and upper ends of the band."""
         return self.value - self.tolerance, self.value + self.tolerance
 
 
@@ -53,7 +53,7 @@ EXPERIMENT: Final[Mapping[Region, ExperimentalBand]] = MappingProxyType(
 )
 """Street-junction experiments, scale 1:5: impulse over free-field impulse at the same path length.
 
-One corner away they gave 0.48 to 0.67, near and far from the edge.
+Behind one corner the results were 0.48 to 0.67, near and far from the edge.
 """
 
 
@@ -61,12 +61,12 @@ One corner away they gave 0.48 to 0.67, near and far from the edge.
 class BlockGeometry:
     """A square block in plan, a charge on the axis of one face, and gauges round it.
 
-    The defaults are the block of published street-junction experiments, at full size: there the
+    The defaults are the block of published street-junction experiments at full size. In these the
     scale was 1:5, with a side of 2.3 m and the charge 1.15 m before the face.
 
     Attributes:
-        side_modules: Modules along each side of the block.
-        stand_off_m: From the charge's centre to the front face.
+        side_modules: Number of modules along each side of the block.
+        stand_off_m: Distance from the charge's centre to the front face.
         tnt_kg: TNT-equivalent mass of the charge.
     """
 
@@ -86,17 +86,17 @@ class BlockGeometry:
 
     @cached_property
     def from_edge_m(self) -> FloatArray:
-        """Distance of each module's middle from the first edge of its face (side_modules,)."""
+        """Distance of the middle of each module from the first edge of its face (side_modules,)."""
         return MODULE_SIDE_M * (np.arange(self.side_modules, dtype=np.float64) + 0.5)
 
     @cached_property
     def side_path_m(self) -> FloatArray:
-        """Path to each gauge of a side, from the front corner on (side_modules,)."""
+        """Path to each gauge of a side, ordered from the front corner (side_modules,)."""
         return self.corner_path_m + self.from_edge_m
 
     @cached_property
     def back_path_m(self) -> FloatArray:
-        """Path to the gauges of half the back, from a back corner to the middle (gauges,)."""
+        """Path to each gauge of half the back, from a back corner to the middle (gauges,)."""
         half = ceil(self.side_modules / 2)
         return self.corner_path_m + self.side_m + self.from_edge_m[:half]
 
@@ -107,7 +107,7 @@ class BlockGeometry:
 
 
 def region_weight(region: Region, geometry: BlockGeometry) -> FloatArray:
-    """Return how many modules of a region each gauge stands for (gauges,)."""
+    """Return the number of modules of a region that each gauge represents (gauges,)."""
     side = geometry.side_modules
     weight, third = np.zeros(len(geometry.gauge_path_m)), round(side / 3)
     if region == "two_corners":
@@ -125,7 +125,7 @@ def block_scenario(geometry: BlockGeometry) -> Scenario:
     """Return the block with the charge before the middle of one face.
 
     Raises:
-        ScenarioError: If the charge does not fit in.
+        ScenarioError: If the charge does not fit on the site.
     """
     side_m = geometry.side_m
     document: dict[str, Any] = {
@@ -159,14 +159,14 @@ def block_scenario(geometry: BlockGeometry) -> Scenario:
 
 @dataclass(frozen=True, eq=False)
 class CornerWaves:
-    """First waves round a block.
+    """Loads round a block.
 
     Attributes:
         geometry: The block.
         height_m: Its height.
         cell_m: Side of a cell.
-        coefficient: Impulse over the free field's at the same path length, those of a side first,
-            then half of the back (gauges,).
+        coefficient: Impulse over that in the free field at the same path length, for a side and
+            then for half of the back (gauges,).
     """
 
     geometry: BlockGeometry
@@ -179,7 +179,7 @@ class CornerWaves:
         return self.coefficient[region_weight(region, self.geometry) > 0.0]
 
     def mean(self, region: Region) -> float:
-        """Return the mean coefficient of a region's modules."""
+        """Return the mean coefficient over the modules of a region."""
         return float(np.average(self.coefficient, weights=region_weight(region, self.geometry)))
 
 
@@ -190,7 +190,7 @@ def corner_waves(
 
     Args:
         cell_m: Side of a cell; a module's side must be a whole number of them.
-        height_m: Height of the block; as high as wide unless given.
+        height_m: Height of the block; its width unless given.
         geometry: The block and the charge.
 
     Raises:
@@ -215,7 +215,7 @@ def corner_waves(
 
 
 def _gauge_means(result: GasResult, geometry: BlockGeometry) -> FloatArray:
-    """Return the mean impulses at the gauges, symmetric ones together (gauges,)."""
+    """Return the impulses at the gauges, averaged over symmetric ones (gauges,)."""
     side = geometry.side_modules
     low = result.faces[result.faces["z_m"] < MODULE_SIDE_M]
     sides = low[low["face"].isin(["south", "north"])].groupby("column")["impulse_pa_s"].mean()

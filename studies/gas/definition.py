@@ -1,4 +1,4 @@
-"""The peak specific impulse against the sum of all positive phases, on the same blasts."""
+"""Comparison of the peak specific impulse with the sum of all positive phases."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,12 +29,14 @@ class PositivePhases:
 class BothLoads:
     """The loads of a blast on the protected structures by both definitions.
 
+    Loads are means over the cell faces of the counted walls.
+
     Attributes:
         positive_pa_s: Sum of all positive phases until the end of a long run.
         impulse_pa_s: Peak specific impulse.
-        reached_s: When that was reached, mean over the faces that count.
-        last_s: When it was reached on the last of them.
-        end_s: When a run ends that waits for it.
+        reached_s: Mean time of the peak specific impulse over these faces.
+        last_s: Largest time of it on any of them.
+        end_s: End of a run that waits for it.
     """
 
     positive_pa_s: float
@@ -45,7 +47,7 @@ class BothLoads:
 
 
 def both_loads(scenario: Scenario, layout: Layout, engine: GasEngine, until_s: float) -> BothLoads:
-    """Run a blast for a time, and once more to its end."""
+    """Run a blast until a time, and again until its loads are known."""
     phases = PositivePhases()
 
     def recorders(_: GasGrid) -> Sequence[Recorder]:

@@ -1,4 +1,4 @@
-"""Loads at the end of a run against those of a run several times as long."""
+"""Comparison of loads at the end of a run with those of a run several times as long."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ class Ending:
     """The loads that a run waits for, at its end and later.
 
     Attributes:
-        time_s: When the run ended.
+        time_s: End of the run.
         cpu_s: CPU time of the run until then.
-        reason: Why it ended.
-        impulse_pa_s: Loads on the walls that count, at the end (walls,).
+        reason: Reason for its end.
+        impulse_pa_s: Loads on the counted protected walls, at the end (walls,).
         later_pa_s: The same at the end of the longer run (walls,).
-        on_buildings_pa_s: Load of the protected structures, at the end and later.
+        on_buildings_pa_s: Load of the protected buildings, at the end and later.
         levels: Level of protection of the facades, at the end and later; `None` without any.
     """
 
@@ -44,18 +44,18 @@ class Ending:
 
     @property
     def missed(self) -> float:
-        """Largest share of the load of a wall that came after the end."""
+        """Largest share of the load of a wall that arrived after the end."""
         return float((1.0 - self.impulse_pa_s / self.later_pa_s).max(initial=0.0))
 
     @property
     def missed_of_all(self) -> float:
-        """Share of the load of the protected structures that came after the end."""
+        """Share of the load of the protected buildings that arrived after the end."""
         now, later = self.on_buildings_pa_s
         return 1.0 - now / later
 
 
 def ending(blast: GasBlast, times: float = 4.0) -> Ending:
-    """Run a blast to its end, and its gas on until so many times as long."""
+    """Run a blast to its end, and continue its gas to `times` times that time."""
     start = process_time()
     result = blast.run()
     cpu_s, time_s, reason = process_time() - start, result.time_s, result.end_reason
@@ -77,7 +77,7 @@ def ending(blast: GasBlast, times: float = 4.0) -> Ending:
 
 @dataclass(frozen=True, eq=False)
 class _Loads:
-    """Loads so far: on the walls that count, on the protected buildings, and the level."""
+    """Current loads on counted protected walls and protected buildings, and the level."""
 
     on_walls_pa_s: FloatArray
     on_buildings_pa_s: float
@@ -97,9 +97,9 @@ class _Loads:
 
 
 def sites(generated: int) -> Iterator[tuple[str, Scenario, GasEngine]]:
-    """Yield the bundled sites with something protected, then so many generated ones of each family.
+    """Yield the bundled sites, then `generated` sites of each family, if they protect a structure.
 
-    Each has a title and an engine: cells grow where the site is large.
+    Each has a title and an engine, whose cells grow if the site is large.
     """
     found = {name: load_scenario(name) for name in bundled_scenarios()}
     for family, ranges in FAMILIES.items():
@@ -111,7 +111,7 @@ def sites(generated: int) -> Iterator[tuple[str, Scenario, GasEngine]]:
 
 
 def layouts(site: Scenario) -> dict[str, Layout]:
-    """Return no barrier, and a random layout where something can be placed."""
+    """Return no barrier and, on sites with a build zone, a random layout."""
     found: dict[str, Layout] = {"none": ()}
     if site.build_zone is not None:
         found["random"] = random_layout(site, np.random.default_rng(0))

@@ -1,4 +1,4 @@
-"""What cells that grow with the blast do to the loads on each wall of a large site, and cost."""
+"""Effect of growing cells on the loads on each wall of a large site, and their cost."""
 
 from dataclasses import dataclass, replace
 from time import process_time
@@ -22,11 +22,11 @@ class CellChoice:
     """A blast with one choice of cells.
 
     Attributes:
-        cells: The choice, for people.
-        impulse_pa_s: Impulse on the protected structures.
-        walls: Impulse and largest overpressure on each wall and roof of what is protected.
-        updates: Cells moved on; a step counts as two.
-        cpu_s: Time of a core.
+        cells: The choice, for display.
+        impulse_pa_s: Mean impulse on the protected structures, by weight.
+        walls: Impulse and largest overpressure on each wall and roof of the protected structures.
+        updates: Number of cell updates, two per step.
+        cpu_s: CPU time.
     """
 
     cells: str
@@ -36,9 +36,9 @@ class CellChoice:
     cpu_s: float
 
     def off_percent(self, other: "CellChoice", column: str) -> tuple[float, float]:
-        """Return the mean and the largest distance from another choice over the walls.
+        """Return the mean and the largest difference from another choice over the walls, %.
 
-        Those count that have at least a twentieth of the largest impulse.
+        Only walls with more than 5 % of the largest impulse are included.
         """
         impulse = other.walls["impulse_pa_s"]
         counting = np.asarray(impulse > _SMALL_LOAD * impulse.max())
@@ -47,7 +47,7 @@ class CellChoice:
 
 
 def engine_with(choice: str, until_s: float | None = None) -> GasEngine:
-    """Return the engine with cells that are `coarse` or `fine`, or of one side in m."""
+    """Return the engine with a named choice of cells, or with cells of one side in m."""
     until = "structures" if until_s is None else until_s
     cells = choice if choice in CELLS else float(choice)
     return replace(GasEngine.with_cells(cells), until=until)

@@ -1,4 +1,4 @@
-"""What gas dynamics says of the particle model: order, overstatement and regret of its layouts."""
+"""Judgement of the particle model by gas dynamics: order, overstatement and regret of layouts."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ PRESETS: Final[Mapping[str, str]] = MappingProxyType(
         "ballistic": "ballistic_kb_100kg",
     }
 )
-"""The presets that are judged, each with the calibration that goes with it."""
+"""The judged presets, each with its calibration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,29 +57,29 @@ class Judgement:
 
     @property
     def overstatement(self) -> float:
-        """How many times the mean reduction of gas dynamics the particle model promises."""
+        """Ratio of the mean reductions by the particle model and by gas dynamics."""
         particle, gas = self.means
         return particle / gas
 
     @property
     def factor(self) -> float:
-        """By which the particle model's reductions come nearest to those of gas dynamics."""
+        """Least-squares factor from the particle model's reductions to those of gas dynamics."""
         return float((self.particle * self.gas).sum() / (self.particle**2).sum())
 
     @property
     def errors(self) -> tuple[float, float]:
-        """Root mean squares: gas less `factor` times particles, and gas less its own mean.
+        """Root mean squares: gas minus `factor` times particles, and gas minus its mean.
 
-        The second is what one gets without looking at the layout.
+        The second is the error of an estimate that ignores the layout.
         """
         left = self.gas - self.factor * self.particle
         return float(np.sqrt((left**2).mean())), float(self.gas.std())
 
     @property
     def regret(self) -> Estimate:
-        """Gas reduction lost by taking the layout that the particle model likes best.
+        """Loss of gas reduction by the particle model's choice, against the best of the layouts.
 
-        Against the best of these layouts; the mean over the charges, with its 95 % interval.
+        It is the mean over the charges, with its 95 % interval.
         """
         liked = self.particle.argmax(axis=0)
         taken = self.gas[liked, np.arange(self.gas.shape[1])]
@@ -96,18 +96,18 @@ def judge(
     presets: Mapping[str, str] = PRESETS,
     store: Path | None = None,
 ) -> dict[str, Judgement]:
-    """Return what gas dynamics and each preset of the particle model say of layouts.
+    """Return the reductions by gas dynamics and by each preset of the particle model.
 
     Args:
         scenario: The scenario.
         layouts: At least three.
         charges: At least one.
-        seeds: Blasts of the particle model for each layout and charge.
-        processes: Worker processes.
-        progress: Called with the share of the gas blasts that is done; the particle model's
+        seeds: Number of blasts of the particle model for each layout and charge.
+        processes: Number of worker processes.
+        progress: Called with the finished share of the gas blasts; those of the particle model
             follow.
         presets: Presets by name, each with its calibration.
-        store: Folder for the gas blasts, from which a study that was broken off goes on.
+        store: Folder for the gas blasts, from which an interrupted study continues.
     """
     drawn = SeedRange.JUDGEMENT.seeds(0, seeds)
     evaluator = BlastEvaluator(scenario, "gas", cache=store)
@@ -128,7 +128,7 @@ def _with_preset(scenario: Scenario, preset: str, calibration: str) -> Scenario:
 
 
 def _bare(impulses: FloatArray) -> FloatArray:
-    """Return the impulses without a barrier as often as there are layouts."""
+    """Return the impulses without a barrier, repeated for each layout (layouts, charges)."""
     return np.broadcast_to(impulses[0], impulses[1:].shape)
 
 
@@ -140,7 +140,7 @@ def _impulses(
     processes: int,
     progress: Callable[[float], None] | None,
 ) -> FloatArray:
-    """Return the impulse without and with each layout, Pa s (1 + layouts, charges)."""
+    """Return the impulses without a barrier and with each layout, Pa s (1 + layouts, charges)."""
     pairs = [
         (layout, Threat(charge, seed))
         for layout in ((), *layouts)

@@ -1,6 +1,7 @@
-"""Loads on the protected structures, for the gas engine's studies.
+"""Loads on the protected structures, for the studies of the gas engine.
 
-By when the run ends and where the grid takes over; on sites with real heights and on a small yard.
+They depend on the end of the run and on the radius at which the grid takes over. Sites have real
+heights, or are a small yard.
 """
 
 from typing import Any, Final
@@ -13,13 +14,16 @@ from blast_env.scenario import Scenario
 
 
 def protected_impulse_pa_s(result: GasResult) -> float:
-    """Return the impulse on the protected buildings, as a mean by weight."""
+    """Return the weighted mean impulse on the protected buildings, Pa s."""
     loads = result.loads()
     return loads.protected_impulse_pa_s / sum(each.weight for each in loads.protected)
 
 
 def impulse_until(blast: GasBlast, until_s: float) -> float:
-    """Return the impulse on the protected structures up to a time, Pa s, whenever a run ends."""
+    """Return the mean impulse on the protected buildings up to a time, Pa s.
+
+    The run continues to that time even if its loads are known before.
+    """
     run = blast.engine.start_on(blast.site)
     run.solver.advance(until_s)
     return protected_impulse_pa_s(GasResult(blast, run))
@@ -41,7 +45,7 @@ def with_heights(
         scenario: The scenario.
         structures_m: Height of all structures.
         barrier_m: Height of the modules of the build zone.
-        air_m: How high the air is, instead of what the scenario says.
+        air_m: Height of the air; that of the scenario unless given.
     """
     document: dict[str, Any] = scenario.model_dump()
     document["schema_version"] = 2
@@ -55,9 +59,10 @@ def with_heights(
 
 
 def yard() -> Scenario:
-    """Return a site on which cells of an eighth of a metre can be afforded.
+    """Return a site small enough for cells of 0.125 m.
 
-    20 kg in the open, 8.5 m before a building of 2 x 4 x 3 m; walls of 1.5 m between them.
+    A charge of 20 kg is in the open, 8.5 m before a building of 2 x 4 x 3 m, with walls of 1.5 m
+    between them.
     """
     document = {
         "schema_version": 2,
@@ -88,12 +93,12 @@ def yard() -> Scenario:
 
 
 def load_from_radius(blast: GasBlast, radius_m: float, until_s: float) -> float:
-    """Return the impulse on the protected structures, Pa s, with a radius of one's own.
+    """Return the mean impulse on the protected buildings, Pa s, with a given handover radius.
 
     Args:
         blast: The blast.
-        radius_m: Where the front is when the grid takes over; nothing solid may be nearer.
-        until_s: When the load is looked at.
+        radius_m: Radius of the front at which the grid takes over, without solids within it.
+        until_s: Time at which the load is read.
 
     Raises:
         BlastEnvError: If the radius is within the charge, or cells are not uniform.

@@ -1,4 +1,4 @@
-"""A facade turned against the grid: what the staircase of cells does to its loads."""
+"""Effect of the staircase of cells on the loads on a facade turned against the grid."""
 
 from dataclasses import dataclass
 from math import cos, pi, radians, sin
@@ -37,13 +37,13 @@ def _block(angle_deg: float) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _depths_m(places_m: FloatArray, angle_deg: float) -> tuple[FloatArray, FloatArray]:
-    """Return how far places are behind the facade, and along it from its middle (n,)."""
+    """Return the distances of places behind the facade, and along it from its middle (n,)."""
     middle, inwards, along = _block(angle_deg)
     return (places_m - middle) @ inwards, (places_m - middle) @ along
 
 
 def turned_block(angle_deg: float) -> Scenario:
-    """Return a block whose facade looks at the charge, turned against the grid, as its modules."""
+    """Return the modules of a block, turned against the grid, whose facade faces the charge."""
     count = round(_SIDE_M / MODULE_SIDE_M)
     centres = MODULE_SIDE_M * (np.arange(count) + 0.5)
     places = np.stack(np.meshgrid(centres, centres), axis=-1)
@@ -76,15 +76,15 @@ def turned_block(angle_deg: float) -> Scenario:
 
 @dataclass(frozen=True)
 class FacadeLoads:
-    """Loads on a facade that is turned against the grid, before and after its own normal counts.
+    """Loads on a facade turned against the grid, on cell faces and along the facade's normal.
 
     Attributes:
-        impulse_pa_s: Mean over the faces of cells.
-        mean_peak_pa: Mean over them of the largest overpressure.
-        largest_peak_pa: The largest overpressure on one of them.
-        told_pa_s: Mean over its walls in the tables, along its own normal.
-        told_peak_pa: Mean over its bays of the largest mean overpressure along that normal.
-        largest_told_pa: The largest of them.
+        impulse_pa_s: Mean impulse over the cell faces.
+        mean_peak_pa: Mean over the cell faces of the largest overpressure.
+        largest_peak_pa: The largest overpressure on any of them.
+        told_pa_s: Mean impulse in the tables of the engine, along the facade's normal.
+        told_peak_pa: Mean over the bays of the largest mean overpressure along that normal.
+        largest_told_pa: The largest of these peaks.
         stepped_m: Largest deflection of an elastic component of 10 ms on any step of the staircase.
         told_m: The same in any bay along that normal.
     """
@@ -102,12 +102,12 @@ class FacadeLoads:
 def oblique_loads(
     angle_deg: float, cell_m: float = 0.5, until: str | float = "structures"
 ) -> FacadeLoads:
-    """Return the loads on a facade at an angle, by faces of cells and as the engine tells them.
+    """Return the loads on a facade at an angle, on cell faces and in the tables of the engine.
 
     Args:
-        angle_deg: How far it is turned against the grid; it looks at the charge all the same.
+        angle_deg: Angle between facade and grid; the facade faces the charge at any angle.
         cell_m: Side of the cells.
-        until: What the blast waits for.
+        until: Loads that the blast waits for.
     """
     result = GasBlast(turned_block(angle_deg), engine=GasEngine(cell_m=cell_m, until=until)).run()
     chosen = _facade(result.run, angle_deg)
@@ -133,7 +133,7 @@ def oblique_loads(
 
 
 def _deflection_m(time_s: FloatArray, history_pa: NDArray[np.float32]) -> float:
-    """Return the largest deflection of an elastic component of 10 ms under any of the histories."""
+    """Return the largest deflection of an elastic component of 10 ms under any history, m."""
     stiffness = (2.0 * pi / _PERIOD_S) ** 2 * _MASS_KG_M2
     system = System(_MASS_KG_M2, 1.0, Resistance.elastic_plastic(stiffness, _NEVER_YIELDS_PA))
     histories = history_pa.astype(np.float64)
@@ -141,7 +141,7 @@ def _deflection_m(time_s: FloatArray, history_pa: NDArray[np.float32]) -> float:
 
 
 def _facade(run: GasRun, angle_deg: float) -> BoolArray:
-    """Return which faces of cells are the facade's (n,)."""
+    """Return a mask of the cell faces of the facade (n,)."""
     faces, centre_m = run.table.faces, run.table.centre_m
     _, inwards, _ = _block(angle_deg)
     behind, beside = _depths_m(centre_m[:, :2], angle_deg)

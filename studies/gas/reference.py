@@ -1,8 +1,8 @@
-"""The gas engine's charge on the ground against Kingery and Bulmash.
+"""Comparison of the gas engine's charge on the ground with Kingery and Bulmash.
 
-Peak specific impulses, arrival and peaks over the curves, in the free field at ground
-level and on a wide rigid wall. Arrival is the time of the steepest rise: a shock is some cells
-wide, and its middle counts.
+Peak specific impulses, arrivals and peaks are divided by the curves, in the free field at ground
+level and on a wide rigid wall. The arrival is the time of the steepest rise, in the middle of the
+computed shock, which is some cells wide.
 """
 
 from collections.abc import Sequence
@@ -23,15 +23,15 @@ from blast_env.physics.gas.source import TNT, Explosive, GasCharge, set_charge
 Wave = Literal["reflected", "incident"]
 
 _FREE_FIELD_START: Final = 1.0
-"""Where the front is, m/kg^(1/3), when the free field goes over to three dimensions."""
+"""Scaled radius of the front, m/kg^(1/3), at which the free field becomes three-dimensional."""
 _ROUNDING: Final = 1e-9
 _LATEST: Final = 1.5
-"""A run ends at this many times the reference's end of the positive phase at the latest."""
+"""Time limit of a run, in units of the reference's end of the positive phase."""
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """What was measured at a distance, over Kingery and Bulmash's.
+    """Computed values at a distance, divided by Kingery and Bulmash's.
 
     Attributes:
         z_m_kg: Scaled distance, m/kg^(1/3).
@@ -49,11 +49,11 @@ class Ratio:
 def wide_wall(
     charge_kg: float, distance_m: float, cell_m: float, explosive: Explosive = TNT
 ) -> Ratio:
-    """Return the load on a rigid wall, nearest to a charge on the ground, normally reflected.
+    """Return the normally reflected load at the point of a rigid wall nearest to a ground charge.
 
-    Half of the scene, beside a mirror through the charge; the distance is rounded up to cells. The
-    wall and the air behind the charge are so wide that their ends are not felt in the first
-    positive phase.
+    The model is half of the scene, beside a mirror through the charge; the distance is rounded up
+    to whole cells. The wall and the air behind the charge are wide enough for their ends to have no
+    effect in the first positive phase.
     """
     to_wall = ceil(distance_m / cell_m - _ROUNDING)
     distance_m = to_wall * cell_m
@@ -89,7 +89,7 @@ def free_field(
 ) -> list[Ratio]:
     """Return the incident wave along the ground, at the centres of cells beside the axis.
 
-    A quarter of the scene, between mirrors through the charge.
+    The model is a quarter of the scene, between mirrors through the charge.
     """
     unit = cbrt(charge_kg)
     gauges = free_field_gauges(charge_kg, [z * unit for z in z_m_kg], cell_m, explosive)
@@ -109,9 +109,9 @@ def free_field(
 def free_field_gauges(
     charge_kg: float, distances_m: Sequence[float], cell_m: float, explosive: Explosive = TNT
 ) -> Gauges:
-    """Return gauges along the ground, in the cells at some distances, when the wave has passed.
+    """Return gauges along the ground, in the cells at given distances, after the wave has passed.
 
-    The mirror beside them is a wall, without thickness and parallel to the flow.
+    The mirror beside them represents a wall without thickness, parallel to the flow.
     """
     unit, farthest_m = cbrt(charge_kg), max(distances_m)
     along, wide = ceil((farthest_m + unit) / cell_m), ceil((0.45 * farthest_m + unit) / cell_m)
@@ -130,7 +130,7 @@ def free_field_gauges(
 
 
 def _phase_end_s(distance_m: float, charge_kg: float) -> float:
-    """Return when the positive phase is over after the reference."""
+    """Return the end of the positive phase by the reference, s."""
     quantities: tuple[Quantity, Quantity] = ("arrival_time", "positive_duration")
     return sum(kingery_bulmash(quantity, distance_m, charge_kg) for quantity in quantities)
 

@@ -1,4 +1,4 @@
-"""A bound of block-structured refinement: how few cells it would have to move on, at best."""
+"""A lower bound on the cell updates of block-structured refinement."""
 
 from dataclasses import dataclass
 from time import process_time
@@ -13,28 +13,29 @@ from blast_env.scenario import Scenario
 from blast_env.scenario.build_scene import build_site
 
 BLOCK: Final = 4
-"""Cells along the side of a block."""
+"""Number of cells along the side of a block."""
 
 _STILL: Final = 0.001
-"""Overpressure, of still air's, below which air counts as still."""
+"""Overpressure, in units of still air's pressure, up to which air counts as still."""
 
 _COARSER: Final = 1.0 / 16.0
-"""Updates of a block of 1 m cells over those of 0.5 m: an eighth of the cells, half the steps."""
+"""Ratio of updates with cells of 1 m to those of 0.5 m: an eighth of the cells, half the steps."""
 
 _FINER: Final = 16.0
-"""Of a block of 0.25 m cells, likewise."""
+"""The same ratio for cells of 0.25 m."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """What perfect refinement would move on, without any overhead.
+    """Cell updates with perfect refinement, without any overhead.
 
     Attributes:
-        threshold: Where a block is refined: its largest jump of pressure from cell to cell over the
-            lower of the two pressures.
-        share: Of the blocks that the blast has reached, the mean share that is refined.
-        coarse: Updates with 0.5 m in these and 1 m elsewhere, over those of 0.5 m everywhere.
-        fine: With 0.25 m in these and 1 m elsewhere, over the same.
+        threshold: Jump of pressure between cells, over the lower of the two pressures, above which
+            a block is refined.
+        share: Mean share of refined blocks among those that the blast has reached.
+        coarse: Ratio of updates, with cells of 0.5 m in refined blocks and 1 m elsewhere, to those
+            with 0.5 m everywhere.
+        fine: The same ratio with 0.25 m in refined blocks.
     """
 
     threshold: float
@@ -45,12 +46,12 @@ class Refinement:
 
 @dataclass(frozen=True, eq=False)
 class RefinedBlast:
-    """A blast with uniform cells of 0.5 m, and what refinement would make of it.
+    """A blast with uniform cells of 0.5 m, and the bounds for its refinement.
 
     Attributes:
-        updates: Cells that it moved on; a step counts as two.
-        cpu_s: Time of a core for that.
-        found: One a threshold.
+        updates: Number of its cell updates, two per step.
+        cpu_s: CPU time for these updates.
+        found: One per threshold.
     """
 
     updates: int
@@ -63,8 +64,8 @@ def refined_blast(scenario: Scenario, thresholds: list[float], every_s: float) -
 
     Args:
         scenario: The site.
-        thresholds: Where blocks are refined.
-        every_s: From one time to the next.
+        thresholds: Thresholds of refinement; see `Refinement.threshold`.
+        every_s: Interval between these times.
     """
     run = GasEngine(cell_m=0.5).start_on(build_site(scenario))
     walls, rows, cpu_s, steps = _at_walls(run), [], 0.0, 0
@@ -87,10 +88,10 @@ def refined_blast(scenario: Scenario, thresholds: list[float], every_s: float) -
 
 
 def _waves(run: GasRun) -> tuple[FloatArray, FloatArray]:
-    """Return the overpressure, of still air's, and the largest relative jump (x, y, z).
+    """Return the overpressure in units of still air's, and the largest relative jump (x, y, z).
 
-    A jump is the difference to a neighbouring cell over the lower pressure. Solids count as still
-    air, and nothing jumps there.
+    A jump is the difference from a neighbouring cell over the lower pressure. Solids count as still
+    air, without jumps.
     """
     gas, air = run.solver, ~run.grid.solid
     layers = [gas.overpressure_in(2, layer) for layer in range(run.grid.shape[2])]
@@ -115,7 +116,7 @@ def _most(cells: FloatArray) -> FloatArray:
 
 
 def _at_walls(run: GasRun) -> BoolArray:
-    """Return the blocks that touch what is protected."""
+    """Return a mask of the blocks that touch protected structures."""
     cells = np.zeros(run.grid.shape)
     protected = np.array([each.protected for each in run.site.structures])
     cells[tuple(run.table.faces.air[protected[run.table.structure]].T)] = 1.0

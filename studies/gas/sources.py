@@ -1,6 +1,7 @@
-"""What the gas engine's charge could be: sources against Kingery and Bulmash, and the trade-off.
+"""Possible sources for the gas engine's charge against Kingery and Bulmash.
 
-No source meets the incident and the reflected impulse at once: what lifts the one lifts the other.
+No source matches both the incident and the reflected impulse: a change that raises one also raises
+the other.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +23,7 @@ CHARGE_KG: Final = 100.0
 Z_M_KG: Final = (1.7, 2.15, 2.7, 4.3)
 REFLECTED_BAND: Final = 0.06
 INCIDENT_BAND: Final = 0.10
-"""How far from Kingery and Bulmash's an impulse may be."""
+"""Tolerances of reflected and incident impulses, relative to Kingery and Bulmash's."""
 
 CHOSEN: Final = "chosen"
 SOURCES: Final[Mapping[str, Explosive]] = MappingProxyType(
@@ -40,7 +41,7 @@ SOURCES: Final[Mapping[str, Explosive]] = MappingProxyType(
         "2.8 + 3.5 MJ/kg in 1 ms": Explosive(1630.0, 2.8e6, 3.5e6, 1e-3, 1.8),
     }
 )
-"""Energy at once, energy by burning and its time constant for 1 kg in free air."""
+"""Sources by prompt energy, energy of burning and its time constant for 1 kg in free air."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,9 @@ class SourceRatios:
     """Both waves of a source over Kingery and Bulmash's.
 
     Attributes:
-        name: Of the source.
-        reflected: On a wide wall, a distance each.
-        incident: In the free field, likewise.
+        name: Name of the source.
+        reflected: Ratios on a wide wall, one per distance.
+        incident: Ratios in the free field, one per distance.
     """
 
     name: str
@@ -64,7 +65,7 @@ def source_ratios(
     cell_m: float = 0.5,
     progress: Callable[[float], None] | None = None,
 ) -> list[SourceRatios]:
-    """Return both waves of each source, 100 kg on the ground."""
+    """Return both waves of each source, for 100 kg on the ground."""
     found = []
     for name, explosive in sources.items():
         distances_m = [z * cbrt(CHARGE_KG) for z in z_m_kg]
@@ -77,7 +78,7 @@ def source_ratios(
 
 
 def trade_off_figure(found: Sequence[SourceRatios], cell_m: float) -> Figure:
-    """Draw the range of both impulses for each source, and where both are as wanted."""
+    """Draw the range of both impulses for each source, and the target region."""
     figure, axes = plt.subplots(figsize=(9.0, 6.5), layout="constrained")
     corner = (1.0 - REFLECTED_BAND, 1.0 - INCIDENT_BAND)
     size = (2.0 * REFLECTED_BAND, 2.0 * INCIDENT_BAND)
