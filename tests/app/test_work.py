@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic, sleep
@@ -563,3 +564,31 @@ def test_a_report_that_is_stopped_may_take_time_to_write(tmp_path: Path) -> None
         assert process.stop_by_s is not None
         assert grace_s - 4.0 < process.stop_by_s - monotonic() <= grace_s
     process.end()
+
+
+WARM_CODE = """
+import sys
+from numba.core.dispatcher import Dispatcher
+from blast_env.app.tasks import warm_up
+from blast_env.engines.gas import GasBlast, GasEngine
+from tests.gas_sites import glazed_hut
+
+def loaded():
+    physics = [vars(own) for name, own in sys.modules.items() if "env.physics" in name]
+    compiled = [each for own in physics for each in own.values() if isinstance(each, Dispatcher)]
+    return {(each.__name__, *each.signatures) for each in compiled if each.signatures}
+
+warm_up()
+warm = loaded()
+for cells in ("uniform", "coarse"):
+    GasBlast(glazed_hut(), engine=GasEngine(cells=cells)).run()
+print(len(warm), *loaded() - warm)
+"""
+
+
+def test_a_worker_has_loaded_all_gas_kernels_before_its_first_task() -> None:
+    """In a process of its own, because other tests load the kernels into this one."""
+    done = subprocess.run([sys.executable, "-c", WARM_CODE], capture_output=True, text=True)
+    count, *later = done.stdout.split()
+    assert int(count) > 8, done.stderr
+    assert later == []
