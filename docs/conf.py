@@ -72,7 +72,7 @@ PUBLIC: Final = (
     "blast_agents.search",
     "blast_agents.league",
 )
-"""Packages whose `__all__` is documented; what several of them have, with the first."""
+"""Packages whose `__all__` is documented; a name of several of them, with the first."""
 
 _MAGIC: Final = "%%bash\n"
 _MARK: Final = re.compile(r"^<!-- (docstring|names|commands) of ([\w.]+) -->$", re.MULTILINE)
@@ -84,7 +84,7 @@ def _docstring(path: str) -> str:
 
 
 def _names(package: str) -> str:
-    """Return what makes autodoc document the public names of a package."""
+    """Return the autodoc directives for the public names of a package."""
     module = import_module(package)
     before = [import_module(name).__all__ for name in PUBLIC[: PUBLIC.index(package)]]
     lines = ["```{eval-rst}", f".. currentmodule:: {package}"]
@@ -102,13 +102,13 @@ def _names(package: str) -> str:
 
 
 def _commands(package: str) -> str:
-    """Return what every command of a Typer application does and takes, as it says itself."""
+    """Return the help text and options of every command of a Typer application."""
     commands = typer.main.get_command(import_module(package).app).commands
     lines: list[str] = []
     for name, lazy in commands.items():
         command = lazy.loaded
         lines += [f"## {name}", "", inspect.cleandoc(command.help), ""]
-        lines += ["| option | what |", "|---|---|"]
+        lines += ["| option | meaning |", "|---|---|"]
         for option in command.params:
             lines.append(f"| `{'`, `'.join(option.opts)}` | {_cell(option.help)} |")
         lines.append("")
@@ -116,7 +116,7 @@ def _commands(package: str) -> str:
 
 
 def _cell(text: str | None) -> str:
-    """Return a text for a cell of a table, with what the command line writes as markup."""
+    """Return a text for a cell of a table, from the markup of the command line."""
     return Text.from_markup(text or "").plain.replace("|", r"\|").replace("\n", " ")
 
 
@@ -128,7 +128,7 @@ _WRITERS: Final[dict[str, Callable[[str], str]]] = {
 
 
 def _fill_in(_app: Any, _page: str, source: list[str]) -> None:
-    """Fill in marks such as `<!-- docstring of NAME -->` with what the code says."""
+    """Fill in marks such as `<!-- docstring of NAME -->` with texts from the code."""
     source[0] = _MARK.sub(lambda mark: _WRITERS[mark[1]](mark[2]), source[0])
 
 
@@ -137,7 +137,7 @@ def _to_restructured_text(
 ) -> None:
     """Let docstrings say m|v|, and leave chapters in Markdown to the pages that show them.
 
-    Fields that are options of the command line say of themselves what they are.
+    Fields that are options of the command line carry their own help texts.
     """
     if is_dataclass(value):
         told = {each.name: each.metadata.get(TEXT) for each in fields(value)}
@@ -160,7 +160,7 @@ def _show_as_commands(_app: Any, doctree: nodes.document) -> None:
 
 
 def setup(app: Any) -> None:
-    """Connect what is above."""
+    """Connect the functions above."""
     app.connect("doctree-read", _show_as_commands)
     app.connect("source-read", _fill_in)
     app.connect("autodoc-process-docstring", _to_restructured_text, priority=400)
