@@ -41,7 +41,7 @@ from studies.gas.loads import (
     yard,
 )
 from studies.gas.oblique import oblique_loads
-from studies.gas.reference import free_field, wide_wall
+from studies.gas.reference import extrapolated_peak, free_field, order_found, wide_wall
 from studies.gas.refinement import refined_blast
 from studies.gas.sources import source_ratios, trade_off_figure
 
@@ -117,14 +117,42 @@ def kingery_bulmash(
                     start = (f"{charge_kg:g}", f"{cell_m:g}", name, f"{ratio.z_m_kg:.2f}")
                     rows.append((*start, *(f"{value:.3f}" for value in values)))
         print_line(markdown_table(headers, rows))
-        peaks = []
+        of_sizes = []
         for cell_m in _numbers(peak_cells):
             ratio = wide_wall(PEAK_CHARGE_KG, PEAK_DISTANCE_M, cell_m)
             cells = f"{cbrt(PEAK_CHARGE_KG) / cell_m:.1f}"
-            peaks.append((f"{cell_m:g}", cells, f"{ratio.impulse:.3f}", f"{ratio.peak:.3f}"))
-        if peaks:
+            of_sizes.append((f"{cell_m:g}", cells, f"{ratio.impulse:.3f}", f"{ratio.peak:.3f}"))
+        if of_sizes:
             columns = ("cell (m)", "cells per kg^(1/3)", "reflected impulse", "reflected peak")
-            print_line("\n" + markdown_table(columns, peaks))
+            print_line("\n" + markdown_table(columns, of_sizes))
+
+
+@app.command()
+def peaks(
+    distances: Annotated[
+        str, typer.Option(help="m/kg^(1/3), separated by commas.")
+    ] = "1.7,2.7,4.3,5.4",
+    sizes: Annotated[
+        str, typer.Option(help="m, three, each half of the one before.")
+    ] = "1,0.5,0.25",
+) -> None:
+    """Print reflected peaks of 100 kg over the curve, by the size of cells, and extrapolated.
+
+    From the two smallest sizes, with a fixed order; the order found from all three stands beside
+    it.
+    """
+    rows = []
+    with user_errors():
+        for scaled in _numbers(distances):
+            found = [
+                wide_wall(PEAK_CHARGE_KG, scaled * cbrt(PEAK_CHARGE_KG), cell_m)
+                for cell_m in _numbers(sizes)
+            ]
+            values = [each.peak for each in found]
+            shown = (*values, order_found(values), extrapolated_peak(*values[-2:]))
+            rows.append((f"{found[-1].z_m_kg:.2f}", *(f"{value:.2f}" for value in shown)))
+    columns = ("Z (m/kg^(1/3))", *(f"{cell_m:g} m" for cell_m in _numbers(sizes)))
+    print_line(markdown_table((*columns, "order found", "extrapolated"), rows))
 
 
 @app.command()

@@ -129,6 +129,27 @@ def free_field_gauges(
     return gauges
 
 
+ORDER: Final = 0.8
+"""Order of convergence with which peaks are extrapolated, fixed beforehand."""
+
+
+def extrapolated_peak(coarse: float, fine: float) -> float:
+    """Return the peak on cells of no size, from two sizes of which one is half of the other.
+
+    Richardson's extrapolation with the fixed `ORDER`.
+    """
+    return fine + (fine - coarse) / float(2.0**ORDER - 1.0)
+
+
+def order_found(peaks: Sequence[float]) -> float:
+    """Return the order of convergence of peaks on three sizes of cells.
+
+    Each size is half of the one before. NaN where the peaks do not approach a limit.
+    """
+    first, second = np.diff(peaks)
+    return float(np.log2(first / second)) if first * second > 0.0 else float("nan")
+
+
 def _phase_end_s(distance_m: float, charge_kg: float) -> float:
     """Return the end of the positive phase by the reference, s."""
     quantities: tuple[Quantity, Quantity] = ("arrival_time", "positive_duration")

@@ -207,6 +207,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.response_sites pictures": "clinic_front",
     "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
     "python -m studies.gas corners": "--sizes 0.5",
+    "python -m studies.gas peaks": "--distances 2.7 --sizes 2,1,0.5",
     "python -m studies.gas handover": "--radii 3,6 --until 0.05",
     "python -m studies.gas settling": "--until 0.02",
     "python -m studies.gas definition --scenario visitor_entrance --sizes 0.5,0.25 --until 0.18": (

@@ -16,7 +16,13 @@ from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending, sites
 from studies.gas.loads import impulse_until, protected_impulse_pa_s, with_heights, yard
 from studies.gas.oblique import oblique_loads
-from studies.gas.reference import free_field, wide_wall
+from studies.gas.reference import (
+    ORDER,
+    extrapolated_peak,
+    free_field,
+    order_found,
+    wide_wall,
+)
 from studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
 from tests.gas_sites import glazed_hut, hut
 
@@ -161,3 +167,11 @@ def test_the_first_wave_is_weaker_behind_corners() -> None:
 def test_a_block_below_a_module_is_named() -> None:
     with pytest.raises(BlastEnvError, match=r"height_m is 0\.2, must be at least 0\.5"):
         corner_waves(0.5, 0.2)
+
+
+def test_peaks_that_converge_with_the_fixed_order_are_extrapolated_to_their_limit() -> None:
+    limit, error = 10.0, 4.0
+    peaks = [limit - error * cell_m**ORDER for cell_m in (1.0, 0.5, 0.25)]
+    assert extrapolated_peak(*peaks[1:]) == pytest.approx(limit)
+    assert order_found(peaks) == pytest.approx(ORDER)
+    assert np.isnan(order_found([1.0, 2.0, 1.5]))
