@@ -14,6 +14,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import Threat
 from blast_env.physics.engine import EndReason
+from blast_env.physics.gas.engine import scaled_distance
 from blast_env.physics.scene import Charge
 from blast_env.recording.parquet import read_parquet
 from tests.gas_sites import WALL, hut
@@ -263,3 +264,18 @@ def test_bad_input_is_named(bare: GasResult) -> None:
         GasEngine(until=1e5).start_on(bare.run.site)
     with pytest.raises(BlastEnvError, match=r"cells is 'large', must be one of 'uniform', 'coarse"):
         blast_env.simulate(HUT, engine="gas", cells="large")
+
+
+@pytest.mark.parametrize(
+    ("charge_m", "base_m", "away_m"),
+    [(0.0, 0.0, 4.0), (1.5, 0.0, 4.0), (5.0, 0.0, 5.0), (0.0, 3.0, 5.0)],
+)
+def test_scaled_distance_is_that_of_the_nearest_point(
+    bare: GasResult, charge_m: float, base_m: float, away_m: float
+) -> None:
+    """4 m away in plan; a charge beside a wall is no farther off than its height in plan."""
+    site = bare.run.site
+    hut = replace(site.structures[0], base_m=base_m, height_m=base_m + 2.0)
+    raised = replace(site, charge=site.charge._replace(height_m=charge_m))
+    found = scaled_distance(raised, hut)
+    assert found == pytest.approx(away_m / site.charge.tnt_kg ** (1.0 / 3.0))

@@ -44,6 +44,7 @@ from blast_env.response.buildings import (
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import worst
 from blast_env.response.facade import FacadeResponse, peak_factor, respond, sharpened
+from blast_env.response.sdof import impulses
 from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.scenario.facade import with_glass
@@ -98,12 +99,9 @@ class BuildingResponse:
 
     @cached_property
     def severity(self) -> Severity:
-        """Severity of the response; its load is the mean positive impulse on the bays, Pa s.
-
-        It is the integral of positive overpressures, averaged by area.
-        """
+        """Severity of the response; its load is the mean impulse on the bays by area, Pa s."""
         facade = self.facade
-        impulses_pa_s = np.trapezoid(np.maximum(facade.pressure_pa, 0.0), facade.time_s, axis=1)
+        impulses_pa_s = impulses(facade.time_s, facade.pressure_pa).max(axis=1)
         areas_m2 = [each.bay.area_m2 for each in facade.bays]
         return Severity(
             4 - facade.level_of_protection,

@@ -240,11 +240,11 @@ class GasRun:
 def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
     """Return the scaled distance of a structure, m/kg^(1/3).
 
-    It combines the distance of the nearest point in plan with the larger of the heights of the
-    charge above the ground and of the structure's base above the charge.
+    The distance is that of its nearest point: in plan, and below its base or above its top.
     """
     distance_m = structure.rectangle_m.distance_to(site.charge.position_m)
-    up_m = max(site.charge.height_m, structure.base_m - site.charge.height_m)
+    height_m, top_m = site.charge.height_m, structure.height_m or site.air_height_m
+    up_m = max(structure.base_m - height_m, height_m - top_m, 0.0)
     return hypot(distance_m, up_m) / cbrt(site.charge.tnt_kg)
 
 
