@@ -74,7 +74,7 @@ def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
         drawn: Number of blasts with a film, maps or walls.
     """
     if not costs:
-        return "nothing to run: all of it is there"
+        return "nothing to run: all results are available"
     blasts = "a blast" if len(costs) == 1 else f"{len(costs)} blasts"
     seconds = sum(each.seconds for each in costs) + drawn * _DRAWING_S
     memory_gb = max(each.memory_bytes for each in costs) / 1e9

@@ -67,7 +67,7 @@ class Design:
             kept, reasons = placing.what_still_stands(scenario, layout)
             layouts.append(kept)
             if reasons:
-                notes.append(f"layout {name}: {len(reasons)} taken away, since {reasons[0]}")
+                notes.append(f"layout {name}: {len(reasons)} removed: {reasons[0]}")
         return replace(self, scenario=scenario, layouts=tuple(layouts)), tuple(notes)
 
     def record(self) -> dict[str, Any]:
@@ -96,7 +96,7 @@ class Design:
         except BlastEnvError:
             raise
         except (KeyError, TypeError, ValueError) as error:
-            raise BlastEnvError(f"{source}: is no design: {error!r}") from error
+            raise BlastEnvError(f"{source}: is not a design: {error!r}") from error
 
 
 @dataclass(frozen=True)
@@ -187,4 +187,4 @@ class History:
                 tuple(step_of(each) for each in record["future"]),
             )
         except (KeyError, TypeError, IndexError) as error:
-            raise BlastEnvError(f"{source}: is no design: {error!r}") from error
+            raise BlastEnvError(f"{source}: is not a design: {error!r}") from error

@@ -291,7 +291,7 @@ def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
         BlastEnvError: If it is the site.
     """
     if thing.kind is ThingKind.SITE:
-        raise BlastEnvError("the site itself cannot be taken away: open another one")
+        raise BlastEnvError("the site itself cannot be deleted: open another one")
 
     def edit(document: Document) -> None:
         table, key = _place_of(document, thing.kind)

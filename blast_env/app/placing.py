@@ -65,7 +65,7 @@ def layout_from(scenario: Scenario, data: Sequence[Sequence[Any]]) -> Layout:
     """
     if scenario.build_zone is None:
         if data:
-            raise LayoutError(f"{scenario.name} has no build zone, so that nothing can stand on it")
+            raise LayoutError(f"{scenario.name} has no build zone: no barrier can be placed")
         return ()
     return scenario.build_zone.catalogue.layout_from([tuple(each) for each in data])
 
@@ -110,7 +110,7 @@ def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
 def _words_of(measure: AnyMeasure, known: Components) -> str:
     """Return a measure in words: `window, 12 mm laminated on office, west, storeys 1`."""
     if isinstance(measure, Removable):
-        return f"takes away {', '.join(measure.structures)}: needs a blast of its own"
+        return f"removes {', '.join(measure.structures)}: needs a new blast"
     names = [each for each in (measure.glazing, measure.wall) if each]
     what = " and ".join(known[name].title or name for name in names)
     where = [*(measure.structures or ("all structures",))]

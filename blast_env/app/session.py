@@ -275,7 +275,7 @@ class Session:
             BlastEnvError: If there is none, or it is not legal on the changed site.
         """
         if status.layout is None:
-            raise BlastEnvError(f"{status.title}: there is no layout to take")
+            raise BlastEnvError(f"{status.title}: there is no layout to use")
         layout = placing.layout_from(self.scenario, status.layout)
         design = self.design.with_layout(layout, slot)
         self.put(f"{status.title} into {SLOTS[slot]}", design)

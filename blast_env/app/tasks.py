@@ -142,7 +142,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
             return
         best = placing.plain(progress.best.layout)
         reduction = 100.0 * problem.reduction(progress.best)
-        text = f"{progress.blasts} of {progress.budget} blasts, best so far {reduction:.1f} % less"
+        text = f"{progress.blasts} of {progress.budget} blasts, best reduction {reduction:.1f} %"
         if best != teller.status.layout:
             teller.tell(share=share, text=text, layout=best)
         elif teller.is_due:
@@ -153,8 +153,8 @@ def _search(task: SearchTask, teller: Teller) -> None:
         raise KeyboardInterrupt
     reduction = 100.0 * problem.reduction(result.history[-1])
     text = (
-        f"{reduction:.1f} % less on the search's own blasts, after {result.blasts} of"
-        f" {result.budget} ({task.engine.label}); blast it for a judgement"
+        f"reduction {reduction:.1f} % on the blasts of the search, after {result.blasts} of"
+        f" {result.budget} ({task.engine.label}); blast the layout to confirm it"
     )
     state = "stopped" if result.interrupted else "done"
     teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
@@ -203,6 +203,6 @@ def _report(task: ReportTask, teller: Teller) -> None:
     written = write_report(study, page, None if task.pdf is None else Path(task.pdf))
     words = f"wrote {' and '.join(path.name for path in written)}"
     if study.stopped:
-        words = f"stopped before: {study.stopped}; {words} with what was done"
+        words = f"stopped before: {study.stopped}; {words} with the finished parts"
     state = "stopped" if study.stopped else "done"
     teller.tell(state=state, share=1.0, text=words, file=str(written[-1]))

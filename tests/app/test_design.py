@@ -41,7 +41,7 @@ def test_what_cannot_stand_on_a_changed_site_falls_away_with_its_reason() -> Non
         edits.added(COURTYARD, ThingKind.KEEP_OUT, (13.0, 5.0), (14.0, 6.0))[0]
     )
     assert after.layouts[0] == ((39, 0),)
-    assert notes == ("layout A: 1 taken away, since cell (0, 0) must stay empty: must stay free",)
+    assert notes == ("layout A: 1 removed: cell (0, 0) must stay empty: must stay free",)
 
 
 @given(st.lists(st.sampled_from("+u<>"), max_size=30))
@@ -114,7 +114,7 @@ def test_a_design_that_was_never_finished_is_none(tmp_path: Path) -> None:
 def test_what_is_no_design_is_refused(tmp_path: Path, content: str) -> None:
     folder = WorkFolder(tmp_path).create(hut(), "begin")
     (folder.path / "design.json").write_text(content)
-    with pytest.raises(BlastEnvError, match="is no design"):
+    with pytest.raises(BlastEnvError, match="is not a design"):
         folder.load()
 
 

@@ -240,6 +240,6 @@ def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) 
     editor.selected = SiteThing(ThingKind.ITEM)
     editor.delete()  # of a catalogue nothing is left, and single modules are placed again
     assert not editor.session.design.layout
-    assert "layout A: 2 taken away" in editor.message
+    assert "layout A: 2 removed" in editor.message
     editor.session.undo()
     assert len(editor.session.design.layout) == 2

@@ -147,8 +147,8 @@ def test_blast_compare_and_take_a_proposal(tmp_path: Path) -> None:
         assert next(iter(proposer.options)) == f"rule {offers.PACKAGED}"
         proposer.value = "rule wall_near_charge"
         user.find(marker="propose").click()
-        await user.should_see("take it")
-        user.find("take it").click()
+        await user.should_see("use it")
+        user.find("use it").click()
         assert session.design.layout != CELLS
         shown = next(iter(user.find(kind=ui.table).elements)).rows
         assert [row["layout"] for row in shown] == ["no barrier"] * 2  # A is another one now
@@ -191,7 +191,7 @@ def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
         session = await opened(user, sessions, hut())
         session.engine = EngineRecord(name="gas", cell_m=0.5)
         session.blast([1])  # an empty one: no barrier
-        await user.should_see("Pa s on what is protected", retries=10)
+        await user.should_see("mean impulse on protected facades: ", retries=10)
         pictures = next(
             each for each in user.find(kind=ui.select).elements if each.props["label"] == "picture"
         )
@@ -292,7 +292,7 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
 
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        choose(user, "site from a file, into this design")
+        choose(user, "replace the site from a file")
         (element,) = user.find(kind=ui.upload).elements
         with user:
             await element.handle_uploads(
@@ -301,7 +301,7 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
         await user.should_see("podium", retries=200)
         assert session.scenario == site
         fields = {each.label: each for each in fields_of(site, SiteThing(ThingKind.STRUCTURE))}
-        for label in ("begins at (m)", "terrace"):
+        for label in ("base height (m)", "terrace"):
             assert fields[label].hint
 
         def shown(kind: type[Any], label: str) -> Any:
@@ -322,10 +322,10 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
         assert shown(ui.switch, "terrace").value is False
         shown(ui.switch, "terrace").value = True
         await user.should_see("must be 0: what carries barriers is solid")
-        begins = field_of(user, "begins at (m)")
+        begins = field_of(user, "base height (m)")
         assert begins.value == "2.5"
         begins.value = "2"
-        user.find("begins at (m)").trigger("blur")
+        user.find("base height (m)").trigger("blur")
         choose(user, "site: scenario file (.toml)")
         saved = (await user.download.next()).content.decode()
         assert Scenario.from_document(tomllib.loads(saved), "saved") == terraced(
@@ -339,7 +339,7 @@ def test_an_unknown_design_leads_to_the_list_with_a_message(tmp_path: Path) -> N
     async def story(user: User, sessions: Sessions) -> None:
         await user.open("/design/nothing")
         await user.should_see("there is no design 'nothing'")
-        await user.should_see("Begin with a site of your own")
+        await user.should_see("Start from a site of your own")
         response = await user.http_client.get("/blasts/nothing/key/000.jpg")
         assert response.status_code == 404
 
@@ -350,7 +350,7 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
         before = session.design
-        choose(user, "site from a file, into this design")
+        choose(user, "replace the site from a file")
         upload = user.find(kind=ui.upload)
         (element,) = upload.elements
         with user:
@@ -367,14 +367,14 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
 def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        choose(user, "site from a file, into this design")
+        choose(user, "replace the site from a file")
         (element,) = user.find(kind=ui.upload).elements
         content = BLOCK.read_bytes()
         with user:
             await element.handle_uploads(
                 [SmallFileUpload(name=BLOCK.name, content_type="", _data=content)]
             )
-        await user.should_see("protected buildings (names, by commas)")
+        await user.should_see("protected buildings (names, separated by commas)")
         mass = field_of(user, "mass of a charge (kg TNT)")
         mass.value = "110 lb"
         user.find(marker="import").click()
@@ -382,7 +382,7 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
         mass.value = "50,5"
         user.find(marker="import").click()
         await user.should_see("no building is protected", retries=200)
-        user.find("protected buildings (names, by commas)").type("Library")
+        user.find("protected buildings (names, separated by commas)").type("Library")
         user.find(marker="import").click()
         await user.should_see(marker="take-site", retries=200)
         await user.should_see("of its outline")
@@ -410,13 +410,13 @@ def test_a_page_that_is_closed_while_a_file_is_read_leaves_nothing(
 
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        choose(user, "site from a file, into this design")
+        choose(user, "replace the site from a file")
         (element,) = user.find(kind=ui.upload).elements
         file = SmallFileUpload(name=BLOCK.name, content_type="", _data=BLOCK.read_bytes())
         with user:
             await element.handle_uploads([file])
-        await user.should_see("protected buildings (names, by commas)")
-        user.find("protected buildings (names, by commas)").type("Library")
+        await user.should_see("protected buildings (names, separated by commas)")
+        user.find("protected buildings (names, separated by commas)").type("Library")
         user.find(marker="import").click()
         await asyncio.sleep(0.1)
         (reading,) = started

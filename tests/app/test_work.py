@@ -319,7 +319,7 @@ def test_a_search_says_how_good_its_layout_is(tmp_path: Path) -> None:
     session.search("random", 12)
     status = state_of(session)
     assert (status.state, status.share) == ("done", 1.0)
-    assert "% less on the search's own blasts" in status.text
+    assert "% on the blasts of the search" in status.text
     session.take(status, 0)
     assert len(session.design.layout) == 16
 
@@ -375,7 +375,7 @@ def test_what_cannot_be_begun_is_refused_at_once(tmp_path: Path) -> None:
     courtyard = session_on(tmp_path, load_scenario("courtyard"))
     with pytest.raises(BlastEnvError, match="budget is 0"):
         courtyard.search("random", 0)
-    with pytest.raises(BlastEnvError, match="no layout to take"):
+    with pytest.raises(BlastEnvError, match="no layout to use"):
         courtyard.take(Status(title="x"), 0)
 
 
@@ -453,7 +453,7 @@ def test_a_search_is_stopped_and_keeps_its_best_and_its_process_goes_on(
     workers.stop(first)
     stopped = wait(workers, first, "stopped")
     assert stopped.layout is not None
-    assert "% less on the search's own blasts" in stopped.text
+    assert "% on the blasts of the search" in stopped.text
     session.take(stopped, 0)
     assert wait(workers, second, "done").layout is not None
     assert workers._processes[0].popen.pid == process
@@ -548,7 +548,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     session.report(tmp_path / "r.html")
     status = state_of(session)
     assert (status.state, status.file) == ("stopped", str(tmp_path / "r.html"))
-    assert status.text == "stopped before: other masses; wrote r.html with what was done"
+    assert status.text == "stopped before: other masses; wrote r.html with the finished parts"
 
 
 def test_a_report_that_is_stopped_may_take_time_to_write(tmp_path: Path) -> None:

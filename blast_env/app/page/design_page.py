@@ -86,7 +86,7 @@ class DesignPage:
                 button.props("flat dense no-caps color=white").tooltip(words)
             self._last = ui.label().classes("be-wide").style("font-size: 12.5px; opacity: 0.85")
             ui.space().classes("be-wide")
-            kept = ui.label("kept at every step").classes("be-wide")
+            kept = ui.label("saved at every step").classes("be-wide")
             kept.style("font-size: 12.5px; opacity: 0.85")
             ui.button("Keys", icon="keyboard", on_click=_show_keys).props(
                 "flat dense no-caps color=white"
@@ -107,15 +107,15 @@ _KEYS = (
         "V P E S Z K C A G",
         "tools: select, place, erase, structure, zone, keep-out, charge, area, gauge",
     ),
-    ("arrow keys", "with Select: move what is selected by 0.5 m; else: move the cell"),
-    ("Enter, space", "place on the cell, or take away what stands there"),
-    ("R", "turn what is placed"),
-    ("Delete, Escape", "delete what is selected; let go"),
+    ("arrow keys", "with Select: move the selection by 0.5 m; otherwise: move the cell"),
+    ("Enter, space", "place an item on the cell, or remove the one there"),
+    ("R", "rotate the item to place"),
+    ("Delete, Escape", "delete the selection; deselect"),
     ("B", "blast"),
     ("Ctrl+Z, Ctrl+Y", "undo, redo"),
-    ("+ - 0", "nearer, farther, whole site"),
+    ("+ - 0", "zoom in, zoom out, whole site"),
     ("right mouse button", "erase, whatever the tool"),
-    ("Tab", "on to the next field or button"),
+    ("Tab", "go to the next field or button"),
 )
 
 

@@ -54,13 +54,13 @@ _FIELDS: Final[Mapping[ThingKind, tuple[FormField, ...]]] = {
         FormField("budget", "budget", optional=True),
         FormField("clearance (m)", "clearance_m"),
         FormField("access way (m)", "width_m", optional=True, inside="access_way"),
-        FormField("way between", "between", "side", optional=True, inside="access_way"),
+        FormField("access way between", "between", "side", optional=True, inside="access_way"),
     ),
     ThingKind.KEEP_OUT: (FormField("reason", "reason", "text"), *_CORNER, *_SIZE),
     ThingKind.COST_AREA: (
         FormField("reason", "reason", "text"),
         FormField("cost of a module", "module_cost", optional=True),
-        FormField("cost of items, times", "cost_factor", optional=True),
+        FormField("cost factor of items", "cost_factor", optional=True),
         *_CORNER,
         *_SIZE,
     ),
@@ -78,7 +78,7 @@ _FIELDS: Final[Mapping[ThingKind, tuple[FormField, ...]]] = {
         FormField("height (m)", "height_m"),
         FormField("cost", "cost"),
         FormField("stock", "stock", "integer"),
-        FormField("may be turned", "rotatable", "switch"),
+        FormField("may be rotated", "rotatable", "switch"),
         FormField("stops vehicles", "stops_vehicles", "switch"),
     ),
     ThingKind.GAUGE: (
@@ -109,7 +109,7 @@ _OF_STRUCTURE: Final = (
     FormField("protected", "protected", "switch"),
     FormField("height (m)", "height_m", optional=True, hint="of its top above the ground"),
     FormField(
-        "begins at (m)",
+        "base height (m)",
         "base_m",
         optional=True,
         hint="height of its underside: 0 on the ground; on a terrace, the terrace's height;"

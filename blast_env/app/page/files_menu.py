@@ -21,9 +21,9 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario
 
 _CELLS: Final[dict[tuple[Cells, Cells], str]] = {
-    (0.5, 0.25): "0.5 and 0.25 m: says what the grid does",
-    (0.5, 0.5): "0.5 m alone: much quicker",
-    ("coarse", "fine"): "coarse and fine: they grow, for sites of 40 m and more",
+    (0.5, 0.25): "0.5 and 0.25 m: shows the grid error",
+    (0.5, 0.5): "0.5 m only: much quicker",
+    ("coarse", "fine"): "coarse and fine: growing cells, for sites of 40 m and more",
 }
 _LEVELS: Final = {
     int(level): f"level of protection: {level.label}"
@@ -50,7 +50,7 @@ class FilesMenu:
         self._after = after
         with _menu("Open", "folder_open"):
             ui.menu_item("all designs, new design", lambda: ui.navigate.to("/"))
-            ui.menu_item("site from a file, into this design", self._open_site)
+            ui.menu_item("replace the site from a file", self._open_site)
             ui.menu_item("layout from a file", self._open_layout)
         with _menu("Save as", "save_alt"):
             ui.menu_item("site: scenario file (.toml)", self._save_site)
@@ -62,8 +62,8 @@ class FilesMenu:
 
     def _open_site(self) -> None:
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[480px]"):
-            ui.label("A site in the place of this one").style("font-weight: 600")
-            ui.label("Layouts stay as far as they may stand there; undo brings all back.")
+            ui.label("Replace the site").style("font-weight: 600")
+            ui.label("Barriers that are legal on the new site stay. Undo restores everything.")
 
             def use(scenario: Scenario, name: str) -> None:
                 dialog.close()
@@ -78,7 +78,7 @@ class FilesMenu:
     def _open_layout(self) -> None:
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[480px]"):
             active = self._session.design.active
-            ui.label(f"A layout file (.json) into layout {SLOTS[active]}")
+            ui.label(f"Open a layout file (.json) as layout {SLOTS[active]}")
 
             async def take(event: events.UploadEventArguments) -> None:
                 file = await read_upload(self._session.workers, event.file, layout_of_file)
@@ -122,7 +122,7 @@ class FilesMenu:
         except BlastEnvError as error:
             complain(error)
             return
-        ui.notify("the film is on its way: it can be downloaded on the right when it is there")
+        ui.notify("the film is being made: download it on the right when it is ready")
 
     def _save_report(self, as_pdf: bool) -> None:
         session = self._session
@@ -151,15 +151,15 @@ class ReportDialog:
             )
             self._cells = ui.select(_CELLS, value=(0.5, 0.25), label="cells of gas dynamics")
             wanted = session.scenario.objective.level or ReportChoice().target
-            self._target = ui.select(_LEVELS, value=wanted, label="has to reach")
+            self._target = ui.select(_LEVELS, value=wanted, label="required level")
             self._target.visible = bool(session.scenario.bays)
-            self._items = ui.switch("what each piece is worth, left out alone", value=True)
+            self._items = ui.switch("contribution of each barrier", value=True)
             for element in (self._cells, self._target):
                 element.props("dense outlined options-dense").classes("w-full")
             self._cost = ui.label().props('aria-live="polite"')
             ui.label(
-                "It can be stopped: what is done by then is written, once the loads with the"
-                " coarser cells are there."
+                "A stopped report keeps its finished parts, once the loads on the coarser cells"
+                " are known."
             ).classes("be-quiet")
             with ui.row():
                 ui.button("begin", on_click=self._begin).props("no-caps")
@@ -189,4 +189,4 @@ class ReportDialog:
         except BlastEnvError as error:
             complain(error)
             return
-        ui.notify("the report is on its way: it can be downloaded on the right when it is there")
+        ui.notify("the report is being made: download it on the right when it is ready")

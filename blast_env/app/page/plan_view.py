@@ -64,15 +64,15 @@ class PlanPanel:
                 button.props("dense flat no-caps size=sm").tooltip(f"{words} (key {key.upper()})")
                 self._buttons[tool] = button
             self._height = NumberField(
-                "its height (m)",
+                "height (m)",
                 self._editor.new_height_m,
                 self._take_height,
                 optional=True,
                 least=0.5,
             )
             self._height.classes("w-32")
-            self._height.tooltip("of a structure that is drawn; empty: as high as the air")
-        ui.label("To draw, take a larger screen: here one looks, blasts and compares.").classes(
+            self._height.tooltip("of a new structure; empty: as high as the air")
+        ui.label("Drawing needs a larger screen; here you can view, blast and compare.").classes(
             "be-quiet be-narrow"
         )
         self._image = ui.interactive_image(
@@ -82,7 +82,7 @@ class PlanPanel:
         ).classes("be-plan")
         self._image.props(
             'tabindex=0 role="application" aria-label="plan of the site: arrow keys move, '
-            'enter places or takes away" oncontextmenu="return false"'
+            'enter places or removes" oncontextmenu="return false"'
         )
         self._image.on(
             "wheel.prevent", self._wheel, ["deltaY", "offsetX", "offsetY"], throttle=0.05
@@ -94,8 +94,8 @@ class PlanPanel:
                 self._words = ui.label()
                 self._reason = ui.label().classes("be-refused")
             for icon, words, act in (
-                ("zoom_in", "nearer (+)", lambda: self._zoom(_ZOOM)),
-                ("zoom_out", "farther (-)", lambda: self._zoom(1.0 / _ZOOM)),
+                ("zoom_in", "zoom in (+)", lambda: self._zoom(_ZOOM)),
+                ("zoom_out", "zoom out (-)", lambda: self._zoom(1.0 / _ZOOM)),
                 ("fit_screen", "whole site (0)", self.fit),
             ):
                 button = ui.button(icon=icon, on_click=act).props("dense flat size=sm")
@@ -253,9 +253,9 @@ class SolidView:
         self._scene = ui.scene(
             width=WIDTH_PX, height=HEIGHT_PX, grid=False, background_color="#eef2f6", fps=15
         ).classes("w-full")
-        ui.label("Drag to turn, wheel to come nearer, right button to shift.").classes("be-quiet")
+        ui.label("Drag to rotate, wheel to zoom, right button to pan.").classes("be-quiet")
         self._see_through = ui.label(
-            "See-through: no height is given, so that it goes up to the air."
+            "Transparent: no height given, up to the top of the air."
         ).classes("be-quiet")
         self._look()
 

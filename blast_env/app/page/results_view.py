@@ -13,8 +13,8 @@ from blast_env.scenario import ObjectiveSection
 
 _FILM: Final = "film"
 _GAUGES: Final = "gauges"
-_NOTHING: Final = "No blast yet for the layouts as they are now: press Blast."
-_RUNNING: Final = "Work is under way: how far it has come is said under Work."
+_NOTHING: Final = "No results yet for the current layouts: press Blast."
+_RUNNING: Final = "Running: the panel Work shows the progress."
 _DAMAGE: Final = "damage of "
 _COLUMNS: Final = (
     ("layout", "layout", "left"),
@@ -35,7 +35,7 @@ _VERDICT_COLUMNS: Final = (
     ("panes", "panes broken", "right"),
     ("condition", "worst pane (GSA)", "left"),
     ("damage", "worst wall panel", "left"),
-    ("flags", "flags of its loads", "left"),
+    ("flags", "flags", "left"),
 )
 # Okabe and Ito, with dashes, so that colour is not the only difference between lines.
 _LINES: Final = (
@@ -90,7 +90,7 @@ class ResultsView:
             self._threats.on_value_change(lambda e: self._set("_threat", e.value))
             for element in (self._pictures, self._threats):
                 element.props("dense outlined options-dense").classes("w-52")
-            bare = ui.switch("no barrier beside", value=True)
+            bare = ui.switch("compare with no barrier", value=True)
             bare.on_value_change(lambda e: self._set("_with_bare", e.value))
             large = ui.switch("large", value=False)
             large.on_value_change(lambda e: self._set("_large", e.value))
@@ -103,15 +103,15 @@ class ResultsView:
             self._verdicts = ui.table(columns=verdict_columns, rows=[], row_key="id")
             self._verdicts.props("dense flat bordered").classes("be-verdicts w-full mb-2")
             self._sharp = ui.label(
-                "Cells clip peaks, and sharper ones count: where the level on the cells is "
-                "higher, take smaller cells."
+                "The level rests on peaks corrected for clipping by the cells. Where the level on "
+                "the cells is higher, use smaller cells."
             ).classes("be-quiet mb-2")
             self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
             self._cards = ui.element("div").classes("be-cards")
             self._chart = ui.column().classes("w-full")
             self._unglazed = ui.label(
-                "Whether windows break and walls fail is said of structures with windows or wall "
-                "panels: choose them on the left, and blast by gas."
+                "For damage of windows and walls, give structures windows or wall panels (on the "
+                "left), and blast with gas dynamics."
             ).classes("be-quiet")
             columns = _columns(self._session.scenario.objective)
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
@@ -222,12 +222,13 @@ class ResultsView:
 
     def _summary(self, record: BlastRecord | None) -> str:
         if record is None or not record.loads:
-            return "" if record is not None else "loads to come"
+            return "" if record is not None else "loads not yet available"
         judge = LoadJudge(self._session.scenario)
-        noun = "" if judge.objective.quantity == "impulse" else f"{judge.objective.noun} "
+        is_impulse = judge.objective.noun == "impulse"
+        noun = "mean impulse on protected facades" if is_impulse else judge.objective.noun
         parts = sum(each.protected for each in self._session.scenario.structures)
-        added = f" ({parts} structures added up by weight)" if parts > 1 else ""
-        return f"{noun}{judge.text(judge.together(record))} on what is protected{added}"
+        added = f" ({parts} structures, weighted)" if parts > 1 else ""
+        return f"{noun}: {judge.text(judge.together(record))}{added}"
 
     def _show_chart(self, threat: NamedThreat) -> None:
         self._chart.clear()

@@ -18,8 +18,8 @@ from blast_env.scenario import Scenario
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
 _SITE: Final = SiteThing(ThingKind.SITE)
 _ADDED: Final = {
-    ThingKind.ITEM: "add an item to the catalogue of what can be placed",
-    ThingKind.MEASURE: "add better glass or walls that a layout can take, at a price",
+    ThingKind.ITEM: "add an item to the catalogue of barriers",
+    ThingKind.MEASURE: "add better glazing or walls that a layout can include at a cost",
 }
 
 
@@ -53,7 +53,7 @@ class SitePanel:
                 for kind, words in _ADDED.items():
                     add = ui.button(kind.value, icon="add", on_click=partial(self._add, kind))
                     add.props("dense outline no-caps size=sm").tooltip(words)
-            ui.label("arrow keys move what is selected by 0.5 m").classes("be-quiet")
+            ui.label("arrow keys move the selection by 0.5 m").classes("be-quiet")
             self._facts = ui.label().classes("be-quiet")
 
     def refresh(self) -> None:
@@ -83,7 +83,7 @@ class SitePanel:
         self._facts.text = " ".join(
             (
                 f"Air {scenario.air_height_m:g} m high.",
-                "Without heights walls go up to it."
+                "Walls without a height reach up to it."
                 if any(each.height_m is None for each in scenario.structures)
                 else "",
             )

@@ -36,9 +36,9 @@ class StartPage:
     def _begin(self, message: str) -> None:
         if message:
             ui.label(message).classes("be-refused")
-        ui.label("Begin with a site of your own").classes("be-head")
+        ui.label("Start from a site of your own").classes("be-head")
         site_upload("drop a file here, or press +", self._sessions.workers, self._create)
-        ui.label("or with one of these").classes("be-head")
+        ui.label("or from a bundled one").classes("be-head")
         for name in bundled_scenarios():
             with ui.row().classes("be-site w-full items-center"):
                 button = ui.button(name, icon="add", on_click=lambda _, n=name: self._bundled(n))
@@ -53,10 +53,10 @@ class StartPage:
             )
 
     def _designs(self) -> None:
-        ui.label("Go on with a design").classes("be-head")
+        ui.label("Continue a design").classes("be-head")
         entries = self._sessions.work.designs()
         if not entries:
-            ui.label("There are none yet.").classes("be-quiet")
+            ui.label("No designs yet.").classes("be-quiet")
         for entry in entries[:_MOST_SHOWN]:
             when = datetime.fromtimestamp(entry.changed_s).strftime("%Y-%m-%d %H:%M")
             if entry.problem:
@@ -66,7 +66,7 @@ class StartPage:
                 ui.link(entry.title, f"/design/{entry.design_id}").style("font-weight: 600")
                 ui.space()
                 ui.label(f"{when}, {entry.design_id}").classes("be-quiet")
-        ui.label(f"kept in {self._sessions.work.path}").classes("be-quiet q-mt-md")
+        ui.label(f"designs are saved in {self._sessions.work.path}").classes("be-quiet q-mt-md")
 
     def _bundled(self, name: str) -> None:
         self._create(load_scenario(name), name)

@@ -27,7 +27,7 @@ _MOST_LETTERS: Final = 100
 def complain(error: BlastEnvError) -> None:
     """Show an error, with all its lines, until the user closes it."""
     with ui.dialog(value=True) as dialog, ui.card().classes("w-[560px] max-w-full"):
-        ui.label("That does not work").style("font-weight: 600; font-size: 16px")
+        ui.label("This could not be done").style("font-weight: 600; font-size: 16px")
         ui.label(str(error)).style("white-space: pre-wrap; overflow-wrap: anywhere")
         ui.label("Nothing was changed; the design is as it was.").classes("be-quiet")
         ui.button("close", on_click=dialog.close).props("autofocus no-caps")
@@ -143,11 +143,11 @@ class ImportDialog:
         with ui.dialog(value=True) as self._dialog, ui.card().classes("w-[560px] max-w-full gap-2"):
             ui.label(f"Import {file.name}").style("font-weight: 600; font-size: 16px")
             with ui.grid(columns=2).classes("w-full gap-2"):
-                self._protect = _text("protected buildings (names, by commas)")
+                self._protect = _text("protected buildings (names, separated by commas)")
                 self._near = _text("or the building nearest to x, y of the file")
                 self._charges = _text("charges at x, y; x, y of the file (or its streets)")
                 self._tnt = _number("mass of a charge (kg TNT)", 100.0)
-                self._around = _number("build zone around what is protected (m)", 10.0)
+                self._around = _number("build zone around the protected buildings (m)", 10.0)
                 self._stock = _number("stock of modules", 20.0, whole=True)
                 self._wall = _number("height of modules (m)", 3.0)
                 self._height = _number("height of buildings without one (m)", None, optional=True)
@@ -208,7 +208,7 @@ class ImportDialog:
                 area, apart = building.deviation.area_share, building.deviation.outline_m
                 name = f"{building.name}, protected" if building.protected else building.name
                 ui.label(
-                    f"{name}: its modules miss {area:.1%} of its area, {apart:.2f} m of its outline"
+                    f"{name}: modules off by {area:.1%} of its area, {apart:.2f} m of its outline"
                 ).classes("be-quiet")
             for note in found.notes:
                 ui.label(f"note: {note}").classes("be-quiet")
@@ -218,7 +218,7 @@ class ImportDialog:
                 self._use(found.scenario, self._file.name)
 
             with ui.row():
-                ui.button("take this site", on_click=take).props("no-caps autofocus").mark(
+                ui.button("use this site", on_click=take).props("no-caps autofocus").mark(
                     "take-site"
                 )
                 ui.button("cancel", on_click=dialog.close).props("flat no-caps")
@@ -250,6 +250,6 @@ def _places(text: str) -> list[tuple[float, float]]:
         try:
             x, y = (plain_number("a coordinate", value.strip()) for value in part.split(","))
         except ValueError:
-            raise BlastEnvError(f"{part!r} is no place: write x, y; x, y") from None
+            raise BlastEnvError(f"{part!r} is not a list of places: write x, y; x, y") from None
         places.append((x, y))
     return places

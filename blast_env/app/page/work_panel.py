@@ -29,11 +29,11 @@ _ENGINES: Final = {
     "gas 0.25": (EngineRecord(name="gas", cell_m=0.25), "gas, cells of 0.25 m (16 times as long)"),
     "gas coarse": (
         EngineRecord(name="gas", cells="coarse"),
-        "gas, coarse cells that grow: for sites of 40 m and more",
+        "gas, coarse growing cells: for sites of 40 m and more",
     ),
     "gas fine": (
         EngineRecord(name="gas", cells="fine"),
-        "gas, fine cells that grow: for final statements there",
+        "gas, fine growing cells: for final results there",
     ),
     "particles": (EngineRecord(name="event"), "particles: a first look"),
 }
@@ -146,10 +146,10 @@ class WorkPanel:
             clear.props('aria-label="clear this layout"').tooltip("clear this layout")
         self._counted = ui.label().classes("be-quiet")
         self._palette = ui.select(
-            {}, label="what is placed", on_change=lambda e: self._item(e.value)
+            {}, label="item to place", on_change=lambda e: self._item(e.value)
         )
         self._palette.props("dense outlined options-dense").classes("w-full be-whole")
-        self._turned = ui.switch("turned (key R)", on_change=lambda e: self.turn(e.value))
+        self._turned = ui.switch("rotated (key R)", on_change=lambda e: self.turn(e.value))
         self._measures = ui.column().classes("w-full gap-0")
         self._measures_shown: object = None
 
@@ -204,7 +204,7 @@ class WorkPanel:
         design = self._session.design
         empty = [k for k, layout in enumerate(design.layouts) if not layout and k != design.active]
         if not empty:
-            ui.notify("all four layouts are taken: clear one first", type="warning")
+            ui.notify("all four layouts are in use: clear one first", type="warning")
             return
         self._try(
             lambda: self._session.put(
@@ -277,7 +277,7 @@ class WorkPanel:
     def _take(self, status: Status) -> None:
         active = self._session.design.active
         if self._try(lambda: self._session.take(status, active)):
-            ui.notify(f"taken into layout {SLOTS[active]}", type="positive")
+            ui.notify(f"copied into layout {SLOTS[active]}", type="positive")
 
     def _stop(self, folder: Path) -> None:
         self._session.workers.stop(folder)
@@ -344,7 +344,7 @@ class WorkPanel:
         self._measures.clear()
         with self._measures:
             if offers:
-                ui.label("measures: what hardens needs no new blast").classes("be-quiet")
+                ui.label("measures: hardening needs no new blast").classes("be-quiet")
             for each in offers:
                 act = partial(self._harden, each.name)
                 switch = ui.switch(each.label, value=each.is_taken)
@@ -397,7 +397,7 @@ class WorkPanel:
                     stop = ui.button("stop", icon="stop", on_click=partial(self._stop, folder))
                     stop.props("dense outline no-caps size=sm")
                 if status.layout is not None:
-                    words = "take it" if status.is_over else "take best so far"
+                    words = "use it" if status.is_over else "use the best so far"
                     take = ui.button(words, icon="input", on_click=lambda: self._take(card.status))
                     take.props("dense outline no-caps size=sm")
                 if status.file and status.state in ("done", "stopped"):
