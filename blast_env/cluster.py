@@ -226,13 +226,13 @@ def _told(error: BaseException) -> BaseException:
 
     if isinstance(error, KilledWorker):
         told = BlastEnvError(
-            f"cluster: a piece of work has ended {error.allowed_failures + 1} workers, for want "
+            f"cluster: one task has ended {error.allowed_failures + 1} workers, for lack "
             f"of memory or because they were killed; the last one was {error.last_worker.address}"
         )
     elif isinstance(error, CancelledError | CommClosedError):
         told = BlastEnvError(
-            "cluster: the connection to the scheduler was lost; what is done is kept where the "
-            "command has a folder for it, and the same command goes on"
+            "cluster: the connection to the scheduler was lost; results so far are kept if the "
+            "command has a folder for them, and the same command resumes"
         )
     else:
         return error

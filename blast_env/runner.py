@@ -118,6 +118,6 @@ def _parallel(
         yield from parallel(joblib.delayed(function)(item) for item in items)
     except BrokenExecutor as error:
         raise BlastEnvError(
-            "a worker process has ended, for want of memory or because it was killed; what is "
-            "done is kept where the command has a folder for it, and the same command goes on"
+            "a worker process has ended, for lack of memory or because it was killed; results so "
+            "far are kept if the command has a folder for them, and the same command resumes"
         ) from error

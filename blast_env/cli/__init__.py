@@ -11,34 +11,32 @@ class _Commands(LazyGroup):
     """All commands, in the order in which help lists them."""
 
     summaries = {  # noqa: RUF012  # annotated in the base class
-        "simulate": "Run one blast and print what each structure took.",
-        "validate": "Check scenario files: what is wrong with each, or what it is (not) good for.",
+        "simulate": "Run one blast and print the load on each structure.",
+        "validate": "Check scenario files for errors, and print the uses and limits of each.",
         "draw": "Draw the plan and the oblique view of a site, with a layout if one is given.",
         "calibrate": (
             "Run blasts at many distances, fit the three laws, and store one as a calibration."
         ),
         "evaluate": "Compare layouts with no barrier, both exposed to the same threats.",
-        "assess": "Say what charges do to the buildings: panes, panels, level of protection.",
+        "assess": "Assess the damage of buildings by charges: panes, panels, level of protection.",
         "advise": (
-            "Say what a budget buys by keeping the charge away, shielding, hardening, and all "
-            "together."
+            "Compare the protection for a budget: stand-off, shielding, hardening, and all "
+            "combined."
         ),
         "search": "Search for the layout with the least load on the protected structures.",
         "bench": "Time blasts and the environment on this machine, and measure the memory.",
-        "train": (
-            "Train an agent that proposes layouts, or go on with a training that was interrupted."
-        ),
+        "train": ("Train an agent that proposes layouts, or resume an interrupted training."),
         "league": (
             "Compare searches, rules and trained agents on the same held-out cases and seeds."
         ),
-        "judge": "Play submissions to the benchmark again by gas dynamics, and show the standings.",
+        "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
         "propose": "Propose a layout for any site, with a catalogue in seconds without a blast.",
-        "report": "Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.",
+        "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",
         "play": (
-            "Place barriers by hand, with mouse and keyboard, and see what the blast makes of them."
+            "Place barriers by hand, with mouse and keyboard, and watch their effect on the blast."
         ),
-        "paper": "Work out the paper's Tables 1 to 4 and Figure 5 again, from its own columns.",
-        "import": "Make a scenario of a map or drawing: GeoJSON, OpenStreetMap, DXF.",
+        "paper": "Recompute the paper's Tables 1 to 4 and Figure 5 from its own columns.",
+        "import": "Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.",
         "app": (
             "Open a local web page to design on: draw a site, place barriers, blast, compare, "
             "search."

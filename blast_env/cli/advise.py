@@ -42,7 +42,7 @@ _HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judge
 
 @dataclass(frozen=True, kw_only=True)
 class AdviseCommand(ChargeOptions):
-    """Say what a budget buys by keeping the charge away, shielding, hardening, and all together.
+    """Compare the protection for a budget: stand-off, shielding, hardening, and all combined.
 
     For each kind the command searches for the cheapest layout that reaches the target, by gas
     dynamics, or for the one with the least shortfall if none does. The layouts found are judged
@@ -52,18 +52,18 @@ class AdviseCommand(ChargeOptions):
     """
 
     scenario: str = argument(SCENARIO_HELP)
-    budget_cost: float | None = option(None, "What may be spent, else the zone's budget.")
+    budget_cost: float | None = option(None, "Most that may be spent; else the zone's budget.")
     target: str | None = option(None, TARGET_HELP.format("medium"))
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     budget: int = option(60, "Most blasts of a search.", min=1)
     rounds: int = option(3, "Most searches for each kind.", min=1)
-    seed: int = option(0, "Decides what is drawn.", min=0)
+    seed: int = option(0, "Seed of the draws.", min=0)
     processes: int = option(1, "Worker processes.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
-    judge_cell_m: float = option(0.25, "Side of the cells that judge what was found, m.")
+    judge_cell_m: float = option(0.25, "Side of the cells for judging the layouts found, m.")
     judge_cells: str | None = option(
-        None, "The same as --cells, for what judges what was found.", show_default="uniform"
+        None, "The same as --cells, for judging the layouts found.", show_default="uniform"
     )
     out: Path | None = option(
         None, "Layout file of the best layout of all: .json.", writes=(".json",)
@@ -87,12 +87,12 @@ class AdviseCommand(ChargeOptions):
         )
         if self.budget < len(threats):
             raise BlastEnvError(
-                f"budget is {self.budget} blasts, must be at least {len(threats)}: one a charge"
+                f"budget is {self.budget} blasts, must be at least {len(threats)}: one per charge"
             )
         kinds = kinds_for(scenario)
         print_line(
             f"{len(kinds)} kinds, at most {self.rounds} searches of {self.budget} blasts each, "
-            f"{engine.words}; what each finds is judged with {len(threats)}, {judge.words}"
+            f"{engine.words}; each result is judged with {len(threats)}, {judge.words}"
         )
         charges = [threat.charge for threat in threats]
         judged: dict[Layout, Consequences] = {}
@@ -140,7 +140,7 @@ class AdviseCommand(ChargeOptions):
             for point in [searched[layout]]
         ]
         charges = len(next(iter(judged.values())).barriers)
-        title = f"{scenario.name}: what each step up costs, the worst of {charges} charges"
+        title = f"{scenario.name}: cost of each higher level, worst of {charges} charges"
         figure = cost_level_figure(tried, pairs, target, title, (engine.words, judge.words))
         print_line(f"wrote {save_figure(figure, path)}")
 
@@ -170,9 +170,7 @@ class AdviseCommand(ChargeOptions):
         print_line(_answer(scenario, target, best, found, judged))
         for note in judged[best.layout].notes:
             print_line(f"flag: {note}")
-        title = (
-            f"{scenario.name}: what {scenario.zone.budget:g} buys, level {target.label!r} wanted"
-        )
+        title = f"{scenario.name}: budget {scenario.zone.budget:g}, required level {target.label!r}"
         table = ResultTable(title, _HEADERS, text_columns=2)
         for each in found:
             seen = judged[each.layout]

@@ -201,7 +201,7 @@ def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
     result_console().print(table)
     outside = int((~cases["in_range"]).sum())
     if outside:
-        print_line(f"note: {outside} threats are outside the range of the calibration (~)")
+        print_line(f"note: {outside} threats are outside the range of the calibration (marked ~)")
     print_means(comparison, objective)
     if engine.needs_calibration:
         calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)

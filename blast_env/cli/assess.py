@@ -66,7 +66,7 @@ _NEIGHBOURS: Final = (
 
 @dataclass(frozen=True, kw_only=True)
 class AssessCommand(ChargeOptions):
-    """Say what charges do to the buildings: panes, panels, level of protection.
+    """Assess the damage of buildings by charges: panes, panels, level of protection.
 
     Gas dynamics runs one blast per charge, with and without the layout; the barrier is judged as
     well. A structure needs a facade in the scenario file; one without is judged as an ordinary
@@ -80,7 +80,7 @@ class AssessCommand(ChargeOptions):
     cell_m: float | None = option(None, CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     without_fallen: bool = option(
-        False, "Take pieces away that overturn before a blast is over, and run it again."
+        False, "Remove pieces that overturn before the blast is over, and run it again."
     )
     picture: Path | None = option(
         None, "Picture of the facades under the worst charge: .png, .svg, .pdf.", writes=PICTURES

@@ -53,7 +53,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
         "15,30,45,60,75,90,105,120", "Distances from charge to facade, m, separated by commas."
     )
     seeds: int = option(16, "Blasts at each distance.", min=2)
-    first_seed: int = option(1000, "The seeds count from here.", min=0)
+    first_seed: int = option(1000, "First seed.", min=0)
     scenario: str = option("free_field", "A scenario with one point charge and one structure.")
     preset: str | None = option(None, "Parameters of this name.")
     engine: str = option("pymunk", f"{' or '.join(CALIBRATED_ENGINES)}.")
@@ -69,7 +69,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
         "hemispherical", "For Kingery-Bulmash: hemispherical or spherical.", metavar="BURST"
     )
     tnt_kg: float | None = option(
-        None, "Its mass, kg TNT, instead of the scenario's.", metavar="KG"
+        None, "Mass of the charge, kg TNT, instead of the scenario's.", metavar="KG"
     )
     tnt_range: str | None = option(
         None, "LOW,HIGH: masses, kg, for which the law shall hold by scaling."
@@ -78,7 +78,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
 
     def how_to_resume(self) -> str:
         """Return the way to resume after Ctrl-C."""
-        return "the same command goes on from the blasts that are finished"
+        return "the same command resumes after the finished blasts"
 
     @property
     def stem(self) -> str:

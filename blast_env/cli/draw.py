@@ -28,7 +28,7 @@ class DrawCommand(Command):
     view: str = option("both", "both, plan or oblique.")
     corner: str | None = option(
         None,
-        "Corner over which one looks: southwest, southeast, northeast, northwest.",
+        "Corner of the viewpoint: southwest, southeast, northeast, northwest.",
         flag="--from",
         show_default="on the side of the charges",
     )

@@ -27,7 +27,7 @@ class EvaluateCommand(EvaluateOptions):
     """
 
     layout: Path | None = option(None, "JSON file of the (row, column) cells.")
-    run: Path | None = option(None, "Folder of a training run: evaluate what its agent proposes.")
+    run: Path | None = option(None, "Folder of a training run, whose agent proposes the layouts.")
     scenario: str | None = option(
         None, "Bundled name, or a scenario file, for --layout.", show_default=_SCENARIO
     )
@@ -41,7 +41,7 @@ class EvaluateCommand(EvaluateOptions):
             elif self.layout is not None:
                 self._evaluate_file(self.layout)
             else:
-                raise BlastEnvError("--layout or --run is missing: what is to be evaluated")
+                raise BlastEnvError("--layout or --run is missing: give the layouts to evaluate")
 
     def _evaluate_file(self, path: Path) -> None:
         scenario = load_scenario(self.scenario or _SCENARIO)
@@ -57,7 +57,7 @@ class EvaluateCommand(EvaluateOptions):
                 "--layout and --run exclude each other: a run's agent proposes the layouts"
             )
         if self.scenario is not None:
-            raise BlastEnvError("--scenario cannot be used with --run: the run folder says it")
+            raise BlastEnvError("--scenario cannot be used with --run: the run folder contains it")
         # Here, because runs need the extras.
         with import_extra("agents,render", "--run"):
             from blast_env.cli.agent_runs import evaluate_run

@@ -59,9 +59,9 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
     seeds: int = option(32, "Number of threats.", min=1)
     first_seed: int | None = option(
         None,
-        "The seeds count from here.",
+        "First seed.",
         min=0,
-        show_default="the first one that no training and no search meets",
+        show_default="the first one outside training and search",
     )
     engine: str = option(JUDGE, ENGINE_HELP)
     cell_m: float | None = option(None, CELL_HELP)

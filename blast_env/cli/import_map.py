@@ -28,7 +28,7 @@ _HEADERS = (
 
 @dataclass(frozen=True, kw_only=True)
 class ImportCommand(ImportOptions, Command):
-    """Make a scenario of a map or drawing: GeoJSON, OpenStreetMap, DXF.
+    """Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.
 
     The site is turned to the direction of most walls, and buildings are cut into modules of 0.5 m;
     the table gives the deviation of each building from its outline.

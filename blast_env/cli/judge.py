@@ -43,7 +43,7 @@ _OWN_SITES: Final = 8
 
 @dataclass(frozen=True, kw_only=True)
 class JudgeCommand(ProcessOptions, CacheOptions):
-    """Play submissions to the benchmark again by gas dynamics, and show the standings.
+    """Run submissions to the benchmark again by gas dynamics, and show the standings.
 
     A submission is a file of layouts. Without one, the command shows the standings that come with
     the package. With --method, it first runs your method and writes its submission.
@@ -64,10 +64,10 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         None, "Judge --method on generated sites that only this text can draw."
     )
     sites: int = option(_OWN_SITES, "How many sites --secret draws.", min=1)
-    search_cell_m: float = option(0.5, "Side of the cells that --method meets, m.")
+    search_cell_m: float = option(0.5, "Side of the cells for --method, m.")
     cell_m: float = option(JUDGE_CELL_M, "Side of the judge's cells, m.")
     out: Path | None = option(
-        None, "Folder for the submission of --method and for what was judged.", writes=FOLDER
+        None, "Folder for the submission of --method and for the judged submissions.", writes=FOLDER
     )
 
     page: Path | None = option(None, "Write the standings as a page: .md.", writes=(".md",))
@@ -75,7 +75,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
     def how_to_resume(self) -> str:
         """Return the way to resume after Ctrl-C: from the written runs, if there are any."""
         kept = super().how_to_resume()
-        through = "the same command goes on with the runs that are through"
+        through = "the same command resumes after the completed runs"
         return kept if self.out is None or self.method is None else f"{through}; {kept}"
 
     def __call__(self) -> None:

@@ -45,7 +45,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
 
     out: Path = option(
         ...,
-        "Folder for tables, figures and results; goes on with what it has.",
+        "Folder for tables, figures and results; results already in it are kept.",
         writes=FOLDER,
     )
     track: str = option("known", f"known, hidden, vehicle, {', '.join(FAMILIES)} or all.")
@@ -53,11 +53,11 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
     seeds: int = option(16, "Held-out threats of a case; 4 times as many where there is one.")
     budgets: str = option("50,200,1000", "Blasts a search may spend on a case.")
     methods: str = option(
-        "random,greedy,annealing,genetic", f"Search methods, of {', '.join(proposers())}."
+        "random,greedy,annealing,genetic", f"Search methods: {', '.join(proposers())}."
     )
     method: tuple[str, ...] = option(
         (),
-        "An optimiser of one's own, for the same budgets; may be given again. Its blasts are "
+        "Your own optimiser, for the same budgets; may be given again. Its blasts are "
         "counted, and refused beyond the budget.",
         metavar="MODULE:OBJECT",
     )
@@ -94,7 +94,7 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
 
     def how_to_resume(self) -> str:
         """Return the way to resume after Ctrl-C."""
-        return "the same command goes on with what is through"
+        return "the same command resumes after the completed part"
 
     def __call__(self) -> None:
         """Play the tracks, and write the results."""
@@ -187,7 +187,7 @@ def _print_outlook(contests: "Sequence[Contest]") -> None:
         print_line(
             f"{contest.track.name}: up to {outlook.search_blasts:,} blasts of searches and "
             f"{outlook.held_out_blasts:,} on held-out threats; {outlook.kept_searches} of "
-            f"{outlook.searches} searches are through already"
+            f"{outlook.searches} searches are complete already"
         )
     print_line(f"up to {total:,} blasts in all")
 

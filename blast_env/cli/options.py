@@ -50,14 +50,14 @@ BY_SITE: Final = f"{JUDGE} where the site states heights, else particles"
 CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
 CELLS_HELP: Final = (
     "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
-    "for search; fine: later, for final statements."
+    "for search; fine: later, for final results."
 )
 UNTIL_HELP: Final = (
     "Loads that a blast of gas dynamics waits for. structures: those protected; walls: all; "
     "gauges; or a number of seconds."
 )
-TARGET_HELP: Final = "Level of protection to reach, else the scenario's, else {}."
-CVAR_HELP: Final = "0.8: the mean of the worst 20 %, beside or instead of that of all."
+TARGET_HELP: Final = "Required level of protection; else the scenario's, else {}."
+CVAR_HELP: Final = "Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
 
 
 def wanted_level(
@@ -84,10 +84,10 @@ class ChargeOptions(Command):
     """The place and the mass of the charge, if the user gives them."""
 
     charge_m: tuple[float, float] | None = option(
-        None, "Where the charge is, m, instead of drawing it.", metavar="X Y"
+        None, "Place of the charge, m, instead of a drawn one.", metavar="X Y"
     )
     tnt_kg: float | None = option(
-        None, "Its mass, kg TNT, instead of the scenario's.", metavar="KG"
+        None, "Mass of the charge, kg TNT, instead of the scenario's.", metavar="KG"
     )
 
     def fixed(self, scenario: Scenario, drawn: AnyCharge) -> AnyCharge:
@@ -135,15 +135,15 @@ class CacheOptions(Command):
         """Return the way to resume after Ctrl-C: from the cached blasts, if there is a cache."""
         if self.cache is None:
             return "with --cache FOLDER the blasts would have been kept for the next call"
-        return f"the same command goes on with the blasts that are kept in {self.cache}"
+        return f"the same command resumes with the blasts kept in {self.cache}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class JsonOptions(Command):
     """The result as JSON, short or complete."""
 
-    as_json: bool = option(False, "Print the result as JSON, in short.", flag="--json")
-    json_all: bool = option(False, "Print as JSON all that there is to know of it.")
+    as_json: bool = option(False, "Print a summary of the result as JSON.", flag="--json")
+    json_all: bool = option(False, "Print the complete result as JSON.")
 
     def __post_init__(self) -> None:
         """Refuse both at once.

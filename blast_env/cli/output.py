@@ -287,8 +287,8 @@ def percent(share: float) -> str:
 
 
 _PIECE_HEADERS: Final = (
-    *("piece", "what it does", "mass (kg)", "peak push (kPa)", "push (Pa s)"),
-    *("slides (m)", "tilt, 1 overturns", "overturns at (ms)"),
+    *("piece", "response", "mass (kg)", "net peak (kPa)", "net impulse (Pa s)"),
+    *("sliding (m)", "tilt (1: overturned)", "overturned at (ms)"),
 )
 _MOST_PIECES: Final = 12
 
@@ -319,7 +319,7 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
         )
     result_console().print(table)
     if len(ordered) > _MOST_PIECES:
-        print_line(f"and {len(ordered) - _MOST_PIECES} more pieces that move less")
+        print_line(f"and {len(ordered) - _MOST_PIECES} more pieces with smaller movements")
 
 
 def outcome_counts(pieces: "pd.DataFrame") -> dict[str, int]:

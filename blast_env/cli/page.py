@@ -27,7 +27,7 @@ class AppCommand(Command):
         flag="--allow-host",
     )
     runs: tuple[Path, ...] = option(
-        (), "Run folder of a trained agent to ask; more than one will do.", flag="--run"
+        (), "Run folder of a trained agent to ask; may be given again.", flag="--run"
     )
 
     def __call__(self) -> None:

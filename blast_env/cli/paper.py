@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # takes a third of a second to import
 
 @dataclass(frozen=True, kw_only=True)
 class PaperCommand(Command):
-    """Work out the paper's Tables 1 to 4 and Figure 5 again, from its own columns.
+    """Recompute the paper's Tables 1 to 4 and Figure 5 from its own columns.
 
     Nothing is simulated. The command gives the deviation from the printed cells of each table, and
     the contradictions in the paper.

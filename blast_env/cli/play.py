@@ -12,7 +12,7 @@ from blast_env.scenario import load_scenario
 
 @dataclass(frozen=True, kw_only=True)
 class PlayCommand(Command):
-    """Place barriers by hand, with mouse and keyboard, and see what the blast makes of them."""
+    """Place barriers by hand, with mouse and keyboard, and watch their effect on the blast."""
 
     scenario: str = argument(SCENARIO_HELP, default="courtyard")
     seed: int = option(0, "Of the first episode.", min=0)

@@ -50,12 +50,12 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
     """
 
     scenario: str = argument(SCENARIO_HELP)
-    verify: bool = option(False, "Judge it by gas dynamics, beside no barrier and the rules.")
+    verify: bool = option(False, "Compare it by gas dynamics with no barrier and the rules.")
     budget: int | None = option(
         None,
-        "Most blasts of gas dynamics, for --verify or for the best rule; fewer rules, then fewer "
-        "charges are compared.",
-        show_default="all that there are to run",
+        "Most blasts of gas dynamics, for --verify or for the best rule: limits the rules, then "
+        "the charges that are compared.",
+        show_default="as many as are needed",
         min=2,
     )
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
@@ -82,7 +82,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         """Return the charge at the user's place; `None` without one."""
         if self.charge_m is None:
             if self.tnt_kg is not None:
-                raise BlastEnvError("--tnt-kg is given without --charge: where is it?")
+                raise BlastEnvError("--tnt-kg is given without --charge, the place of the charge")
             return None
         middle = expected_charge(scenario.charge)
         tnt_kg = middle.tnt_kg if self.tnt_kg is None else self.tnt_kg
@@ -121,7 +121,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         if chosen.budget:
             return chosen, result
         ms = MS_PER_S * (perf_counter() - began_s)
-        words = "" if self.verify else " (--verify says what it is worth)"
+        words = "" if self.verify else " (--verify evaluates it)"
         return chosen, replace(result, by=f"{result.by}{words}, in {ms:,.0f} ms")
 
     def _verify(self, problem: LayoutProblem, layout: Layout) -> None:
@@ -146,9 +146,9 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         _print_verdict(by_name, case)
         left_out = [name for name in rules if name not in layouts]
         if left_out:
-            print_line(f"note: not compared for want of blasts: {', '.join(left_out)}")
+            print_line(f"note: not compared, for lack of blasts: {', '.join(left_out)}")
         if len(case.threats) < len(problem.threats):
-            print_line(f"note: {len(case.threats)} of {len(problem.threats)} charges were met")
+            print_line(f"note: {len(case.threats)} of {len(problem.threats)} charges were used")
 
     def _write(
         self, scenario: Scenario, layout: Layout, source: Mapping[str, str], out: Path

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class ReportCommand(ProcessOptions, CacheOptions):
-    """Report on a layout by gas dynamics: HTML that needs nothing else, and PDF.
+    """Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.
 
     The verdict comes first, then the assumptions: site and threats, bill of quantities, loads with
     two sizes of cells, damage, film stills, the worth of each item, other masses and places, the
@@ -42,7 +42,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
     pdf: Path | None = option(None, "The same as PDF: .pdf.", writes=(".pdf",))
     charges: tuple[tuple[float, float, float], ...] = option(
         (),
-        "A threat, site metres and kg TNT; more than one will do.",
+        "A threat, site metres and kg TNT; may be given again.",
         flag="--charge",
         metavar="X,Y,KG",
         show_default="of each charge source the worst of its places with the layout",
@@ -56,7 +56,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
     )
     limits: tuple[str, ...] = option(
         (),
-        "What a building may take, in the units of the report; one may be left out.",
+        "Largest permissible load of a building, in the units of the report; one may be left out.",
         flag="--limit",
         metavar="NAME=IMPULSE,PEAK",
     )
@@ -64,7 +64,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
     units: str = option("si", "si (Pa s, kPa) or psi (psi ms, psi).")
     front: Path | None = option(None, "front.csv of `blast-env search --method nsga2`.")
     places: int = option(5, "Other places of each charge source.")
-    items: bool = option(True, "Rank what each module or piece is worth.")
+    items: bool = option(True, "Rank the contribution of each module or piece.")
     stills: int = option(4, "Moments of the film, 0 to 12.")
 
     def __call__(self) -> None:
@@ -92,7 +92,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         print_written(write_report(study, self.out, self.pdf))
         if study.stopped:
             raise InterruptedCommandError(
-                f"{self.out} has what was done before: {study.stopped}", self.how_to_resume()
+                f"{self.out} has the parts finished before: {study.stopped}", self.how_to_resume()
             )
 
     def how_to_resume(self) -> str:

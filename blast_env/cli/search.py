@@ -91,30 +91,30 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
     budget: int = option(DEFAULT_BUDGET, "Most blasts that may be spent.", min=1)
     seed: int = option(0, "Decides threats and search.", min=0)
     threat: ThreatName = option(
-        "visible", "One charge that is known, or a layout for wherever it may be."
+        "visible", "visible: one known charge; hidden: a layout for all possible charges."
     )
     threats: int | None = option(None, "Charges of a hidden threat; 16 unless given.", min=1)
     realisations: int | None = option(
         None,
-        "Blasts of particles a charge; 2 (visible) or 1 (hidden) unless given.",
+        "Particle blasts per charge; 2 (visible) or 1 (hidden) unless given.",
         min=1,
     )
     risk: str | None = option(
         None,
         "mean, cvar or worst, over the charges.",
-        show_default="as the scenario's objective says",
+        show_default="as in the scenario's objective",
     )
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     engine: str = option(JUDGE, ENGINE_HELP)
     cell_m: float | None = option(None, CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
-    start_from: tuple[Path, ...] = option((), "Layout file to begin with; more than one will do.")
+    start_from: tuple[Path, ...] = option((), "Initial layout file; may be given again.")
     surrogate: Path | None = option(
         None,
         "File of the surrogate for --method surrogate (studies.surrogate fit).",
         show_default="the package's",
     )
-    held_out: int = option(32, "Threats that the result is checked on at the end.", min=1)
+    held_out: int = option(32, "Number of threats for the final check of the result.", min=1)
     out: Path | None = option(
         None, "Folder for layout, its plan, history, front and figure.", writes=FOLDER
     )
@@ -301,8 +301,8 @@ def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
     result_console().print(table)
     if checked is None:
         print_line(
-            "no threat is held out: by this engine a charge is one blast, and the search has met "
-            "every charge; `evaluate` judges with others"
+            "no threat is held out: with this engine a charge is one blast, and the search used "
+            "every charge; `evaluate` takes other charges"
         )
     print_line(
         f"{layout_counts(result.layout, of=problem.stock)}; {result.blasts} of {result.budget} "

@@ -58,7 +58,7 @@ _PARTICLES_PANEL: Final = "Particles only"
 
 @dataclass(frozen=True, kw_only=True)
 class SimulateCommand(ChargeOptions, JsonOptions):
-    """Run one blast and print what each structure took.
+    """Run one blast and print the load on each structure.
 
     Each picture shows the same for either engine: --film the spread of the blast, --heat-map the
     places of the load, --history its course over time.
@@ -76,7 +76,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
     )
     heat_map: Path | None = option(
         None,
-        "Write a picture of the load on what is protected, by place: .png, .svg, .pdf.",
+        "Write a picture of the load over the protected facades: .png, .svg, .pdf.",
         writes=PICTURES,
     )
     history: Path | None = option(
@@ -102,7 +102,7 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         panel=_GAS_PANEL,
     )
     quantity: str | None = option(
-        None, "impulse or peak: what --heat-map shows.", show_default="impulse", panel=_GAS_PANEL
+        None, "Quantity of --heat-map: impulse or peak.", show_default="impulse", panel=_GAS_PANEL
     )
     gauge: str | None = option(
         None,
@@ -330,7 +330,8 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         self.print_table(scene.charge, f"seed {blast.seed}", rows)
         notes = {str(each["error"]) for each in scaled.values() if "error" in each}
         for name, each in scaled.items():
-            notes |= {f"outside the calibration (~): {name}, {text}" for text in _notes(each)}
+            where = f"outside the range of the calibration (marked ~): {name}"
+            notes |= {f"{where}, {text}" for text in _notes(each)}
         what = f"{len(scene.balls):,} balls"
         texts = [f"impulse (Pa s): {note}" for note in sorted(notes)]
         texts += blast.scenario.height_notes
@@ -478,10 +479,10 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         charge = result.run.site.charge
         self.print_table(charge, f"{charge.height_m:g} m high", rows)
         _print_gauges(result.gauges)
-        print_pieces(result.pieces, "does the barrier stand")
+        print_pieces(result.pieces, "stability of the barrier")
         cells = " x ".join(str(count) for count in result.run.grid.shape)
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
-        texts = [f"outside what was checked (~): {note}" for note in notes]
+        texts = [f"outside the validated range (marked ~): {note}" for note in notes]
         texts += result.stepped_notes
         texts += (f"{each.building}: {each.words}" for each in result.unjudged)
         self.print_end(result, f"{cells} cells", "steps", texts)

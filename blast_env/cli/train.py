@@ -42,7 +42,7 @@ _WITH_RESUME: Final = ("resume", "scenario", "cluster")
 
 @dataclass(frozen=True, kw_only=True)
 class TrainCommand(ClusterOptions):
-    """Train an agent that proposes layouts, or go on with a training that was interrupted."""
+    """Train an agent that proposes layouts, or resume an interrupted training."""
 
     algo: str | None = option(
         None, "ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM
@@ -54,14 +54,14 @@ class TrainCommand(ClusterOptions):
     )
     steps: int | None = option(
         None,
-        "Steps, a module each (of self_labelling, a layout that meets a threat each); else as the "
-        "YAML file says.",
+        "Steps: one module each (self_labelling: one threat and its layout each); else as in the "
+        "YAML file.",
         min=1,
     )
     seed: int | None = option(None, "Decides everything.", min=0, show_default="0")
     envs: int | None = option(
         None,
-        "Parallel environments (of self_labelling, worker processes); else as the YAML file says.",
+        "Parallel environments (self_labelling: worker processes); else as in the YAML file.",
         min=1,
     )
     run: Path | None = option(None, "Folder for the run; new or empty.", writes=FOLDER)
@@ -75,7 +75,7 @@ class TrainCommand(ClusterOptions):
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
     observation: str | None = option(
         None,
-        "What the agent sees: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
+        "Observation: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
         "MlpPolicy).",
         show_default="grid",
     )
@@ -83,10 +83,10 @@ class TrainCommand(ClusterOptions):
         (), "key=value, e.g. ent_coef=0.01; may be given again.", flag="--set"
     )
     start_from: Path | None = option(
-        None, "Run folder whose best weights to begin with, of a scenario of this size."
+        None, "Run folder with the initial weights (its best), for a scenario of this size."
     )
     resume: Path | None = option(
-        None, "Go on with the run of this folder; no other option but --cluster."
+        None, "Resume the run of this folder; no other option but --cluster."
     )
 
     def how_to_resume(self) -> str:
@@ -98,8 +98,8 @@ class TrainCommand(ClusterOptions):
         from blast_agents.training.run_folder import RunFolder
 
         if RunFolder(folder).is_run:
-            return f"blast-env train --resume {folder} goes on"
-        return "the run had not begun: the same command begins anew"
+            return f"blast-env train --resume {folder} continues the run"
+        return "the run had not begun: the same command starts it again"
 
     def __call__(self) -> None:
         """Train, and print the result."""
@@ -120,7 +120,7 @@ class TrainCommand(ClusterOptions):
         for each in options_of(type(self)):
             if each.name not in _WITH_RESUME and getattr(self, each.name) != each.default:
                 raise BlastEnvError(
-                    f"{each.flag} cannot be changed with --resume: the run folder says it"
+                    f"{each.flag} cannot be changed with --resume: the run folder fixes it"
                 )
         with progress_bar(f"training {folder}") as progress:
             return resume(folder, self.scenario, progress)

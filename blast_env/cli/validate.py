@@ -12,7 +12,7 @@ from blast_env.scenario import find_problems
 
 @dataclass(frozen=True, kw_only=True)
 class ValidateCommand(Command):
-    """Check scenario files: what is wrong with each, or what it is (not) good for.
+    """Check scenario files for errors, and print the uses and limits of each.
 
     The exit code is 0 if all files are valid, 1 if one has a problem.
     """

@@ -175,7 +175,7 @@ def test_without_weights_the_surrogate_proposes_and_no_blast_is_run(
     out = tmp_path / "layout.json"
     done = proposed(tmp_path, monkeypatch, yard, "--charge", *CHARGE.position_m, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "by guesses of gas dynamics (--verify says what it is worth)" in done.output
+    assert "by guesses of gas dynamics (--verify evaluates it)" in done.output
     surrogate = packaged_surrogate()
     wanted = LearntSearch(surrogate).at_once(site, CHARGE)
     layout = LayoutFile.load(out)

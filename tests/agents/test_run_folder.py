@@ -144,7 +144,7 @@ def test_a_folder_with_something_in_it_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_folder_of_a_run_says_how_to_go_on(finished: Path, tmp_path: Path) -> None:
-    with pytest.raises(BlastEnvError, match="has a run in it already; --resume goes on"):
+    with pytest.raises(BlastEnvError, match="has a run in it already; --resume continues"):
         train(settings(scenario_file(tmp_path)), hyperparameters(), finished)
 
 

@@ -196,7 +196,7 @@ def test_the_loss_of_an_environment_s_process_is_told(tmp_path: Path) -> None:
                 child.kill()
 
     chosen = hyperparameters({"n_envs": 2})
-    with pytest.raises(BlastEnvError, match=r"has ended, .*; --resume goes on"):
+    with pytest.raises(BlastEnvError, match=r"has ended, .*; --resume continues"):
         train(settings(scenario_file(tmp_path)), chosen, tmp_path / "run", progress)
 
 

@@ -67,7 +67,7 @@ def _train(folder: Path) -> None:
     try:
         train(chosen, hyperparameters(), folder / "run")
     except BlastEnvError as error:
-        if "--resume goes on" not in str(error):
+        if "--resume continues" not in str(error):
             raise
         resume(folder / "run")
 

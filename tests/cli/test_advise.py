@@ -79,7 +79,7 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
     first, verdict = text.splitlines()[:2]
     assert first.startswith("4 kinds, at most 3 searches of 3 blasts each, gas, cells of 0.5 m; ")
-    assert first.endswith("what each finds is judged with 1, gas, cells of 0.5 m")
+    assert first.endswith("each result is judged with 1, gas, cells of 0.5 m")
     assert "walled_yard" in verdict
     assert all(
         kind.value in text for kind in (MeasureKind.NOTHING, MeasureKind.SHIELD, MeasureKind.HARDEN)

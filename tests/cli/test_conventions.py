@@ -291,13 +291,13 @@ EVALUATE = ("evaluate", "--layout", "LAYOUT", "--engine", "event")
     ("arguments", "resume"),
     [
         ((*SEARCH, "--out", "a/b"), "with --cache FOLDER the blasts would have been kept"),
-        ((*SEARCH, "--out", "a", "--cache", "c/d"), "the same command goes on with the blasts"),
+        ((*SEARCH, "--out", "a", "--cache", "c/d"), "the same command resumes with the blasts"),
         ((*EVALUATE, "--out", "a/b"), "with --cache FOLDER the blasts"),
-        ((*EVALUATE, "--cache", "c"), "the same command goes on"),
-        (("league", "--out", "a", "--methods", "random"), "the same command goes on"),
+        ((*EVALUATE, "--cache", "c"), "the same command resumes"),
+        (("league", "--out", "a", "--methods", "random"), "the same command resumes"),
         (
             ("calibrate", "--name", "a", "--reference", "paper_ufc", "--engine", "event"),
-            "the same command goes on from the blasts that are finished",
+            "the same command resumes after the finished blasts",
         ),
     ],
 )
@@ -361,7 +361,7 @@ def test_an_interrupted_training_says_how_to_go_on_and_can_be_evaluated(
     options = [text for each in changes for text in ("--set", each)]
     result = run("train", "--scenario", site, "--run", folder, "--envs", 1, *options)
     assert result.exit_code == 130, result.output
-    assert f"blast-env train --resume {folder} goes on" in result.stderr
+    assert f"blast-env train --resume {folder} continues the run" in result.stderr
     monkeypatch.undo()
     evaluate = ("evaluate", "--run", folder, "--engine", "event")
     result = run(*evaluate, "--seeds", 2, "--json")

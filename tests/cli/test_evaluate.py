@@ -152,7 +152,7 @@ def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
     monkeypatch.setattr(EventRun, "advance", terminated)
     result = evaluate(*options, "--cache", cache)
     assert result.exit_code == 128 + signal.SIGTERM
-    assert f"goes on with the blasts that are kept in {cache}" in " ".join(result.stderr.split())
+    assert f"resumes with the blasts kept in {cache}" in " ".join(result.stderr.split())
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     assert not (tmp_path / "out").exists()
     before = runs[0]

@@ -192,7 +192,7 @@ def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(
 
 def test_after_ctrl_c_it_is_said_what_goes_on(tmp_path: Path) -> None:
     entry = JudgeCommand(method="random", out=tmp_path)
-    assert entry.how_to_resume().startswith("the same command goes on with the runs that are")
+    assert entry.how_to_resume().startswith("the same command resumes after the completed runs")
     assert "--cache" in replace(entry, out=None).how_to_resume()
     assert "runs" not in replace(entry, out=None).how_to_resume()
 

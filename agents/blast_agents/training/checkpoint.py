@@ -219,7 +219,7 @@ class Checkpoint(BaseModel):
             what = "evaluation" if self.policy else "rollout"
             raise BlastEnvError(
                 f"{place}: has no weights yet, before its first {what}; "
-                f"blast-env train --resume {place} goes on"
+                f"blast-env train --resume {place} continues the run"
             )
         load_weights(policy, values, place)
 

@@ -463,7 +463,7 @@ class RunFolder:
     def _check_empty(self) -> None:
         """Refuse a folder with a run, or with files other than those of an interrupted creation."""
         if self.is_run:
-            raise BlastEnvError(f"{self.path}: has a run in it already; --resume goes on with it")
+            raise BlastEnvError(f"{self.path}: has a run in it already; --resume continues it")
         if self._unfinished.exists():
             return
         taken = sorted(name for name in os.listdir(self.path) if not is_temporary(name))

@@ -159,12 +159,13 @@ def _run(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> Traini
                 learn(job, so_far, show)
         except (EOFError, ConnectionError) as error:
             raise BlastEnvError(
-                f"{job.folder.path}: a process with an environment has ended, for want of memory "
-                "or because it was killed; --resume goes on"
+                f"{job.folder.path}: a process with an environment has ended, for lack of memory "
+                "or because it was killed; --resume continues it"
             ) from error
         except OSError as error:
             raise BlastEnvError(
-                f"{job.folder.path}: cannot be written: {error.strerror or error}; --resume goes on"
+                f"{job.folder.path}: cannot be written: {error.strerror or error}; "
+                "--resume continues"
             ) from error
     save_figure(learning_curve(so_far, job.configuration), job.folder.learning_curve)
     return TrainingResult(job.folder, job.configuration, so_far)
