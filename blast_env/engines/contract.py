@@ -354,7 +354,7 @@ class Engine(ABC):
         needs_calibration: Whether a calibration of the scenario converts its impulses to Pa s.
         title: Its kind, for display.
         caveat: Warning with every result, one sentence; empty for none.
-        checked_for: The scope of its checks as a noun clause, for "outside ...".
+        validated_range: The range in which it was validated, for "outside ...".
         options: Settings that only this engine has.
         unfolding: The class that shows a blast step by step in `BlastSimulator-v0`, as
             "module:Class"; empty where there is no blast to show.
@@ -368,7 +368,7 @@ class Engine(ABC):
     needs_calibration: ClassVar[bool] = False
     title: ClassVar[str] = "Own engine"
     caveat: ClassVar[str] = ""
-    checked_for: ClassVar[str] = "what the engine was checked for"
+    validated_range: ClassVar[str] = "the validated range of the engine"
     options: ClassVar[tuple[EngineOption, ...]] = ()
     unfolding: ClassVar[str] = ""
     screening: ClassVar[str] = ""

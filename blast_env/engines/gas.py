@@ -102,7 +102,7 @@ class GasEngine(GasSettings, Engine):
 
     has_peaks: ClassVar[bool] = True
     title: ClassVar[str] = "Gas dynamics"
-    checked_for: ClassVar[str] = "what gas dynamics was checked for"
+    validated_range: ClassVar[str] = "the validated range of gas dynamics"
     options: ClassVar[tuple[EngineOption, ...]] = (
         EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
         EngineOption("cells", "Whether cells of gas dynamics grow with the blast."),

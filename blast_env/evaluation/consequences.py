@@ -195,8 +195,8 @@ class Consequences:
         for building, reason in self.unchecked:
             reasons.setdefault(building, []).append(reason)
         notes += [
-            f"{building}: {len(own)} of {len(self.barriers)} charges are outside what the engine "
-            f"was checked for, e.g. {own[0]}"
+            f"{building}: {len(own)} of {len(self.barriers)} charges are outside the validated "
+            f"range of the engine, e.g. {own[0]}"
             for building, own in reasons.items()
         ]
         known = self._known
@@ -453,7 +453,7 @@ def verdict_word(passes: bool, flagged: bool) -> str:
 def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:
     """Yield each building with doubtful loads, and the reasons.
 
-    The loads are outside the checked range of the engine or the response, or not known.
+    The loads are outside the validated range of the engine or the response, or not known.
     """
     from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
 

@@ -385,7 +385,7 @@ class LayoutEvaluation:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
         notes = [self.engine.caveat] if self.engine.caveat else []
         notes += [] if self.engine.knows_heights else self.scenario.height_notes
-        checked = self.engine.checked_for
+        checked = self.engine.validated_range
         if self.engine.needs_calibration:
             checked = f"the range of calibration {self.calibration!r}"
         for of_structure in zip(*(load.structures for load in self.loads), strict=True):

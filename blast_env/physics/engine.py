@@ -108,8 +108,8 @@ class EndReason(StrEnum):
 
     OUT_OF_REACH = "no moving ball can reach a structure before the time limit"
     TIME_LIMIT = "the time limit was reached"
-    TIME_ASKED = "the time that was asked for was reached"
-    LOADS_KNOWN = "the loads that it waits for are known"
+    TIME_ASKED = "the requested time was reached"
+    LOADS_KNOWN = "all required loads are known"
     EVENT_LIMIT = "the limit of collisions was reached before the end"
 
 

@@ -96,7 +96,7 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
 def _charge_legend(evaluation: LayoutEvaluation) -> list[Artist]:
     handles: list[Artist] = [_charge_handle("o", "charge")]
     if not evaluation.in_range:
-        handles.append(_charge_handle("s", "charge outside the checked range"))
+        handles.append(_charge_handle("s", "charge outside the validated range"))
     return [*handles, _worst_ring()]
 
 
@@ -186,7 +186,7 @@ def _title(evaluation: LayoutEvaluation) -> str:
 def _subtitle(evaluation: LayoutEvaluation) -> str:
     stand_off = stand_off_text(evaluation.scenario, evaluation.layout)
     law = f"calibration {evaluation.calibration}, " if evaluation.engine.needs_calibration else ""
-    range_note = "" if evaluation.in_range else "; partly outside the checked range"
+    range_note = "" if evaluation.in_range else "; partly outside the validated range"
     return (
         f"{count_of('threat', len(evaluation.threats))}; worst: "
         f"{charge_text(evaluation.worst.charge)}, {_load_text(evaluation, evaluation.worst.load)}; "
@@ -453,5 +453,5 @@ def _cases_subtitle(panels: Sequence[_Panel]) -> str:
     else:
         parts.append(count_of("case", len(panels)))
     if not all(panel.in_range for panel in panels):
-        parts.append("~ outside the checked range")
+        parts.append("~ outside the validated range")
     return "; ".join(parts)

@@ -208,7 +208,7 @@ def risk_picture(bare: MeasuredBlast, walled: MeasuredBlast) -> Picture:
     charges = (bare.result.run.site.charge, walled.result.run.site.charge)
     beside = bare.result if charges[0] == charges[1] else None
     figure = threshold_map(walled.result, beside)
-    return "where windows and eardrums are at risk: for the choice of assembly points", png(figure)
+    return "risk to windows and eardrums, for the choice of assembly points", png(figure)
 
 
 def film_stills(
@@ -257,7 +257,7 @@ def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     axes.set_xlim(max(left, 0.0), min(right, scenario.site.width_m))
     axes.set_ylim(max(bottom, 0.0), min(top, scenario.site.height_m))
     bar = figure.colorbar(ScalarMappable(scale, modules.get_cmap()), ax=axes, shrink=0.8)
-    bar.set_label("worth: percentage points of reduction lost without it")
+    bar.set_label("contribution: percentage points of reduction lost without the item")
     write_names(axes, features)
     return png(figure)
 

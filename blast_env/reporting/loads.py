@@ -235,7 +235,7 @@ class MeasuredBlast:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Notes on loads outside the checked range of the engine, and on loads not captured.
+        """Notes on loads outside the validated range of the engine, and on loads not captured.
 
         The checked range counts for protected buildings alone, capture for all.
         """

@@ -56,7 +56,7 @@ class Limit:
                 f"{units.impulse} and {units.pressure}; one of them may be left out"
             )
         if not (isfinite(impulse) or isfinite(peak)):
-            raise BlastEnvError(f"--limit is {text!r}, which limits nothing")
+            raise BlastEnvError(f"--limit is {text!r}, without any limit")
         return cls(name, impulse * units.pa_s_per_impulse, peak * units.pa_per_pressure)
 
     def is_kept(self, load: TargetLoad) -> bool:

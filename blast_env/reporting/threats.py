@@ -81,7 +81,7 @@ def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[N
     """
     scenario.with_possible_charges(charges)
     return tuple(
-        NamedCharge(f"T{number}", charge, "as asked for")
+        NamedCharge(f"T{number}", charge, "given by the user")
         for number, charge in enumerate(charges, start=1)
     )
 
@@ -123,7 +123,7 @@ def other_masses(
         try:
             scenario.with_possible_charges([other])
         except (ScenarioError, BlastEnvError) as error:
-            notes.append(f"{name} was left out: {error}")
+            notes.append(f"{name} is omitted: {error}")
         else:
             possible.append(NamedCharge(name, other, f"{factor:g} times the mass"))
     return tuple(possible), tuple(notes)
@@ -133,7 +133,7 @@ def _why(place: NamedCharge, count: int) -> str:
     if count == 1:
         return place.why
     words = "the worst with the layout"
-    return f"{place.why}, {words} of {count} places that this report looks at"
+    return f"{place.why}, {words} of {count} places examined"
 
 
 def _with_mass(charge: AnyCharge, tnt_kg: float) -> AnyCharge:

@@ -26,7 +26,7 @@ class ShadeEngine(Engine):
     version: str = "shade 1"
 
     title: ClassVar[str] = "Shade"
-    checked_for: ClassVar[str] = "what nobody has checked"
+    validated_range: ClassVar[str] = "the validated range of a shade"
 
     def loads(
         self,

@@ -62,7 +62,7 @@ def test_layouts_are_evaluated_and_reported_with_it() -> None:
     record = json.loads(json.dumps(evaluation.to_dict()))
     assert (record["engine"], record["versions"]["engine"]) == ("shade", "shade 1")
     (note,) = evaluation.notes
-    assert "3 of 3 threats are outside what nobody has checked" in note
+    assert "3 of 3 threats are outside the validated range of a shade" in note
 
 
 def test_a_search_uses_up_the_stock_with_it() -> None:

@@ -63,7 +63,7 @@ def test_a_charge_that_the_engine_was_not_checked_for_is_named(found: Consequenc
     result = simulate(site(), WALL, charge=CHARGE, engine=GasEngine())
     reason = "; ".join(result.impulse("hut").notes)
     assert "cells per m/kg^(1/3)" in reason
-    words = "are outside what the engine was checked for, e.g."
+    words = "are outside the validated range of the engine, e.g."
     assert f"hut: 1 of 1 charges {words} {reason}" in found.notes
     both = Consequences.together([found, replace(found, unchecked=())])
     assert f"hut: 1 of 2 charges {words} {reason}" in both.notes

@@ -101,7 +101,7 @@ def test_numbers_that_are_not_to_be_trusted_say_so() -> None:
     figure = comparison_figure(comparison(0.5, 0.5, in_range=(False, True)))
     titles = [axes.get_title() for axes in panels(figure)]
     assert titles == ["case 1: reduction 50 % ~", "case 2: reduction 50 %"]
-    assert "~ outside the checked range" in words(figure)
+    assert "~ outside the validated range" in words(figure)
     assert "~" not in words(comparison_figure(comparison(0.5)))
 
 

@@ -101,11 +101,11 @@ def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
     low, high = (f"{100.0 * end:.0f} %" for end in evaluation.ci95)
     share = f"{100.0 * evaluation.mean_reduction:.0f} %"
     assert f"reduction of the impulse {share} (95 %: {low} to {high})" in title
-    assert any("outside the checked range" in text.get_text() for text in figure.axes[0].texts)
+    assert any("outside the validated range" in text.get_text() for text in figure.axes[0].texts)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels[:3] == [
         "charge",
-        "charge outside the checked range",
+        "charge outside the validated range",
         "charge with the largest impulse",
     ]
     assert "barrier module, as high as the air: 10 of 16" in labels

@@ -52,9 +52,7 @@ def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> 
     first, second = chief_threats(places, severity, 6)
     assert (first.name, second.name) == ("T1", "T2")
     assert (first.charge, second.charge) == (places[1].charge, places[-1].charge)
-    assert first.why == (
-        "charge source 1, the worst with the layout of 4 places that this report looks at"
-    )
+    assert first.why == ("charge source 1, the worst with the layout of 4 places examined")
     assert [each.charge for each in chief_threats(places, severity, 1)] == [first.charge]
 
 
@@ -100,7 +98,7 @@ def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
     assert len({each.against(site, POSTS) for each in places}) == len(places) == 3
     masses, notes = other_masses(site, threat.charge, (2.0, 1e9))
     assert [each.against(site, POSTS) for each in masses] == [Charge((3.0, 4.0), 10.0)]
-    assert "5e+09 kg was left out" in notes[0]
+    assert "5e+09 kg is omitted" in notes[0]
 
 
 def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
@@ -120,7 +118,7 @@ def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
 def test_masses_that_the_scenario_cannot_have_are_left_out_by_name() -> None:
     charge = Charge((2.0, 4.0), 80_000.0)
     possible, notes = other_masses(small_hut(), charge, (0.5, 2.0))
-    assert "160000 kg was left out" in notes[-1]
+    assert "160000 kg is omitted" in notes[-1]
     assert all(each.charge.tnt_kg < 100_000.0 for each in possible)
 
 

@@ -153,9 +153,9 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
         (str(number), title)
         for number, title in enumerate(
             (
-                *("What was assumed", "Site and threats", "Layout", "Loads", "The blast"),
-                *("What each item is worth", "Other masses and places", "Reduction against cost"),
-                *("Validity and limits", "Where the numbers come from", "To repeat it"),
+                *("Assumptions", "Site and threats", "Layout", "Loads", "The blast"),
+                *("Contribution of each item", "Other masses and places", "Reduction against cost"),
+                *("Validity and limits", "Sources of the numbers", "Reproduction"),
             ),
             start=1,
         )
@@ -177,7 +177,7 @@ def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
 def test_other_units_and_loads_within_what_was_checked(study: Study, page: str) -> None:
     """What is outside is said by name; here a copy of the study without notes, in psi."""
     assert any("checked from 9.2" in note for note in study.notes)
-    assert "outside what the engine was checked for" in page
+    assert "outside the validated range of the engine" in page
     other = replace(study, notes=(), options=replace(study.options, units=UNITS["psi"]))
     changed = report_html(other, ["blast-env"])
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
@@ -192,7 +192,7 @@ def test_pdf_has_the_same_pages_of_text_and_pictures(study: Study, tmp_path: Pat
     assert html.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     document = pypdfium2.PdfDocument(pdf)
     text = "".join(each.get_textpage().get_text_range() for each in document)
-    assert "What each item is worth" in text
+    assert "Contribution of each item" in text
     assert small_hut().content_hash[:20] in text
     assert f"{len(document)} / {len(document)}" in text
     pictures = sum(1 for each in document for item in each.get_objects() if item.type == 3)
@@ -270,7 +270,7 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     assert "costs 4" in first
     assert all(f"all windows: {each.title}" in page for each in verdict.glazing)
     assert page.count("no price given in the site file") == len(verdict.glazing) - 1
-    assert "the windows have it" in page  # of the windows as they are
+    assert "installed already" in page  # of the windows as they are
     bays = page[page.index("Bay by bay") :]
     assert all(f"hut/{wall}/1/1" in bays for wall in ("west", "east", "south", "north"))
 
@@ -293,7 +293,7 @@ def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) 
 
 
 def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) -> None:
-    table = page[page.index("Where the numbers come from") : page.index("To repeat it")]
+    table = page[page.index("Sources of the numbers") : page.index("Reproduction")]
     digests = dict(study.digests)
     for words in ("without a barrier", "with the layout"):
         assert digests[f"T1 {words}, cells of 0.25 m"][:16] in table
@@ -346,7 +346,7 @@ def test_stopped_among_the_finer_cells_a_report_has_the_coarser_ones(
     assert {each.cells for each in stopped.pairs} == {0.5}
     page = report_html(stopped, ["blast-env"])
     assert "This report was stopped before: cells of 0.25 m" in page
-    assert "there is one size of cells alone" in page
+    assert "only one cell size was used" in page
     assert not re.search(r"\bnan\b", re.sub(r"base64,[^\"]*", "", page))
     sizes[:] = [0.5] * 2
     with pytest.raises(KeyboardInterrupt):  # nothing is done yet

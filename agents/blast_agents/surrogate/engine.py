@@ -46,7 +46,7 @@ class SurrogateEngine(Engine):
     caveat: ClassVar[str] = (
         "These are guesses of gas dynamics, not blasts: judge with engine 'gas'."
     )
-    checked_for: ClassVar[str] = "what a blast says: they are guesses"
+    validated_range: ClassVar[str] = "a validated range: they are predictions of the surrogate"
 
     surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
     name: str = field(init=False, default=SURROGATE)

@@ -132,7 +132,7 @@ _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
 }
 _LAST_OF_STRUCTURE: Final = (
     FormField("weight", "weight"),
-    FormField("walls that count", "faces", "walls"),
+    FormField("assessed walls", "faces", "walls"),
     FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
     FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
 )

@@ -217,7 +217,7 @@ class GasRun:
         return all(on_faces[faces].mean() >= AREA for faces in walls)
 
     def _notes(self) -> tuple[str, ...]:
-        """Return the reasons why this blast is outside the checked range of the source."""
+        """Return the reasons why this blast is outside the validated range of the source."""
         clear, least = (
             clearance_m(self.grid, self.charge),
             least_clearance_m(self.grid, self.charge),
