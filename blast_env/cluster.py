@@ -244,7 +244,7 @@ def _do(work: Callable[[], Any], origin: str) -> Any:
     """Do a piece of work, on a worker with the code and versions of the submitting process."""
     if _origin() != origin:
         raise BlastEnvError(
-            f"cluster: a worker has {_origin()}, must have what asks for the work: {origin}"
+            f"cluster: a worker has {_origin()}, must have that of the submitter: {origin}"
         )
     return work()
 

@@ -41,7 +41,7 @@ COLUMNS: Final = (
         "scenario", "", "bundled scenario of that hash, or generated site; empty: one of a file"
     ),
     Column("scenario_hash", "", "content hash of the scenario"),
-    Column("layout", "", "JSON: [row, column] a module, [row, column, item, turned] a piece"),
+    Column("layout", "", "JSON: [row, column] per module, [row, column, item, turned] per piece"),
     Column("charge_x_m", "m", "where the charge went off, from the left border"),
     Column("charge_y_m", "m", "from the lower border"),
     Column("charge_height_m", "m", "height of its centre; 0: it lay on the ground"),

@@ -112,7 +112,7 @@ class AgentComparison:
         """Whether the agent has learnt anything, and its lead over the best rule, in words."""
         gain = self.standings.difference(self.agent, self.random)
         if isnan(gain.low):
-            return "No verdict: one threat says nothing about the others."
+            return "No verdict: one threat gives no interval."
         value, low, high = gain.scaled(100.0)
         outcome = (
             "The agent has learnt: its layouts beat random ones by more than the 95 % intervals, "

@@ -115,7 +115,7 @@ def test_a_stop_leaves_out_what_has_not_begun(
 def test_a_worker_with_other_code_is_refused(two: Dask, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its results would be kept under the versions of whoever asked."""
     monkeypatch.setattr(cluster, "_origin", lambda: "blast-env 0.0.1+0, numpy 1.26.4")
-    message = "a worker has blast-env .*, must have what asks .*: blast-env 0.0.1"
+    message = "a worker has blast-env .*, must have that of the submitter: blast-env 0.0.1"
     with on_cluster(two.file), pytest.raises(BlastEnvError, match=message):
         run_all(square, range(2))
 

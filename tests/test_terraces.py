@@ -343,7 +343,7 @@ def test_what_carries_nothing_has_the_hash_of_before() -> None:
         (
             [TERRACE | {"base_m": 0.5}],
             {},
-            r"structures\[1\].base_m: is 0.5, must be 0: what carries barriers is solid",
+            r"structures\[1\].base_m: is 0.5, must be 0: a terrace is solid",
         ),
         ([TERRACE | {"height_m": 1.5}], {}, r"'podium' .* overlaps structures\[0\], 'hall'"),
         (
@@ -376,7 +376,7 @@ def test_a_terrace_cannot_be_taken_away() -> None:
     document = site_document()
     removable = {"name": "dig", "structures": ["podium"], "cost": 1.0}
     document["build_zone"]["removable"] = [removable]
-    with pytest.raises(ScenarioError, match="is 'podium', a terrace: it cannot be taken away"):
+    with pytest.raises(ScenarioError, match="is 'podium', a terrace: it cannot be removed"):
         Scenario.from_document(document, "dug")
 
 

@@ -274,7 +274,7 @@ def _checked_pair(i_sim: Numbers, i_reference: Numbers) -> tuple[FloatArray, Flo
     y = checked_array("i_reference", i_reference, above=0.0, dimensions=1)
     if len(x) != len(y):
         raise BlastEnvError(
-            f"i_sim has {len(x)} values and i_reference {len(y)}, must be as many: one a distance"
+            f"i_sim has {len(x)} values and i_reference {len(y)}, must be one per distance each"
         )
     if not len(x):
         raise BlastEnvError("i_sim is empty, must have one value a distance")
@@ -506,5 +506,5 @@ def _checked_column(
     """Check that there is one number per distance and return them (count,)."""
     column = checked_array(name, values, least=least, above=above, dimensions=1)
     if len(column) != count:
-        raise BlastEnvError(f"{name} has {len(column)} values, must have {count}: one a distance")
+        raise BlastEnvError(f"{name} has {len(column)} values, must have {count}: one per distance")
     return column

@@ -403,7 +403,7 @@ class Engine(ABC):
             BlastEnvError: If the engine computes loads without a blast.
         """
         raise BlastEnvError(
-            f"engine {self.name!r} tells loads without a blast: there is none to show"
+            f"engine {self.name!r} predicts loads without a blast: there is none to show"
         )
 
     def check(self, scenario: Scenario) -> None:

@@ -42,9 +42,9 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
 _PROGRESS_CALLS: Final = 200
 
 PARTICLES_OVERRATE: Final = (
-    "The particle model overrates barriers: on 'courtyard' it promised 5.1 times the reduction of"
-    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Judge what"
-    " matters with engine 'gas'."
+    "The particle model overrates barriers: on 'courtyard' it predicted 5.1 times the reduction of"
+    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Use engine"
+    " 'gas' for decisions."
 )
 """Caveat of every evaluation with particles; measured by `python -m studies.gas judge`."""
 
@@ -288,7 +288,7 @@ class BlastResult:
             BlastEnvError: Always; the message names the alternative.
         """
         raise BlastEnvError(
-            f"engine {self.engine_name!r} knows no overpressure, so no response of bays: take 'gas'"
+            f"engine {self.engine_name!r} has no overpressure, so no response of bays: use 'gas'"
         )
 
     @property
@@ -299,7 +299,7 @@ class BlastResult:
             BlastEnvError: Always; the message names the alternative.
         """
         raise BlastEnvError(
-            f"engine {self.engine_name!r} knows no overpressure, so no push on pieces: take 'gas'"
+            f"engine {self.engine_name!r} has no overpressure, so no loads on pieces: use 'gas'"
         )
 
     @cached_property

@@ -114,7 +114,7 @@ class Observable:
             BlastEnvError: If `module_loads` is None.
         """
         if self.module_loads is None:
-            raise BlastEnvError("module_loads is None, must be given for what shows the loads")
+            raise BlastEnvError("module_loads is None, must be given for an observation with loads")
         return self.module_loads(self.scenario, self.sources, blasts)
 
 

@@ -89,7 +89,7 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, .
         raise BlastEnvError("seeds: there are none, must be at least one")
     for index, seed in enumerate(plain):
         if seed in plain[:index]:
-            raise BlastEnvError(f"seeds[{index}] is {seed}, is there already: must be none twice")
+            raise BlastEnvError(f"seeds[{index}] is {seed}, appears twice, must be unique")
     found = find_scenario(scenario)
     charges = ranked(draw_threat(found, seed) for seed in plain)
     return tuple(Threat(charge, seed) for charge, seed in zip(charges, plain, strict=True))
@@ -186,7 +186,7 @@ class Case:
         if self.practice is not None:
             both = set(self.threats) & set(self.practice.threats)
             if both:
-                raise BlastEnvError(f"a search may not meet {both.pop()}: layouts are judged on it")
+                raise BlastEnvError(f"a search may not use {both.pop()}: layouts are judged on it")
 
     @property
     def charges(self) -> tuple[AnyCharge, ...]:
@@ -312,9 +312,7 @@ def check_distinct(threats: Sequence[Threat]) -> None:
     """Refuse a repeated threat, which would count as evidence twice (`BlastEnvError`)."""
     for index, threat in enumerate(threats):
         if threat in threats[:index]:
-            raise BlastEnvError(
-                f"threats[{index}] is {threat}, is there already: must be none twice"
-            )
+            raise BlastEnvError(f"threats[{index}] is {threat}, appears twice, must be unique")
 
 
 def _spread_first(charges: Sequence[AnyCharge]) -> list[AnyCharge]:

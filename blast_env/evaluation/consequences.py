@@ -58,11 +58,11 @@ if TYPE_CHECKING:  # a third of a second to import
     from blast_env.engines.gas import GasResult
 
 _CLIPPED: Final = (
-    "by the peaks on its cells it passes, which clip them; by peaks as sharp as Kingery and"
-    " Bulmash's of the same impulse it does not: smaller cells may tell"
+    "it passes with the peaks of the cells, which are clipped, but fails with Kingery and"
+    " Bulmash's sharp peaks of the same impulse: use smaller cells"
 )
 
-_BREACH: Final = "so near, walls may be breached: the response knows bending alone"
+_BREACH: Final = "so close that walls may be breached: the response covers bending only"
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,7 @@ THREAT_COLUMNS: Final = (
     Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
     Column("peak_pa", "Pa", "largest overpressure on them, with the barrier"),
     Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
-    Column("load", "", "what the scenario's objective counts, with the barrier"),
+    Column("load", "", "load in the scenario's objective, with the barrier"),
     Column("unprotected_load", "", "the same without it"),
     Column("reduction", "", "of that load"),
     Column("in_range", "", "whether the calibration was made for this threat"),

@@ -99,7 +99,7 @@ def _height_limits(scenario: Scenario) -> Iterator[str]:
     if endless:
         yield (
             f"no height ({', '.join(endless)}): as high as the air, {scenario.air_height_m:g} m, "
-            f"so {JUDGE} overrates what walls do (height_m)"
+            f"so {JUDGE} overrates walls (height_m)"
         )
     for note in scenario.height_notes:
         yield f"particles: {note[0].lower()}{note[1:]}"
@@ -114,8 +114,8 @@ def _charge_limits(scenario: Scenario) -> Iterator[str]:
     yield from _speed_limits(scenario)
     if len(scenario.charge) == 1 and isinstance(scenario.charge[0], PointSource):
         yield (
-            "the charge is always at one place: a hidden threat is no question here, and an agent "
-            "trained on it knows no other"
+            "the charge is always at one place: a hidden threat adds nothing, and an agent trained "
+            "on it learns no other place"
         )
 
 

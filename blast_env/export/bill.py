@@ -90,13 +90,13 @@ PIECE_COLUMNS: Final = (
 
 BILL_COLUMNS: Final = (
     Column("item", "", "item or measure of the zone, or `module`; `total` is all of them"),
-    Column("description", "", "what it is"),
+    Column("description", "", "description"),
     Column("count", "", "pieces that the layout takes"),
     Column("in_stock", "", "pieces that there are"),
     Column("length_m", "m", "length"),
     Column("thickness_m", "m", "thickness"),
     Column("height_m", "m", "height; nothing where it is as high as the air"),
-    Column("unit_cost", "", "cost of a piece where no cost area says otherwise"),
+    Column("unit_cost", "", "cost of a piece outside all cost areas"),
     Column("cost", "", "cost of these pieces at their places, in the unit of the budget"),
 )
 """Columns of the bill of quantities."""

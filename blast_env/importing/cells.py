@@ -99,7 +99,7 @@ def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
     if covered > MOST_COVERED:
         raise BlastEnvError(
             f"{what} take {covered:,.0f} cells of {MODULE_SIDE_M:g} m together, each with the "
-            f"rectangle around it, must take at most {MOST_COVERED:,}: do they lie over each other?"
+            f"rectangle around it, must take at most {MOST_COVERED:,}: do they overlap?"
         )
 
 
@@ -118,7 +118,7 @@ def mended(outline: BaseGeometry, what: str) -> BaseGeometry:
     if _crosses_often(outline):
         raise BlastEnvError(
             f"{what} crosses itself more than {MOST_CROSSINGS:,} times, must cross itself at most "
-            "that often to be put right"
+            "that often for --repair"
         )
     return shapely.buffer(shapely.make_valid(outline), 0.0)
 

@@ -216,7 +216,7 @@ def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[s
             f"out (--least-area): {small}"
         )
     if len(unsound):
-        notes.append(f"outlines that cross themselves, which were put right: {len(unsound)}")
+        notes.append(f"outlines that cross themselves, corrected: {len(unsound)}")
     return kept, notes
 
 
@@ -250,7 +250,7 @@ def _put_right(site: PlacedSite, thing: Thing, options: ImportOptions) -> BaseGe
     what = f"{site.path}: {thing.place}{words}: the outline"
     if not options.repair:
         reason = str(shapely.is_valid_reason(thing.geometry)).split("[")[0].strip().lower()
-        raise BlastEnvError(f"{what} is not sound: {reason}; --repair puts such outlines right")
+        raise BlastEnvError(f"{what} is not sound: {reason}; --repair corrects such outlines")
     return mended(thing.geometry, what)
 
 
@@ -437,8 +437,8 @@ def _hint(site: PlacedSite) -> str:
 def _hints(site: PlacedSite) -> Iterator[str]:
     if site.layers:
         layers = ", ".join(site.layers[:20])
-        yield f": say with --buildings-from which layer has them; the file has {layers}"
+        yield f": name their layer with --buildings-from; the file has {layers}"
     elif site.of_role(Role.BUILDING):
         yield ": buildings of the file lie elsewhere, or are smaller than --least-area"
     else:
-        yield ": the file has none; say with --buildings-from what is one"
+        yield ": the file has none; define them with --buildings-from"

@@ -69,17 +69,17 @@ class ImportOptions:
     crs: str | None = option(
         None,
         "Reference system of the coordinates: EPSG:25832, or local for plain metres.",
-        show_default="what GeoJSON says, else EPSG:4326; none for DXF",
+        show_default="that of the GeoJSON file, else EPSG:4326; none for DXF",
     )
     units: str | None = option(None, "Unit of a drawing: m, mm, cm, dm, km, in, ft.")
     buildings_from: tuple[str, ...] = option(
-        (), "What is a building: KEY, KEY=VALUE, or a layer of a drawing."
+        (), "Features that are buildings: KEY, KEY=VALUE, or a layer of a drawing."
     )
     charges_from: tuple[str, ...] = option(
         (), "Where charges may be, named in the same way.", show_default="streets, car parks"
     )
     zone_from: tuple[str, ...] = option((), "Where barriers may stand, named in the same way.")
-    keep_outs_from: tuple[str, ...] = option((), "What must stay empty, named in the same way.")
+    keep_outs_from: tuple[str, ...] = option((), "Areas to be kept empty, named in the same way.")
     protect: tuple[str, ...] = option((), "Name of a building whose load counts.")
     protect_near: PlaceXY | None = option(
         None, "Protect the building nearest to this.", metavar="X Y"
@@ -89,9 +89,7 @@ class ImportOptions:
     zone_m: tuple[float, float, float, float] | None = option(
         None, "The build zone, site metres.", metavar="LEFT BOTTOM WIDTH HEIGHT"
     )
-    zone_around_m: float | None = option(
-        None, "Zone around what is protected, so many metres wide."
-    )
+    zone_around_m: float | None = option(None, "Width of a zone around the protected buildings, m.")
     stock: int = option(20, "Modules that there are to place.", min=1)
     wall_height_m: float = option(3.0, "Height of the modules, m.")
     clearance_m: float = option(1.0, "Least distance of modules from structures, m.", min=0.0)

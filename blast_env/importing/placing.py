@@ -157,7 +157,7 @@ def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOption
     if not things:
         raise BlastEnvError(
             f"{site_map.path}: has no building and no place of a charge that is marked as such; "
-            "say what is one with --buildings-from and --charges-from"
+            "define them with --buildings-from and --charges-from"
         )
     plane = plane_around(site_map.coordinates, _reference(things, options))
     near = _near(site_map, things, plane, options)
@@ -292,7 +292,7 @@ def _bounds_m(
     chief = _chief(things)
     if not any(each.role is Role.BUILDING for each in things):
         raise BlastEnvError(
-            f"{site_map.path}: has no building that is marked as such; say what is one with "
+            f"{site_map.path}: has no building that is marked as such; define them with "
             "--buildings-from"
         )
     left, bottom, right, top = (

@@ -104,7 +104,7 @@ def _keep_outs(
                 for rectangle in CellRectangle.each(table)
             ]
     raise BlastEnvError(
-        f"{site.path}: what must stay empty takes {count} rectangles even in blocks of "
+        f"{site.path}: areas that must stay empty take {count} rectangles even in blocks of "
         f"{COARSER[-1] * MODULE_SIDE_M:g} m, must take at most {MOST_KEEP_OUTS}: make the zone "
         "smaller or simpler"
     )

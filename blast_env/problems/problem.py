@@ -248,6 +248,6 @@ def make(
     if known is not None and known.digest != definition.digest:
         raise BlastEnvError(
             f"{definition.name}: the site or its charges have changed (digest {definition.digest}, "
-            f"must be {known.digest}): a version never changes what it says"
+            f"must be {known.digest}): a version never changes its content"
         )
     return BenchmarkProblem(definition, budget, find_engine(engine, cell_m), cache)

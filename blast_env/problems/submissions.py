@@ -116,7 +116,7 @@ class Submission:
                 raise BlastEnvError(f"{where}: there is no problem {run.problem!r}")
             if run.key in seen:
                 raise BlastEnvError(
-                    f"{where}: {run.problem}, {run.budget}, {run.seed}: is there twice"
+                    f"{where}: {run.problem}, {run.budget}, {run.seed}: appears twice"
                 )
             if run.blasts > run.budget:
                 raise BlastEnvError(

@@ -136,7 +136,7 @@ def _subtitle(scenario: Scenario, placement: Placement) -> str:
     parts.append(stand_off_text(scenario, placement.layout))
     if any(each.height_m is None for each in scenario.structures):
         air_m = scenario.air_height_m
-        parts.append(f"what has no height is drawn as high as the air, {air_m:g} m")
+        parts.append(f"structures without a height are drawn as high as the air, {air_m:g} m")
     return ", ".join(filter(None, parts))
 
 

@@ -76,7 +76,7 @@ def check_limits(limits: Sequence[Limit], targets: Sequence[ReportedBuilding]) -
         if limit.target not in names:
             raise UnknownNameError("building", limit.target, names)
         if limit.target in [each.target for each in limits[:index]]:
-            raise BlastEnvError(f"--limit is there twice for {limit.target!r}")
+            raise BlastEnvError(f"--limit appears twice for {limit.target!r}")
 
 
 @dataclass(frozen=True)

@@ -174,13 +174,13 @@ def _removable_problems(parts: Parts) -> Iterator[Problem]:
             if name not in structures:
                 yield Problem(where, unknown_name("structure", name, structures))
             elif structures[name].protected:
-                yield Problem(where, f"is {name!r}, which is protected: it cannot be taken away")
+                yield Problem(where, f"is {name!r}, which is protected: it cannot be removed")
             elif structures[name].facade is not None:
-                yield Problem(where, f"is {name!r}, which has a facade: it cannot be taken away")
+                yield Problem(where, f"is {name!r}, which has a facade: it cannot be removed")
             elif structures[name].carries:
-                yield Problem(where, f"is {name!r}, a terrace: it cannot be taken away")
+                yield Problem(where, f"is {name!r}, a terrace: it cannot be removed")
             elif used != where:
-                yield Problem(where, f"is {name!r}, which {used} takes away already")
+                yield Problem(where, f"is {name!r}, which {used} removes already")
 
 
 def _objective_problems(parts: Parts) -> Iterator[Problem]:
@@ -403,8 +403,8 @@ def _stopping_problems(
     stand_off_m = ground.worst_places().stand_off_m
     if ground.worst_places(full).stand_off_m <= stand_off_m + TOLERANCE_M:
         message = (
-            "nothing can stop the vehicle: even with something that stops it on each of the"
-            f" {cells.sum()} cells where that can stand, it comes as near as {stand_off_m:g} m to a"
+            "nothing can stop the vehicle: even with a vehicle barrier on each of the"
+            f" {cells.sum()} cells where one can stand, it comes as near as {stand_off_m:g} m to a"
             " protected structure"
         )
         yield Problem(key, message)

@@ -18,7 +18,7 @@ def terrace_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem
             message = "is true, needs the structure's height_m: barriers stand on its top"
             yield Problem(f"structures[{index}].carries", message)
         if each.carries and each.base_m > 0.0:
-            message = f"is {each.base_m:g}, must be 0: what carries barriers is solid"
+            message = f"is {each.base_m:g}, must be 0: a terrace is solid"
             yield Problem(f"structures[{index}].base_m", message)
 
 

@@ -90,8 +90,7 @@ def _key_problems(zone: BuildZone) -> Iterator[Problem]:
             what = "cost" if key == "module_cost" else "height"
             yield Problem(
                 f"build_zone.{key}",
-                f"is {getattr(zone, key):g}, must be left out: the items have each a {what} of"
-                " their own",
+                f"is {getattr(zone, key):g}, must be left out: each item has its own {what}",
             )
 
 

@@ -357,7 +357,7 @@ def test_processes_change_nothing(tmp_path: Path) -> None:
 
 def test_bad_input_is_refused(tmp_path: Path) -> None:
     kept = store(tmp_path)
-    with pytest.raises(BlastEnvError, match="'no barrier' is there twice"):
+    with pytest.raises(BlastEnvError, match="'no barrier' appears twice"):
         Contest(TRACK, (NO_BARRIER, NO_BARRIER), kept)
     with pytest.raises(BlastEnvError, match="no barrier is not among"):
         Contest(TRACK, (LeagueEntry(RandomSearch(), 6),), kept)

@@ -140,7 +140,7 @@ def test_each_family_of_sites_is_a_track_of_its_own() -> None:
         (("hidden", 1, 1, 1001), "seed is 1001"),
         (("sites", 1, 1, 0, ["courtyard"]), "generates its own"),
         (("item_sites", 1, 1, 0, ["courtyard"]), "'item_sites' generates its own"),
-        (("known", 1, 1, 0, ["courtyard", "courtyard"]), "'known_courtyard' is there twice"),
+        (("known", 1, 1, 0, ["courtyard", "courtyard"]), "'known_courtyard' appears twice"),
         (("known", 1, 1, 0, ["free_field"]), "no build zone"),
     ],
 )

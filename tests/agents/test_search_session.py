@@ -190,7 +190,7 @@ def test_reductions_refer_to_the_threats_that_were_met(problem: LayoutProblem) -
 
 @pytest.mark.parametrize(
     ("threats", "words"),
-    [((), "there are none"), ((Threat(WEST, 1), Threat(WEST, 1)), "is there already")],
+    [((), "there are none"), ((Threat(WEST, 1), Threat(WEST, 1)), "appears twice")],
 )
 def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words: str) -> None:
     with pytest.raises(BlastEnvError, match=words):

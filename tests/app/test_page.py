@@ -321,7 +321,7 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
         chooser.value = "structure 2"
         assert shown(ui.switch, "terrace").value is False
         shown(ui.switch, "terrace").value = True
-        await user.should_see("must be 0: what carries barriers is solid")
+        await user.should_see("must be 0: a terrace is solid")
         begins = field_of(user, "base height (m)")
         assert begins.value == "2.5"
         begins.value = "2"

@@ -75,7 +75,7 @@ def test_a_search_uses_up_the_stock_with_it() -> None:
 
 
 def test_without_a_blast_there_is_none_to_show() -> None:
-    with pytest.raises(BlastEnvError, match="engine 'shade' tells loads without a blast"):
+    with pytest.raises(BlastEnvError, match="engine 'shade' predicts loads without a blast"):
         blast_env.simulate(COURTYARD, WALL, engine="shade")
     with pytest.raises(BlastEnvError, match="shade"):
         gym.make("BlastSimulator-v0", scenario="courtyard", engine="shade")

@@ -37,7 +37,7 @@ def test_numbers_of_other_types_make_the_same_threat() -> None:
     ("seeds", "words"),
     [
         ([], "there are none, must be at least one"),
-        ([4, 2, 4], r"seeds\[2\] is 4, is there already"),
+        ([4, 2, 4], r"seeds\[2\] is 4, appears twice"),
         ([0, -7], r"seeds\[1\] is -7, must be an integer from 0"),
         ([0.5], r"seeds\[0\] is 0.5, must be an integer"),
         ([True], r"seeds\[0\] is true, must be an integer"),
@@ -89,7 +89,7 @@ def test_a_search_meets_none_of_the_threats_that_judge() -> None:
     scenario = load_scenario("courtyard")
     practice = practice_hidden(scenario, 3, 2, seed=1)
     assert all(threat.seed in SeedRange.SEARCH.value for threat in practice.threats)
-    with pytest.raises(BlastEnvError, match="a search may not meet"):
+    with pytest.raises(BlastEnvError, match="a search may not use"):
         Case(scenario, practice.threats[:1], practice=practice)
 
 

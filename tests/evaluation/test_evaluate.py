@@ -175,7 +175,7 @@ def test_unusable_arguments_are_named(evaluator: BlastEvaluator) -> None:
         evaluate_layout(COURTYARD, FEW, SEEDS, engine="event", cvar_level=1.0)
     with pytest.raises(BlastEnvError, match="threats: there are none"):
         evaluate_layout(COURTYARD, FEW, engine="event", threats=[])
-    with pytest.raises(BlastEnvError, match=r"threats\[1\] .* is there already"):
+    with pytest.raises(BlastEnvError, match=r"threats\[1\] .* appears twice"):
         evaluate_layout(COURTYARD, FEW, engine="event", threats=[THREATS[0]] * 2)
 
 

@@ -45,7 +45,7 @@ def test_what_has_everything_is_limited_only_by_what_it_lacks() -> None:
     assert "no calibration: particles give simulation units alone" in said
     assert "no gauges" not in said
     assert "no height (" not in said
-    assert "overrates what walls do" not in said
+    assert "overrates walls" not in said
     assert PLACING in suitability(hut()).uses[1]
     assert suitability(hut()).uses[1].endswith("with gas")
     assert suitability(hut()).uses[2] == "report (gas)"

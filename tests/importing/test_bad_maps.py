@@ -194,7 +194,7 @@ def test_map_without_buildings(tmp_path: Path) -> None:
         rectangle(0, 0, 6, 4), close=True, dxfattribs={"layer": "WALLS"}
     )
     document.saveas(path)
-    assert "say what is one with --buildings-from" in error_of(path)
+    assert "define them with --buildings-from" in error_of(path)
     assert "there is no building on the site: the file has none" in error_of(
         written(tmp_path, PLACE), origin=(0.0, 0.0), size_m=(20.0, 20.0)
     )
@@ -208,7 +208,7 @@ def test_outlines_that_cross_themselves(tmp_path: Path) -> None:
     message = "features[0] (bow): the outline is not sound: self-intersection; --repair"
     assert message in error_of(path)
     site = import_site(path, ImportOptions(repair=True, most_area_deviation=0.6))
-    assert "which were put right: 1" in site.notes[0]
+    assert "corrected: 1" in site.notes[0]
     assert site.buildings[0].outline.area == pytest.approx(12.0)
 
 

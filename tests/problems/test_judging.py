@@ -86,7 +86,7 @@ def test_a_layout_that_is_better_than_the_best_known_shows() -> None:
     ("runs", "message"),
     [
         ((run(99),), "runs\\[0\\]: control_room-told-v1: .*outside"),
-        ((run(1), run(2)), "is there twice"),
+        ((run(1), run(2)), "appears twice"),
         ((replace(run(1), blasts=1),), "1 blasts were spent, the budget is 0"),
         ((replace(run(1), problem="none-v1"),), "there is no problem 'none-v1'"),
     ],

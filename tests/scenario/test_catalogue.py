@@ -117,8 +117,8 @@ BAD: list[tuple[Document, str]] = [
     ({"items": [item("wall", 3, 1, 2.0, stock=0)]}, "items: none is in stock, at least one must "),
     ({"budget": 0.5}, "budget: is 0.5, must be at least 1, the cost of the cheapest piece at its"),
     ({"stock": 10}, "stock: is 10, must be at most 9, the number of pieces of all items"),
-    ({"module_cost": 2.0}, "module_cost: is 2, must be left out: the items have each a cost of"),
-    ({"height_m": 2.0}, "height_m: is 2, must be left out: the items have each a height of their"),
+    ({"module_cost": 2.0}, "module_cost: is 2, must be left out: each item has its own cost"),
+    ({"height_m": 2.0}, "height_m: is 2, must be left out: each item has its own height"),
     ({"cost_areas": [AREA]}, "cost_areas[0].cost_factor: missing"),
     (
         {"cost_areas": [{**AREA, "module_cost": 2.0, "cost_factor": 2.0}]},

@@ -124,8 +124,8 @@ _ITEM = {"name": "wall", "length_modules": 3, "thickness_modules": 1, "height_m"
     ("removable", "place", "message"),
     [
         ({"structures": ["fense"]}, ".structures[0]", "did you mean 'fence'"),
-        ({"structures": ["hut"]}, ".structures[0]", "is protected: it cannot be taken away"),
-        ({"structures": ["fence", "fence"]}, ".structures[1]", "takes away already"),
+        ({"structures": ["hut"]}, ".structures[0]", "is protected: it cannot be removed"),
+        ({"structures": ["fence", "fence"]}, ".structures[1]", "removes already"),
         ({"structures": []}, ".structures", "must have at least 1"),
         ({"name": "wall"}, ".name", "already the name of build_zone.items[0]"),
         ({"cost": 0.0}, ".cost", "must be greater than 0"),

@@ -83,8 +83,8 @@ def test_walls_with_gaps_narrower_than_the_vehicle_let_it_no_further_than_its_en
 def test_a_vehicle_that_nothing_could_stop_is_refused() -> None:
     zone = site_document()["build_zone"] | {"rows": 4, "stock": 4}
     assert problems(build_zone=zone) == [
-        "charge[0]: nothing can stop the vehicle: even with something that stops it on each of the"
-        " 16 cells where that can stand, it comes as near as 1 m to a protected structure"
+        "charge[0]: nothing can stop the vehicle: even with a vehicle barrier on each of the"
+        " 16 cells where one can stand, it comes as near as 1 m to a protected structure"
     ]
 
 

@@ -183,9 +183,9 @@ class Contest:
         names = [entry.name for entry in self.entries]
         for name in names:
             if names.count(name) > 1:
-                raise BlastEnvError(f"entry {name!r} is there twice, must be none twice")
+                raise BlastEnvError(f"entry {name!r} appears twice, must be unique")
         if NO_BARRIER not in self.entries:
-            raise BlastEnvError("no barrier is not among the entries: it is what others refer to")
+            raise BlastEnvError("no barrier is not among the entries: the others refer to it")
 
     @cached_property
     def _instant(self) -> Mapping[str, tuple[Proposal, ...]]:

@@ -193,7 +193,7 @@ class LeagueVerdict:
     def conclusion(self) -> str:
         """The conclusion from the interval."""
         if isnan(self.difference.low):
-            return "one threat says nothing about the others"
+            return "one threat gives no interval"
         subject = "search" if self.result.blasts_per_case else "agent"
         if self.difference.low > 0.0:
             return f"the {subject} protects better"

@@ -274,7 +274,7 @@ def find_tracks(
     names = [track.name for track in tracks]
     for each in names:
         if names.count(each) > 1:
-            raise BlastEnvError(f"track {each!r} is there twice: scenarios need different names")
+            raise BlastEnvError(f"track {each!r} appears twice: scenarios need different names")
     return tuple(tracks)
 
 

@@ -98,8 +98,8 @@ def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) 
     axes.set_xlabel("cost" if has_items else "modules")
     axes.xaxis.set_major_locator(MaxNLocator(integer=not has_items))
     threats = count_of("threat", front[0].threats)
-    what = "spending is" if has_items else "modules are"
-    axes.set_title(f"Front: what {what} worth, under {threats}", fontsize=11)
+    price = "cost" if has_items else "number of modules"
+    axes.set_title(f"Front: reduction against {price}, under {threats}", fontsize=11)
     _set_reduction_axis(axes, problem)
 
 

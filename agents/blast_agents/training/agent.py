@@ -96,8 +96,8 @@ def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFo
         must_be = getattr(wanted.policy_kwargs, name)
         if value != must_be:
             raise BlastEnvError(
-                f"{folder.path}: policy_kwargs.{name} is {value}, must be {must_be}, as the "
-                "scenario's build zone says"
+                f"{folder.path}: policy_kwargs.{name} is {value}, must be {must_be}, as in "
+                "the build zone of the scenario"
             )
 
 

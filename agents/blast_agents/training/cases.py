@@ -135,7 +135,7 @@ def _cases(
 ) -> tuple[Case, ...]:
     """Return one case with one threat per scenario and seed."""
     if len(set(seeds)) < len(seeds):
-        raise BlastEnvError("seeds: one is there twice, must be none twice")
+        raise BlastEnvError("seeds: one appears twice, must be unique")
     cases = []
     for number, (scenario, seed) in enumerate(zip(scenarios, seeds, strict=True), start=1):
         threats = draw_threats(scenario, [seed])
