@@ -88,12 +88,12 @@ class Chosen:
             if self.is_guessed:
                 layout = worth_its_pieces(guesses, layout, rules.values())
             else:
-                by = f"{by}; the gain is a guess"
+                by = f"{by}; reduction predicted by the surrogate"
             gain = reductions(*guesses.loads([layout, ()])).item()
         if gain is not None and not gain >= LEAST_GAIN:  # NaN: nothing arrives
             by = (
-                f"{by}: no layout is expected to take off {100.0 * LEAST_GAIN:g} %, the "
-                f"best one {100.0 * gain:.1f} %"
+                f"{by}: no layout has an expected reduction of {100.0 * LEAST_GAIN:g} %, "
+                f"the best one {100.0 * gain:.1f} %"
             )
             layout, gain = (), 0.0
         return replace(result, method=PackageProposer.name, by=by, layout=layout, gain=gain)
@@ -164,7 +164,9 @@ def chosen_for(problem: LayoutProblem) -> Chosen:
     if scenario.zone.items:
         surrogate = packaged_surrogate()
         known = {"surrogate": surrogate.digest}
-        return Chosen(search_by(surrogate), "guesses of gas dynamics", 0, known, is_guessed=True)
+        return Chosen(
+            search_by(surrogate), "the surrogate of gas dynamics", 0, known, is_guessed=True
+        )
     blasts = len(layouts_by_rule(scenario, problem.told)) * len(problem.threats)
     rules = {"method": BestRuleSearch.name}
     return Chosen(BestRuleSearch(), "the best rule by gas dynamics", blasts, rules)

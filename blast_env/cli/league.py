@@ -85,9 +85,9 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
     agent_search: str = option("", "Blasts that a search from an agent may spend on a case.")
     surrogate: Path | None = option(
         None,
-        "Surrogate of gas dynamics (studies.surrogate fit): enters by itself, and as a search with "
-        "the blasts of --agent-search; what agents draw enters ranked by it, and their searches "
-        "guided by it, too.",
+        "Surrogate of gas dynamics (studies.surrogate fit): an entry by itself, and a search with "
+        "the blasts of --agent-search. It also ranks the layouts of agents and guides their "
+        "searches, as further entries.",
     )
     cell_m: float | None = option(None, CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")

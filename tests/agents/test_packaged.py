@@ -116,7 +116,7 @@ def test_weights_for_generated_sites_are_for_each_site_of_their_family(
 
     save_scenario(site, tmp_path / "site.toml")
     done = proposed(tmp_path, monkeypatch, tmp_path / "site.toml")
-    assert "by guesses of gas dynamics" in done.output  # which are better there
+    assert "by the surrogate of gas dynamics" in done.output  # which are better there
 
     assert packaged_agent(site, "visible", tmp_path) is None
     assert packaged_agent(wide_yard(), "hidden", tmp_path) is None  # of another size
@@ -175,7 +175,7 @@ def test_without_weights_the_surrogate_proposes_and_no_blast_is_run(
     out = tmp_path / "layout.json"
     done = proposed(tmp_path, monkeypatch, yard, "--charge", *CHARGE.position_m, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "by guesses of gas dynamics (--verify evaluates it)" in done.output
+    assert "by the surrogate of gas dynamics (--verify evaluates it)" in done.output
     surrogate = packaged_surrogate()
     wanted = LearntSearch(surrogate).at_once(site, CHARGE)
     layout = LayoutFile.load(out)

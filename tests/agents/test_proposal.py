@@ -84,8 +84,10 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     done = CliRunner().invoke(app, ["propose", str(tmp_path / "yard.toml"), *options])
     assert done.exit_code == 0, done.output
     words = " ".join(done.output.split())
-    assert "walled_yard: nothing is proposed, by guesses of gas dynamics: no layout is" in words
-    assert "expected to take off 3 %, the best one 1.6 %" in words
+    assert (
+        "walled_yard: nothing is proposed, by the surrogate of gas dynamics: no layout has" in words
+    )
+    assert "expected reduction of 3 %, the best one 1.6 %" in words
     assert load_layout(tmp_path / "none.json", wide_yard()) == ()
 
 

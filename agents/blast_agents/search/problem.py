@@ -224,7 +224,7 @@ class SearchResult:
     @property
     def expectation(self) -> str:
         """The predicted gain as text; empty without a prediction."""
-        return "" if self.gain is None else f"expected to take off {100.0 * self.gain:.1f} %"
+        return "" if self.gain is None else f"expected reduction {100.0 * self.gain:.1f} %"
 
     def best_at(self, blasts: int) -> Candidate | None:
         """Return the best layout after a number of blasts, or `None` if there was none yet.

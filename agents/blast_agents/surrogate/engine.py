@@ -44,7 +44,7 @@ class SurrogateEngine(Engine):
     has_peaks: ClassVar[bool] = True
     title: ClassVar[str] = "Surrogate"
     caveat: ClassVar[str] = (
-        "These are guesses of gas dynamics, not blasts: judge with engine 'gas'."
+        "These are predictions of a surrogate, not blasts: judge with engine 'gas'."
     )
     validated_range: ClassVar[str] = "a validated range: they are predictions of the surrogate"
 
@@ -94,7 +94,7 @@ class SurrogateEngine(Engine):
         nothing = [None] * len(impulse_pa_s)
         peak_pa = nothing if guess.peak_pa is None else of_all(guess.peak_pa[0])
         structures = tuple(
-            StructureLoad.on(*told, notes=("a guess of the surrogate, not a blast",))
+            StructureLoad.on(*told, notes=("a prediction of the surrogate, not a blast",))
             for told in zip(scenario.structures, impulse_pa_s, peak_pa, strict=True)
         )
         modules = [each.rows * each.columns for each in scenario.structures]
