@@ -120,7 +120,7 @@ def test_called_again_it_has_nothing_left_to_simulate(
     second = league(*arguments)
     assert second.exit_code == 0, second.output
     assert "up to 0 blasts in all" in second.stdout
-    assert "4 of 4 searches are through already" in second.stdout
+    assert "4 of 4 searches are complete already" in second.stdout
 
 
 def test_a_run_says_what_it_is_for_and_what_it_cost(run: Path) -> None:

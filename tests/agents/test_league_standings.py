@@ -144,7 +144,7 @@ def test_agents_are_held_against_the_best_rule_genetic_search_and_the_best_searc
         (-0.1, -0.001, "protects worse"),
         (-0.1, 0.1, "no difference shown"),
         (0.0, 0.0, "no difference shown"),
-        (np.nan, np.nan, "says nothing"),
+        (np.nan, np.nan, "gives no interval"),
     ],
 )
 def test_the_interval_decides(low: float, high: float, words: str) -> None:
