@@ -40,7 +40,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from, worst
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_layout, load_scenario
 from blast_env.scenario.build_scene import charge_against
-from blast_env.scenario.versions import SCHEMA_VERSION
+from blast_env.scenario.models import SCHEMA_VERSION
 from blast_env.tables import markdown_table
 
 with render_extra():

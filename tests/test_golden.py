@@ -54,7 +54,7 @@ def dense_yard() -> Scenario:
     """Return a small yard in dense air, with friction, spin and modules that break."""
     return Scenario.from_document(
         {
-            "schema_version": 1,
+            "schema_version": 2,
             "name": "dense_yard",
             "site": {"width_m": 24.0, "height_m": 18.0},
             "charge": [

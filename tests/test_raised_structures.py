@@ -102,13 +102,6 @@ def test_a_base_of_0_changes_nothing() -> None:
     assert hut_with(CANOPY).content_hash != hut_with({**CANOPY, "base_m": 2.0}).content_hash
 
 
-def test_a_file_of_version_1_has_none() -> None:
-    with pytest.raises(
-        BlastEnvError, match=r"structures\[1\].base_m: schema_version 2 has this key"
-    ):
-        hut_with({**CANOPY, "base_m": 0.0}, schema_version=1)
-
-
 def test_it_survives_saving(tmp_path: Path) -> None:
     scenario = hut_with(CANOPY)
     path = tmp_path / "canopy.toml"

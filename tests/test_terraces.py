@@ -356,7 +356,6 @@ def test_what_carries_nothing_has_the_hash_of_before() -> None:
             {"charge": [{"kind": "point", "position_m": [7.0, 6.0], "tnt_kg": 5.0}]},
             r"'podium' .* must keep clear of it by 0.5 m, .* or be higher than its 1 m",
         ),
-        ([TERRACE], {"schema_version": 1}, r"structures\[1\].carries: schema_version 2 has this"),
         (
             [TERRACE | {"carries": "yes"}],
             {},

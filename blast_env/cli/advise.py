@@ -34,8 +34,8 @@ from blast_env.geometry import Layout, layout_words
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Placement, Scenario, load_scenario, write_layout
+from blast_env.scenario.models import SCHEMA_VERSION
 from blast_env.scenario.placement import met_by_blasts
-from blast_env.scenario.versions import SCHEMA_VERSION
 
 _HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks")
 

@@ -28,7 +28,7 @@ from blast_env.provenance import package_version
 from blast_env.reading import read_apart
 from blast_env.scenario import Scenario, SimulationSection
 from blast_env.scenario.checks import charge_radius_m
-from blast_env.scenario.versions import SCHEMA_VERSION
+from blast_env.scenario.models import SCHEMA_VERSION
 from blast_env.values import path_of
 
 _MOST_DESCRIPTION: Final = 2000

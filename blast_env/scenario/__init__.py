@@ -17,6 +17,7 @@ from blast_env.scenario.files import (
 )
 from blast_env.scenario.layout_file import LayoutFile, load_layout, write_layout
 from blast_env.scenario.models import (
+    SCHEMA_VERSION,
     AnySource,
     AnyStructure,
     ConcreteSquareSection,
@@ -34,7 +35,6 @@ from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.placement import Placement, check_layout, usable_cells
 from blast_env.scenario.problems import Problem, ScenarioError
 from blast_env.scenario.vehicles import AnyCharge, VehicleCharge
-from blast_env.scenario.versions import SCHEMA_VERSION
 from blast_env.scenario.zone import BuildZone, CostArea, KeepOut
 
 __all__ = [

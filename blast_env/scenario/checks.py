@@ -40,7 +40,6 @@ from blast_env.scenario.sections import (
 )
 from blast_env.scenario.terraces import terrace_problems
 from blast_env.scenario.vehicles import MOST_PLACES, Obstacles, RatedPiece, VehicleGround
-from blast_env.scenario.versions import MAX_ITEMS
 from blast_env.scenario.zone import (
     BuildZone,
     EmptyZone,
@@ -59,6 +58,9 @@ MOST_AIR_BALLS: Final = 1_000_000
 
 MOST_MODULES: Final = 250_000
 """Most modules of a scene: 250 m x 250 m of buildings, which add 2 s to a blast."""
+
+_MOST_ITEMS: Final = 100
+"""Most items of an array that are examined; longer arrays are errors anyway."""
 
 _SITE: Final = TypeAdapter(Site)
 _SOURCE: Final[TypeAdapter[AnySource]] = TypeAdapter(AnySource)
@@ -220,7 +222,7 @@ def _sound_items(adapter: TypeAdapter[Checked], values: object) -> dict[int, Che
     """Return the valid items of an array by index."""
     if not isinstance(values, list | tuple):
         return {}
-    items = ((index, _sound(adapter, value)) for index, value in enumerate(values[:MAX_ITEMS]))
+    items = ((index, _sound(adapter, value)) for index, value in enumerate(values[:_MOST_ITEMS]))
     return {index: item for index, item in items if item is not None}
 
 

@@ -18,24 +18,13 @@ from blast_env.scenario.models import Scenario
 from blast_env.scenario.placement import check_layout
 from blast_env.values import path_of
 
-CELLS_VERSION: Final = 1
-"""Version of a file with a layout of cells; the default."""
-
-PIECES_VERSION: Final = 2
-"""Version of a file with a layout of pieces."""
-
-MEASURES_VERSION: Final = 3
-"""Version of a file with a layout of pieces and measures."""
-
-_LISTS: Final[Mapping[int, str]] = MappingProxyType(
-    {CELLS_VERSION: "cells", PIECES_VERSION: "pieces", MEASURES_VERSION: "pieces"}
-)
-"""The key of the layout, by the version of the file."""
+VERSION: Final = 1
+"""The version of the file format."""
 
 _MEASURES: Final[Mapping[str, type[Measure]]] = MappingProxyType(
     {"hardening": Measure, "taken_away": Removal}
 )
-"""The keys of the names of the measures, in the last version."""
+"""The keys of the names of the measures, beside pieces."""
 
 _OTHER_KEYS: Final = ("scenario", "site_hash", "provenance", "version")
 _PIECE_KEYS: Final[Mapping[str, type]] = MappingProxyType(
@@ -156,9 +145,8 @@ class LayoutFile:
             for key, kind in _MEASURES.items()
         }
         if pieces or any(measures.values()):
-            version = MEASURES_VERSION if any(measures.values()) else PIECES_VERSION
             lines = ",\n".join(f"    {json.dumps(_piece_table(piece))}" for piece in pieces)
-            layout = f'  "version": {version},\n  "pieces": [\n{lines}\n  ]'
+            layout = f'  "pieces": [\n{lines}\n  ]'
             for key in filter(measures.get, measures):
                 layout += f',\n  "{key}": {json.dumps(measures[key])}'
         else:
@@ -171,7 +159,7 @@ class LayoutFile:
             rest = json.dumps(given, indent=2, allow_nan=False)
         except (TypeError, ValueError, RecursionError) as error:
             raise LayoutError(f"{path}: provenance: JSON cannot hold it: {error}") from error
-        return f"{{\n{layout}" + (f",{rest[1:]}" if given else "\n}")
+        return f'{{\n  "version": {VERSION},\n{layout}' + (f",{rest[1:]}" if given else "\n}")
 
     def _mismatch(self, scenario: Scenario) -> str:
         """Return the message of a layout for another scenario, with a remedy."""
@@ -240,15 +228,17 @@ def _parse(content: Any, source: str) -> LayoutFile:
     """Return the content of a file; `source` is its name, for errors."""
     if not isinstance(content, dict):
         return LayoutFile(_cells(content, source, ""))
-    version = content.get("version", CELLS_VERSION)
-    if type(version) is not int or version not in _LISTS:
-        known = ", ".join(map(str, _LISTS))
-        raise LayoutError(f"{source}: version: is {type_word(version)}, must be one of {known}")
-    key = _LISTS[version]
-    measures = _MEASURES if version == MEASURES_VERSION else ()
+    version = content.get("version", VERSION)
+    if type(version) is not int or version != VERSION:
+        raise LayoutError(
+            f"{source}: version: is {type_word(version)}, must be {VERSION}, the version of this"
+            " release"
+        )
+    key = "pieces" if "pieces" in content else "cells"
+    measures = _MEASURES if key == "pieces" else ()
     _check_keys(content, (key, *measures, *_OTHER_KEYS), f"{source}: ")
     if key not in content:
-        raise LayoutError(f"{source}: {key}: missing")
+        raise LayoutError(f"{source}: cells or pieces: missing")
     name, site_hash = content.get("scenario"), content.get("site_hash")
     if name is not None and not isinstance(name, str):
         raise LayoutError(f"{source}: scenario: is {type_word(name)}, must be a string")
@@ -264,7 +254,7 @@ def _parse(content: Any, source: str) -> LayoutFile:
     provenance = content.get("provenance", {})
     if not isinstance(provenance, dict):
         raise LayoutError(f"{source}: provenance: is {type_word(provenance)}, must be a table")
-    read = _cells if version == CELLS_VERSION else _pieces
+    read = _cells if key == "cells" else _pieces
     layout = read(content[key], source, key)
     for name_key, kind in _MEASURES.items():
         layout += _measures(content.get(name_key, []), f"{source}: {name_key}", kind)

@@ -13,12 +13,11 @@ from typing import Annotated, Any, Final, Self
 import numpy as np
 from pydantic import (
     AfterValidator,
+    BaseModel,
     Field,
-    SerializerFunctionWrapHandler,
     StrictInt,
     TypeAdapter,
     ValidationError,
-    model_serializer,
     model_validator,
 )
 
@@ -66,14 +65,6 @@ from blast_env.scenario.sections import (
     VehicleSource,
 )
 from blast_env.scenario.vehicles import AnyCharge, VehicleCharge, VehicleGround, ranked
-from blast_env.scenario.versions import (
-    FIRST_VERSION,
-    SCHEMA_VERSION,
-    check_version,
-    lowest_version,
-    unused_new_keys,
-    version_problems,
-)
 from blast_env.scenario.zone import (
     BuildZone,
     KeepOut,
@@ -106,11 +97,21 @@ __all__ = [
     "VehicleSource",
 ]
 
-_LATER_KEYS: Final = (
-    *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
-    *("hardening", "removable"),
-)
-"""Keys of a build zone added after the first hashes, which ignore their defaults."""
+SCHEMA_VERSION: Final = 2
+"""The version of the file format."""
+
+_OPTIONAL: Final[Mapping[str, tuple[str, ...]]] = {
+    "scenario": ("gauges", "objective"),
+    "charge": ("height_m",),
+    "structures": ("height_m", "base_m", "carries", "faces", "peak_weight", "facade"),
+    "objective": ("kind", "measure", "target"),
+    "build_zone": (
+        *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
+        *("hardening", "removable"),
+    ),
+    "access_way": ("gate",),
+}
+"""Keys by section that the hashes leave out where they have their default values."""
 
 _NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
 """Sections that the hash ignores; it has the parameters of `simulation` instead, and the components
@@ -126,11 +127,18 @@ Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
 """The sources of the charge."""
 
 
+def _check_version(version: int) -> int:
+    """Refuse a file of another version of the format."""
+    if version != SCHEMA_VERSION:
+        raise ValueError(f"must be {SCHEMA_VERSION}, the version of this release")
+    return version
+
+
 class Scenario(Section):
     """A protective-layout problem, without layout and seed.
 
     Attributes:
-        schema_version: The lowest version of the file format that holds the scenario.
+        schema_version: Version of the file format.
         name: Short name, as in `load_scenario("courtyard")`.
         description: Description for readers.
         site: The simulated area.
@@ -145,7 +153,7 @@ class Scenario(Section):
         components: Components of facades by name, beside those of the catalogue.
     """
 
-    schema_version: Annotated[StrictInt, AfterValidator(check_version)]
+    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
     name: Name
     description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
     site: Site
@@ -262,8 +270,15 @@ class Scenario(Section):
                 name: each.model_dump(mode="json", exclude=words)
                 for name, each in self.components.items()
             }
-        content["schema_version"] = FIRST_VERSION  # the presence of newer keys suffices
-        if self.site.air_height_m == default_air_height_m(self.structures, self.build_zone):
+        content["schema_version"] = 1
+        _omit_defaults(content, self, "scenario")
+        if "objective" in content:
+            _omit_defaults(content["objective"], self.objective, "objective")
+        for key in ("charge", "structures"):
+            for table, section in zip(content[key], getattr(self, key), strict=True):
+                _omit_defaults(table, section, key)
+        default_m = default_air_height_m(self.structures, self.build_zone)
+        if self.site.air_height_m in (None, default_m):
             del content["site"]["air_height_m"]
         if self.build_zone is not None:
             content["build_zone"] = _without_words(self.build_zone)
@@ -308,7 +323,7 @@ class Scenario(Section):
             problems = problems_from(error, cls)
         # Pydantic skips the checks between sections if any section is invalid.
         problems = changed.as_written((*problems, *check_parts(sound_parts(changed.document))))
-        raise ScenarioError(source, (*problems, *version_problems(document)))
+        raise ScenarioError(source, problems)
 
     def at_stand_off(self, distance_m: float) -> "Scenario":
         """Return the scenario with the structure at another distance from the charge.
@@ -378,14 +393,12 @@ class Scenario(Section):
         except ValidationError:  # the error of the whole document has all problems
             own = [source.model_dump() for source in sources]
             return Scenario.from_document(
-                self.model_dump() | {"schema_version": SCHEMA_VERSION, "charge": [*own, *document]},
-                self.name,
+                self.model_dump() | {"charge": [*own, *document]}, self.name
             )
         problems = check_sources(self._parts(together))
         if problems:
             raise ScenarioError(self.name, problems)
-        copy = self.model_copy(update={"charge": together})
-        return copy.model_copy(update={"schema_version": lowest_version(copy)})
+        return self.model_copy(update={"charge": together})
 
     def with_simulation(
         self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
@@ -449,26 +462,10 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check_sections_together(self) -> Self:
         """Refuse a scenario with inconsistent sections."""
-        problems = (*version_problems(self), *check_parts(self._parts(self.charge)))
+        problems = check_parts(self._parts(self.charge))
         if problems:
             raise ScenarioError(self.name, problems)
-        # Equal scenarios compare equal whatever the versions of their files.
-        object.__setattr__(self, "schema_version", lowest_version(self))
         return self
-
-    @model_serializer(mode="wrap")
-    def _in_lowest_version(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit newer keys with default values, so that the lowest version suffices."""
-        document: dict[str, Any] = handler(self)
-        for *above, key in unused_new_keys(self):
-            table: Any = document
-            if not above or above[0] in document:  # else it was left out of the dump
-                for part in above:
-                    table = table[part]
-                table.pop(key, None)
-        if "schema_version" in document:
-            document["schema_version"] = lowest_version(self)
-        return document
 
     def _parts(self, sources: Sequence[AnySource]) -> Parts:
         """Return the sections for the checks between them, with the given sources."""
@@ -494,7 +491,7 @@ def _digest(content: dict[str, Any]) -> str:
 
 
 def _without_words(zone: BuildZone) -> dict[str, Any]:
-    """Return the content of a build zone without texts for readers and unused later keys."""
+    """Return the content of a zone without texts for readers and defaults of optional keys."""
     content = zone.model_dump(mode="json")
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
@@ -504,14 +501,20 @@ def _without_words(zone: BuildZone) -> dict[str, Any]:
         _without_test(item)
     for measure in (*content["hardening"], *content["removable"]):
         del measure["description"]
-    if zone.access_way is not None and zone.access_way.gate is None:
-        del content["access_way"]["gate"]
-    elif zone.access_way is not None:
-        _without_test(content["access_way"]["gate"])
-    for key in _LATER_KEYS:
-        if getattr(zone, key) == BuildZone.model_fields[key].default:
-            del content[key]
+    if zone.access_way is not None:
+        if zone.access_way.gate is not None:
+            _without_test(content["access_way"]["gate"])
+        _omit_defaults(content["access_way"], zone.access_way, "access_way")
+    _omit_defaults(content, zone, "build_zone")
     return content
+
+
+def _omit_defaults(content: dict[str, Any], section: BaseModel, name: str) -> None:
+    """Remove the optional keys of a section that have their default values."""
+    for key in _OPTIONAL[name]:
+        field = type(section).model_fields[key]
+        if getattr(section, key) == field.get_default(call_default_factory=True):
+            content.pop(key, None)
 
 
 def _without_test(content: dict[str, Any]) -> None:

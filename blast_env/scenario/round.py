@@ -22,7 +22,6 @@ from blast_env.arrays import IntArray
 from blast_env.geometry import stacked_runs
 from blast_env.scenario.problems import Problem, problems_from, unknown_key
 from blast_env.scenario.sections import Name, PointM, Section
-from blast_env.scenario.versions import FIRST_VERSION
 from blast_env.units import MODULE_SIDE_M
 
 KIND: Final = "round"
@@ -128,7 +127,6 @@ class WithoutRound:
     def of(cls, document: Mapping[str, Any]) -> "WithoutRound":
         """Return a file with its round structures replaced."""
         listed = document.get("structures")
-        is_new = document.get("schema_version") != FIRST_VERSION
         if not isinstance(listed, list | tuple) or not any(map(_is_round, listed)):
             return cls(document)
         structures: list[Any] = []
@@ -139,7 +137,7 @@ class WithoutRound:
         for index, table in enumerate(listed):
             parts: list[Any] = [table]
             wrong: tuple[Problem, ...] = ()
-            if _is_round(table) and is_new:
+            if _is_round(table):
                 parts, wrong = _parts_of(table, index)
                 name = str(table.get("name"))
                 if taken.count(name) > 1:

@@ -129,7 +129,7 @@ def block_scenario(geometry: BlockGeometry) -> Scenario:
     """
     side_m = geometry.side_m
     document: dict[str, Any] = {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "block",
         "site": {
             "width_m": 2.0 * _MARGIN_M + geometry.stand_off_m + side_m,

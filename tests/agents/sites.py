@@ -14,7 +14,7 @@ def site(
 ) -> Scenario:
     """Return a site of 40 m x 40 m with a building of 4 m x 4 m and a zone of 10 m x 10 m."""
     document = {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "site",
         "site": {"width_m": SIDE_M, "height_m": SIDE_M},
         "charge": [{"kind": "point", "position_m": charge_m, "tnt_kg": 100.0}],

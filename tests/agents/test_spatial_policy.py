@@ -201,7 +201,7 @@ def test_a_place_counts_by_the_angle_under_which_it_sees_the_facade() -> None:
     points = ((2.25, 10.25), (35.25, 10.25))  # 7.75 m before the house, and 3 times that behind it
     scenario = Scenario.from_document(
         {
-            "schema_version": 1,
+            "schema_version": 2,
             "name": "two_sides",
             "site": {"width_m": 40.0, "height_m": 20.0},
             "charge": [

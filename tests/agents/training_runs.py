@@ -25,7 +25,7 @@ STEPS = 3 * ROLLOUT
 def small_scenario(stock: int = 4) -> Scenario:
     """Return a site of 20 m x 14 m with a road, a building, and a zone of 8 x 6 cells."""
     document = {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "small",
         "calibration": "ballistic_kb_100kg",
         "site": {"width_m": 20.0, "height_m": 14.0},

@@ -43,7 +43,7 @@ class ThinEngine(ParticleEngine):
 def small_document(**zone: Any) -> dict[str, Any]:
     """Return a document with two protected structures and another one, and a zone of 8 x 5."""
     return {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "small",
         "calibration": _MODEL.calibration,
         "simulation": _MODEL.simulation.model_dump(),

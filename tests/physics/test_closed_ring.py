@@ -43,7 +43,7 @@ def ring(cavity_modules: int, thickness: int, shift_m: float = 0.0) -> Scenario:
     site_m = {"width_m": target_m + 4.0, "height_m": 2.0 * corner + side * MODULE_SIDE_M}
     return Scenario.from_document(
         {
-            "schema_version": 1,
+            "schema_version": 2,
             "name": "ring",
             "site": site_m,
             "charge": [{"kind": "point", "position_m": (middle_m, middle_m), "tnt_kg": 100.0}],

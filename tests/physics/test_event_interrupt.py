@@ -17,7 +17,7 @@ from blast_env.scenario import Scenario
 def touching_air() -> Scene:
     """Return air whose balls touch each other: a hundred thousand events in one moment."""
     document = {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "touching_air",
         "site": {"width_m": 20.0, "height_m": 20.0},
         "charge": [{"kind": "point", "position_m": (5.0, 5.0), "tnt_kg": 100.0}],

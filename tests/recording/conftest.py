@@ -21,7 +21,7 @@ SEED = 2**60 + 1
 
 def make_scenario(**overrides: dict[str, Any]) -> Scenario:
     return Scenario(
-        schema_version=1,
+        schema_version=2,
         name="small_yard",
         site=Site(width_m=20.0, height_m=20.0),
         charge=(PointSource(position_m=(4.0, 10.0), tnt_kg=100.0),),

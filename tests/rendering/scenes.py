@@ -12,7 +12,7 @@ LAYOUT = tuple((row, 1) for row in range(2, 9))
 
 def small_scenario(ball_count: int = 240, time_limit_s: float = 0.05) -> Scenario:
     document: dict[str, Any] = {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "small",
         "site": {"width_m": 20.0, "height_m": 20.0},
         "charge": [{"kind": "point", "position_m": (6.0, 10.0), "tnt_kg": 100.0}],

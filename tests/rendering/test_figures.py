@@ -159,7 +159,7 @@ def test_another_suffix_is_refused(result: BlastResult, tmp_path: Path) -> None:
 
 
 def test_the_parts_of_a_building_are_one_on_the_heat_map(blast: Blast) -> None:
-    document = blast.scenario.model_dump(mode="json", exclude_none=True) | {"schema_version": 2}
+    document = blast.scenario.model_dump(mode="json", exclude_none=True)
     for each in document["structures"]:
         each["building"] = "town"
     joined = replace(blast, scenario=Scenario.from_document(document, "joined")).run()

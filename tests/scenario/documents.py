@@ -14,7 +14,7 @@ Document = dict[str, Any]
 KeyPath = tuple[str | int, ...]
 
 _FULL: Document = {
-    "schema_version": 1,
+    "schema_version": 2,
     "name": "full",
     "description": 'Every key of the format, with "quotes", \\ and\nümlauts.',
     "calibration": "some_calibration",
@@ -73,7 +73,7 @@ def full_document() -> Document:
 
 
 def tall_document() -> Document:
-    """Return the full document with every key that version 2 added."""
+    """Return the full document with heights, faces, gauges and what else gas dynamics knows."""
     document = full_document()
     document |= {
         "schema_version": 2,
@@ -151,7 +151,7 @@ def driven_document() -> Document:
 def minimal_document() -> Document:
     """Return a valid document with nothing but required keys."""
     return {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "minimal",
         "site": {"width_m": 20.0, "height_m": 10.0},
         "charge": [{"kind": "point", "position_m": [3.0, 5.0], "tnt_kg": 100.0}],

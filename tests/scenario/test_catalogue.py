@@ -48,7 +48,7 @@ def test_a_catalogue_survives_saving(tmp_path: Path) -> None:
     save_scenario(scenario, tmp_path / "yard.toml")
     assert load_scenario(tmp_path / "yard.toml") == scenario
     assert Scenario.from_document(scenario.model_dump(), "yard") == scenario
-    assert (scenario.schema_version, scenario.zone.stock) == (2, 9)
+    assert scenario.zone.stock == 9
 
 
 AREA: Document = {"corner_m": (3.5, 2.5), "size_m": (1.0, 1.0), "reason": "duct"}
@@ -85,12 +85,6 @@ def test_words_and_defaults_do_not_count_in_the_hash() -> None:
     )
     assert same.content_hash == yard().content_hash
     assert yard(stock=8).content_hash != yard().content_hash
-
-
-def test_a_catalogue_in_a_file_of_version_1_is_named() -> None:
-    document = {**yard_document(), "schema_version": 1}
-    with pytest.raises(ScenarioError, match=r"build_zone.items: schema_version 2 has this key"):
-        Scenario.from_document(document, "yard")
 
 
 BAD: list[tuple[Document, str]] = [
@@ -334,7 +328,7 @@ def test_layout_files_name_items_and_cells(tmp_path: Path) -> None:
     path = write_layout(tmp_path / "layout.json", yard(), WALL, {"seed": 3})
     assert load_layout(path) == load_layout(path, yard()) == WALL
     content = json.loads(path.read_text())
-    assert (content["version"], content["scenario"]) == (2, "walled_yard")
+    assert (content["version"], content["scenario"]) == (1, "walled_yard")
     assert content["pieces"][0] == {"item": "wall", "row": 5, "column": 1, "turned": True}
     assert content["pieces"][2] == {"item": "post", "row": 4, "column": 1}
     assert LayoutFile.load(path).provenance == {"seed": 3}
@@ -348,18 +342,17 @@ PIECE = {"item": "wall", "row": 5, "column": 1, "turned": True}
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ({"version": 4, "pieces": []}, "version: is 4, must be one of 1, 2, 3"),
-        ({"version": 2.0, "pieces": []}, "version: is 2.0, must be one of 1, 2, 3"),
-        ({"version": 2, "cells": []}, "cells: unknown key"),
-        ({"pieces": []}, "pieces: unknown key"),
-        ({"version": 2}, "pieces: missing"),
-        ({"version": 2, "pieces": {}}, "pieces: is a table, must be a list of tables"),
-        ({"version": 2, "pieces": [[5, 1]]}, "pieces[0]: is an array, must be a table"),
-        ({"version": 2, "pieces": [{**PIECE, "row": 1.5}]}, "pieces[0]: row: is 1.5, must be a wh"),
-        ({"version": 2, "pieces": [{**PIECE, "turned": 1}]}, "pieces[0]: turned: is 1, must be tr"),
-        ({"version": 2, "pieces": [{**PIECE, "rows": 1}]}, "pieces[0]: rows: unknown key, did you"),
-        ({"version": 2, "pieces": [{"item": "wall", "row": 5}]}, "pieces[0]: column: missing"),
-        ({"version": 2, "pieces": [{**PIECE, "item": "fence"}]}, "'fence' at cell (5, 1), turned,"),
+        ({"version": 4, "pieces": []}, "version: is 4, must be 1"),
+        ({"version": 1.0, "pieces": []}, "version: is 1.0, must be 1"),
+        ({"cells": [], "pieces": []}, "cells: unknown key"),
+        ({"version": 1}, "cells or pieces: missing"),
+        ({"pieces": {}}, "pieces: is a table, must be a list of tables"),
+        ({"pieces": [[5, 1]]}, "pieces[0]: is an array, must be a table"),
+        ({"pieces": [{**PIECE, "row": 1.5}]}, "pieces[0]: row: is 1.5, must be a wh"),
+        ({"pieces": [{**PIECE, "turned": 1}]}, "pieces[0]: turned: is 1, must be tr"),
+        ({"pieces": [{**PIECE, "rows": 1}]}, "pieces[0]: rows: unknown key, did you"),
+        ({"pieces": [{"item": "wall", "row": 5}]}, "pieces[0]: column: missing"),
+        ({"pieces": [{**PIECE, "item": "fence"}]}, "'fence' at cell (5, 1), turned,"),
         ({"cells": [[5, 1]]}, "layout[0]: has 2 values, must be (row, column, item, turned)"),
     ],
 )

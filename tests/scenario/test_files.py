@@ -283,8 +283,8 @@ def test_example_of_heights_fits_into_the_whole_example() -> None:
         tomllib.loads((EXAMPLES / name).read_text(encoding="utf-8"))
         for name in ("example.toml", "example_heights.toml")
     )
-    scenario = Scenario.from_document({**whole, **heights, "schema_version": 2}, "example")
-    assert (scenario.schema_version, scenario.air_height_m) == (2, 12.0)
+    scenario = Scenario.from_document({**whole, **heights}, "example")
+    assert scenario.air_height_m == 12.0
     for key in ("charge", "structures"):  # what the second one repeats is as in the first
         for item in heights[key]:
             assert {k: v for k, v in item.items() if k not in ("height_m", "faces")} in whole[key]

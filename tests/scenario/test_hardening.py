@@ -93,30 +93,29 @@ def test_of_two_measures_on_a_bay_the_later_one_counts() -> None:
     assert scenario.bays_with(both) == scenario.bays_with(both[:1]) != scenario.bays_with(both[1:])
 
 
-def test_layout_file_has_a_version_of_its_own_only_with_measures(tmp_path: Path) -> None:
+def test_layout_file_has_measures(tmp_path: Path) -> None:
     scenario = glazed_yard()
     path = tmp_path / "layout.json"
     layout = (*WALL, TAKEN)
     write_layout(path, scenario, layout)
     content = json.loads(path.read_text())
-    assert (content["version"], content["hardening"]) == (3, ["glass"])
+    assert content["hardening"] == ["glass"]
     read = load_layout(path, scenario)
     assert read == layout
     assert standing(read) == WALL
     write_layout(path, scenario, WALL)
     content = json.loads(path.read_text())
-    assert content["version"] == 2
     assert "hardening" not in content
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"version": 2, "pieces": [], "hardening": ["glass"]}, "hardening: unknown key"),
-        ({"version": 3, "pieces": [], "hardening": "glass"}, "must be a list of names"),
-        ({"version": 3, "pieces": [], "hardening": [3]}, r"hardening\[0\]: is 3, must be a string"),
-        ({"version": 3, "pieces": [], "hardening": ["glas"]}, "did you mean 'glass'"),
-        ({"version": 3, "pieces": [], "hardening": ["glass"] * 2}, "is repeated"),
+        ({"cells": [], "hardening": ["glass"]}, "hardening: unknown key"),
+        ({"pieces": [], "hardening": "glass"}, "must be a list of names"),
+        ({"pieces": [], "hardening": [3]}, r"hardening\[0\]: is 3, must be a string"),
+        ({"pieces": [], "hardening": ["glas"]}, "did you mean 'glass'"),
+        ({"pieces": [], "hardening": ["glass"] * 2}, "is repeated"),
     ],
 )
 def test_unsound_layout_files_are_refused(
@@ -137,13 +136,12 @@ def test_the_bill_has_measures_and_plans_have_not() -> None:
     assert len(list(barrier_features(plan.scenario, plan.layout))) == len(WALL)
 
 
-def test_hash_and_version_are_as_ever_where_nothing_of_it_is_used() -> None:
+def test_hash_is_as_ever_where_nothing_of_it_is_used() -> None:
     bare = document()
     del bare["build_zone"]["hardening"]
     with_facade = Scenario.from_document(bare, "yard")
     plain = Scenario.from_document(yard_document(), "yard")
     assert with_facade.content_hash == plain.content_hash
-    assert "hardening" not in plain.model_dump()["build_zone"]
     assert glazed_yard().content_hash != plain.content_hash  # there is more to be built
 
 

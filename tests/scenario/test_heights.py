@@ -1,4 +1,4 @@
-"""Version 2 of the file format: heights, faces, gauges, buildings and georeferences."""
+"""Heights, faces, gauges, buildings and georeferences."""
 
 from pathlib import Path
 
@@ -17,7 +17,6 @@ from blast_env.scenario import (
     usable_cells,
 )
 from blast_env.scenario.build_scene import build_scene, build_site, draw_charge
-from blast_env.scenario.versions import NEW_KEYS
 from tests.scenario.documents import (
     Document,
     KeyPath,
@@ -43,20 +42,6 @@ def test_scenario_with_heights_survives_saving(tmp_path: Path) -> None:
     copy = load_scenario(tmp_path / "copy.toml")
     assert copy == scenario
     assert copy.content_hash == scenario.content_hash
-    assert copy.schema_version == 2
-    assert tmp_path.joinpath("copy.toml").read_text().startswith("schema_version = 2")
-
-
-@pytest.mark.parametrize("document", all_documents(), ids=lambda document: document["name"])
-def test_version_is_the_lowest_that_holds_the_content(tmp_path: Path, document: Document) -> None:
-    """A file that uses nothing of version 2 is one of version 1, which older releases read."""
-    newer = scenario_from({**document, "schema_version": 2})
-    assert newer.schema_version == (2 if document["name"] in ("tall", "driven") else 1)
-    assert newer == scenario_from(document)
-    assert newer.content_hash == scenario_from(document).content_hash
-    save_scenario(newer, tmp_path / "copy.toml")
-    assert load_scenario(tmp_path / "copy.toml") == newer
-    assert f"schema_version = {newer.schema_version}\n" in (tmp_path / "copy.toml").read_text()
 
 
 @pytest.mark.parametrize("document", all_documents(), ids=lambda document: document["name"])
@@ -69,8 +54,8 @@ def test_document_of_a_scenario_makes_the_same_scenario(document: Document) -> N
 
 
 def defaults_written_out() -> Document:
-    """Return the full document with the defaults of version 2 written out."""
-    document = {**full_document(), "schema_version": 2, "gauges": []}
+    """Return the full document with the defaults of heights and faces written out."""
+    document = {**full_document(), "gauges": []}
     document["site"]["air_height_m"] = 12.0
     for source in document["charge"]:
         source["height_m"] = 0
@@ -102,42 +87,11 @@ WORDS: list[KeyPath] = [("georeference",), ("structures", 0, "building")]
 NEW_PATHS = COUNTING_PATHS + WORDS
 
 
-def test_new_keys_are_all_tried() -> None:
-    listed = {(section, key) for section, keys in NEW_KEYS.items() for key in keys}
-    own_tests = {
-        "base_m",
-        "carries",
-        "items",
-        "components",
-        "facade",
-        "hardening",
-        "kind",
-        "measure",
-        "removable",
-        "target",
-    }
-    listed = {each for each in listed if each[1] not in own_tests}
-    named = [[str(part) for part in path if isinstance(part, str)] for path in NEW_PATHS]
-    assert listed == {(".".join(above), key) for *above, key in named}
-
-
 @pytest.mark.parametrize("path", NEW_PATHS, ids=written)
 def test_each_new_key_counts_in_the_hash_unless_no_result_depends_on_it(path: KeyPath) -> None:
     fewer = without(tall_document(), path)
     same = scenario_from(fewer).content_hash == scenario_from(tall_document()).content_hash
     assert same == (path in WORDS)
-
-
-@pytest.mark.parametrize("path", NEW_PATHS, ids=written)
-@pytest.mark.parametrize("section", [None, "site", "structures"])
-def test_new_key_in_a_file_of_version_1_is_named(path: KeyPath, section: str | None) -> None:
-    document = {**tall_document(), "schema_version": 1}
-    if section is not None and path[0] != section:
-        document[section] = 3  # another problem, which must not hide this one
-    lines = lines_for(document)
-    message = "schema_version 2 has this key, the file has schema_version 1"
-    assert f"f.toml: {written(path)}: {message}" in lines
-    assert len(lines) >= 6 if section is None else True
 
 
 @pytest.mark.parametrize(
@@ -166,14 +120,7 @@ def test_georeference_out_of_bounds_is_named(georeference: object, lines: list[s
         assert any(each.startswith(f"f.toml: {line}") for each in found), (line, found)
 
 
-def test_default_of_version_2_is_a_new_key_too() -> None:
-    lines = lines_for(changed(full_document(), ("charge", 1, "height_m"), 0.0))
-    assert lines == [
-        "f.toml: charge[1].height_m: schema_version 2 has this key, the file has schema_version 1"
-    ]
-
-
-def test_every_wall_of_version_1_is_as_high_as_the_air() -> None:
+def test_every_wall_without_a_height_is_as_high_as_the_air() -> None:
     site = build_site(load_scenario("courtyard"), [(4, 0)])
     assert [outline.height_m for outline in site.structures] == [None] * len(site.structures)
     assert {outline.faces for outline in site.structures} == {WALLS}
@@ -210,10 +157,8 @@ def test_charges_carry_their_height() -> None:
     assert heights == {0.0, 1.0}
     raised = scenario_from(full_document()).with_charge(Charge((8.0, 15.0), 50.0, 2.0))
     assert raised.sample_charge(np.random.default_rng(0)) == Charge((8.0, 15.0), 50.0, 2.0)
-    assert raised.schema_version == 2
     assert scenario_from(raised.model_dump()) == raised
     lowered = raised.with_charge(Charge((8.0, 15.0), 50.0))
-    assert lowered.schema_version == 1
     assert lowered.content_hash != raised.content_hash
 
 
@@ -417,8 +362,8 @@ def test_charge_inside_a_building_is_refused(height_m: float) -> None:
 def test_engines_without_heights_can_say_what_they_leave_aside() -> None:
     assert scenario_from(full_document()).height_notes == ()
     bundled = [load_scenario(name) for name in bundled_scenarios()]
-    assert all(each.height_notes == () for each in bundled if each.schema_version == 1)
-    assert all(each.height_notes for each in bundled if each.schema_version == 2)
+    without_heights = {each.name for each in bundled if not each.height_notes}
+    assert without_heights == {"courtyard", "free_field", "perimeter_gate", "street_junction"}
     notes = scenario_from(tall_document()).height_notes
     words = ("endlessly high", "on the ground", "all walls", "gauges record nothing")
     assert len(notes) == len(words)
@@ -434,7 +379,7 @@ def test_engines_without_heights_can_say_what_they_leave_aside() -> None:
     ],
 )
 def test_each_note_has_its_cause(path: KeyPath) -> None:
-    document = changed(minimal_document(), ("schema_version",), 2)
+    document = minimal_document()
     zone = {"corner_m": [5.0, 0.0], "rows": 20, "columns": 4, "stock": 12}
     document["build_zone"] = zone
     assert scenario_from(document).height_notes == ()

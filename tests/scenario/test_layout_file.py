@@ -197,7 +197,7 @@ def test_a_file_that_could_not_be_read_back_is_not_written(
         (b'{"cells": [], "site_hash": "12"}', "site_hash: is '12' .a string., must be 64"),
         (b'{"cells": [], "provenance": []}', "provenance: is an array, must be a table"),
         (b'{"cells": [], "cells": [[1, 2]]}', "a key occurs twice"),
-        (b"{}", "cells: missing"),
+        (b"{}", "cells or pieces: missing"),
         (b"null", "is nothing, must be a list"),
         (b'"text"', "is 'text' .a string., must be a list"),
         (b"[[1, NaN]]", "NaN is not a number of JSON"),

@@ -1,8 +1,6 @@
-import json
 import math
 import pickle
 from functools import partial
-from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -142,24 +140,6 @@ def test_hash_ignores_words_and_ways_of_writing(path: KeyPath, value: object) ->
     assert scenario_from(other).content_hash == scenario_from(full_document()).content_hash
 
 
-def test_conditions_that_a_file_does_not_make_leave_its_hash_as_it_was_before_they_existed() -> (
-    None
-):
-    """Results and calibrations name scenarios by their hash: the format may only grow."""
-    document = full_document()
-    for key in ("clearance_m", "module_cost", "cost_areas", "budget", "access_way"):
-        del document["build_zone"][key]
-    scenario = scenario_from(document)
-    words = {"name", "description", "simulation"}
-    content: Document = scenario.model_dump(mode="json", exclude=words)
-    known = ("corner_m", "rows", "columns", "stock", "module_capacity", "keep_outs")
-    content["build_zone"] = {key: content["build_zone"][key] for key in known}
-    del content["build_zone"]["keep_outs"][0]["reason"]
-    content["parameters"] = scenario.parameters.model_dump(mode="json")
-    text = json.dumps(content, sort_keys=True)
-    assert scenario.content_hash == sha256(text.encode()).hexdigest()
-
-
 def test_hash_ignores_the_sign_of_zero() -> None:
     document = changed(minimal_document(), ("structures", 0, "corner_m"), [10.0, 0.0])
     negative = changed(document, ("structures", 0, "corner_m"), [10.0, -0.0])
@@ -274,7 +254,7 @@ def test_a_charge_that_does_not_fit_has_the_problems_of_the_whole_document(charg
         (partial(scenario.with_charge, charge), [point]),
         (partial(scenario.with_possible_charges, [charge]), [*document["charge"], point]),
     ):
-        changes = {"schema_version": 2, "charge": sources}
+        changes = {"charge": sources}
         with pytest.raises(ScenarioError) as expected:
             Scenario.from_document(document | changes, scenario.name)
         with pytest.raises(ScenarioError) as found:

@@ -38,7 +38,7 @@ from tests.scenario.documents import (
         (("charge", 0, "position_m"), [1, 2, 3], "charge[0].position_m: has 3 values, must have"),
         (("charge", 0, "position_m"), [1.0], "charge[0].position_m[1]: missing"),
         (("charge", 0, "position_m"), [1, "a"], "charge[0].position_m[1]: is 'a' (a string), mus"),
-        (("schema_version",), 3, "schema_version: is 3, must be 1 or 2, the versions that"),
+        (("schema_version",), 1, "schema_version: is 1, must be 2, the version of this release"),
         (("schema_version",), True, "schema_version: is true (a truth value), must be a whole"),
         (("simulation", "preset"), "balistic", "simulation.preset: is 'balistic', there is no su"),
         (("simulation", "preset"), "balistic", "did you mean 'ballistic'?"),

@@ -70,7 +70,6 @@ def test_tables_have_it_as_one_and_files_keep_it(tmp_path: Path) -> None:
 
 def test_particles_meet_its_modules() -> None:
     document = load_scenario("courtyard").model_dump(mode="json", exclude_none=True)
-    document["schema_version"] = 2
     document["structures"].append(COLUMN | {"centre_m": [3.0, 3.0]})
     scene = build_scene(Scenario.from_document(document, "courtyard"))
     modules = [each for each in scene.obstacles() if each.name.startswith("column")]
@@ -112,10 +111,3 @@ def test_errors_have_the_keys_of_the_file(changes: dict[str, Any], message: str)
         with_column(**changes)
     assert message in str(caught.value)
     assert "structures[2]" not in str(caught.value)
-
-
-def test_it_needs_version_2() -> None:
-    document = site_document() | {"schema_version": 1}
-    document["structures"].append(COLUMN)
-    with pytest.raises(ScenarioError, match=r"structures\[1\].kind: schema_version 2 has the kind"):
-        Scenario.from_document(document, "site.toml")

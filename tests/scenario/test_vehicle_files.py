@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from blast_env.scenario import Scenario, ScenarioError, parse_scenario, save_scenario
+from blast_env.scenario import ScenarioError, parse_scenario, save_scenario
 from blast_env.scenario.sections import ChargeSource, VehicleSource
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 
@@ -138,25 +138,6 @@ def test_a_gate_that_does_not_fit_its_way_is_refused(gate: dict[str, Any], messa
     way = {"width_m": 2.0, "between": "left_right", "gate": gate}
     zone = site_document()["build_zone"] | {"access_way": way}
     assert problems(build_zone=zone) == [f"build_zone.access_way.gate: {message}"]
-
-
-def test_version_1_knows_neither_vehicles_nor_gates() -> None:
-    gate = {"corner_m": [4.0, 3.0], "size_m": [0.5, 2.0]}
-    way = {"width_m": 2.0, "between": "left_right", "gate": gate}
-    document = site_document() | {
-        "schema_version": 1,
-        "site": {"width_m": 14.0, "height_m": 8.0},
-        "build_zone": {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "stock": 16}
-        | {"access_way": way},
-        "structures": [{key: value for key, value in HUT.items() if key != "height_m"}],
-    }
-    with pytest.raises(ScenarioError) as caught:
-        Scenario.from_document(document, "old")
-    assert [str(problem) for problem in caught.value.problems] == [
-        "build_zone.access_way.gate: schema_version 2 has this key, the file has schema_version 1",
-        "charge[0].kind: schema_version 2 has the kind 'vehicle', the file has schema_version 1",
-    ]
-    assert Scenario.from_document(document | {"schema_version": 2}, "new").schema_version == 2
 
 
 def test_a_file_of_a_vehicle_comes_back_equal(tmp_path: Any) -> None:

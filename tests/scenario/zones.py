@@ -40,7 +40,7 @@ def zone_document(*structures: Document, **zone: Any) -> Document:
     """A zone of 8 x 8 cells and 10 modules, unless said otherwise; all else is far away."""
     protected = {**structure("protected", 20.0, 20.0, 2, 2), "protected": True}
     return {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "zone",
         "site": {"width_m": 40.0, "height_m": 40.0},
         "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 100.0}],
@@ -205,7 +205,6 @@ def catalogue_documents(draw: st.DrawFn) -> Document:
     They may have terraces, side by side, of the same height or not.
     """
     document = draw(zone_documents())
-    document["schema_version"] = 2
     zone = document["build_zone"]
     del zone["module_cost"]
     zone["cost_areas"] = [

@@ -18,7 +18,7 @@ def yard_document(*structures: dict[str, Any], **zone: Any) -> dict[str, Any]:
         "protected": True,
     }
     return {
-        "schema_version": 1,
+        "schema_version": 2,
         "name": "yard",
         "calibration": "ballistic_kb_100kg",
         "site": {"width_m": 20.0, "height_m": 20.0},
