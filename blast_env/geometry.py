@@ -1,13 +1,15 @@
-"""Axis-parallel rectangles, the only plane figures of sites; cells, pieces and layouts."""
+"""Axis-parallel rectangles, walls in plan; cells, pieces and layouts."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from math import hypot
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.units import MODULE_SIDE_M
 
 Cell = tuple[int, int]
 """(row, column) of a build-zone cell, from 0; rows count upwards, columns to the right."""
@@ -222,6 +224,78 @@ def _turn(way: Place, here: Place, there: Place) -> float:
     """Return 1 for a side to the left of a direction, -1 for one to its right."""
     x, y = _way(here, there)
     return way[0] * y - way[1] * x
+
+
+_ALIGNED_COSINE: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class WallLine:
+    """A wall in plan; the building is on its left.
+
+    Attributes:
+        start_m: One end.
+        end_m: The other end.
+    """
+
+    start_m: Place
+    end_m: Place
+
+    @property
+    def length_m(self) -> float:
+        """Its length."""
+        return hypot(self.end_m[0] - self.start_m[0], self.end_m[1] - self.start_m[1])
+
+    @property
+    def along(self) -> Place:
+        """Unit vector from start to end."""
+        (x0, y0), (x1, y1) = self.start_m, self.end_m
+        return (x1 - x0) / self.length_m, (y1 - y0) / self.length_m
+
+    @property
+    def normal(self) -> Place:
+        """Unit normal out of the building."""
+        x, y = self.along
+        return y, -x
+
+    @property
+    def side(self) -> Literal["west", "east", "south", "north"]:
+        """The side that it mostly faces."""
+        x, y = self.normal
+        if abs(x) > abs(y) - _ALIGNED_COSINE:
+            return "west" if x < 0.0 else "east"
+        return "south" if y < 0.0 else "north"
+
+    @property
+    def is_oblique(self) -> bool:
+        """Whether its modules are a staircase: it crosses a module on its way along an axis."""
+        (x0, y0), (x1, y1) = self.start_m, self.end_m
+        return min(abs(x1 - x0), abs(y1 - y0)) >= MODULE_SIDE_M
+
+    @property
+    def bounds_m(self) -> Rectangle:
+        """The rectangle around it."""
+        (x0, y0), (x1, y1) = self.start_m, self.end_m
+        return Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+
+    def point_at(self, along_m: float) -> Place:
+        """Return the point at a distance from the start."""
+        return (
+            self.start_m[0] + along_m * self.along[0],
+            self.start_m[1] + along_m * self.along[1],
+        )
+
+    def along_m(self, points_m: FloatArray) -> FloatArray:
+        """Return the distances of points (n, 2) from the start, along the wall (n,)."""
+        found: FloatArray = (points_m - np.array(self.start_m)) @ np.array(self.along)
+        return found
+
+    def distances_m(self, points_m: FloatArray) -> FloatArray:
+        """Return the distances of points (n, 2) from the wall (n,)."""
+        at_m = np.clip(self.along_m(points_m), 0.0, self.length_m)[:, np.newaxis]
+        away_m = points_m - np.array(self.start_m) - at_m * np.array(self.along)
+        found: FloatArray = np.hypot(*away_m.T)
+        return found
 
 
 def stacked_runs(cells: BoolArray) -> IntArray:

@@ -247,6 +247,8 @@ class Feature:
         is_raised: Whether there is air below it.
         part_of: Identifier of the area of which it is one rectangle; such parts are drawn without
             lines between them.
+        holes_m: Corners of the holes of an area, clockwise.
+        boxes_m: The modules of a polygon in rectangles; empty for other areas.
     """
 
     kind: FeatureKind
@@ -258,6 +260,8 @@ class Feature:
     fill: Colour | None = None
     is_raised: bool = False
     part_of: str = ""
+    holes_m: tuple[tuple[PointM, ...], ...] = ()
+    boxes_m: tuple[Rectangle, ...] = ()
 
     @property
     def look(self) -> Look:
@@ -310,7 +314,7 @@ def site_features(
     zone, there = scenario.build_zone, scenario.structures_with(layout)
     found = [area_feature(Kinds.SITE, scenario.site.rectangle_m, scenario.name)]
     if zone is not None:
-        found += zone_features(zone, [each.rectangle_m for each in there])
+        found += zone_features(zone, [box for each in there for box in each.boxes_m])
         found += barrier_features(scenario, layout)
     found += structure_features(there)
     found += (
@@ -354,8 +358,27 @@ def outlines_of(areas: Iterable[Feature]) -> Iterator[tuple[PointM, ...]]:
             wholes.setdefault(area.part_of, []).append(area.bounds_m)
         else:
             yield area.places_m
+            yield from area.holes_m
     for parts in wholes.values():
         yield from outlines(parts)
+
+
+def in_boxes(features: Iterable[Feature]) -> Iterator[Feature]:
+    """Yield features, polygons as the rectangles of their modules."""
+    for each in features:
+        if not each.boxes_m:
+            yield each
+        for number, box in enumerate(each.boxes_m):
+            area = area_feature(each.kind, box, each.name)
+            label = "" if number else each.label
+            yield replace(
+                each,
+                places_m=area.places_m,
+                holes_m=(),
+                boxes_m=(),
+                label=label,
+                part_of=each.part_of or each.name,
+            )
 
 
 def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -> Iterator[Feature]:
@@ -532,7 +555,7 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
     """Yield the structures; the largest part of a building in several parts has the label."""
     structures = tuple(structures)
     for name, parts in buildings_of(structures).items():
-        largest = max(parts, key=lambda each: each.rows * each.columns)
+        largest = max(parts, key=lambda each: each.modules)
         heights = [each.height_m for each in parts if each.height_m is not None]
         label = f"{name}\n{max(heights):g} m" if len(heights) == len(parts) else name
         for part in parts:
@@ -548,6 +571,13 @@ def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
 def _structure_feature(kind: FeatureKind, structure: AnyStructure) -> Feature:
     said = _said_of(structure)
     feature = area_feature(kind, structure.rectangle_m, structure.name, **said)
+    if structure.footprint is not None:
+        outline, *courtyards = (
+            tuple(rounded_m(*place) for place in ring) for ring in structure.footprint.rings
+        )
+        return replace(
+            feature, places_m=outline, holes_m=tuple(courtyards), boxes_m=structure.boxes_m
+        )
     parts_end = [said.get(key) for key in ("building", "base_m", "height_m")]
     return replace(feature, part_of=" ".join(map(str, parts_end)) if structure.building else "")
 

@@ -227,6 +227,8 @@ def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
             if key in own:
                 x_m, y_m, *rest = own[key]
                 own[key] = [_plain(x_m + step[0]), _plain(y_m + step[1]), *rest]
+        for ring in (own.get("outline_m", []), *own.get("courtyards_m", [])):
+            ring[:] = [[_plain(x_m + step[0]), _plain(y_m + step[1])] for x_m, y_m in ring]
 
     return changed(scenario, edit)
 

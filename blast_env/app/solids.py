@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from blast_env.geometry import Layout, Rectangle
 from blast_env.physics.structure import Colour
-from blast_env.plan import EXPLOSIVE, STANDING, Feature, Kinds, on_levels, site_features
+from blast_env.plan import EXPLOSIVE, STANDING, Feature, Kinds, in_boxes, on_levels, site_features
 from blast_env.scenario import Scenario
 
 _GROUND: Final[Colour] = (223, 228, 234)
@@ -38,7 +38,7 @@ class SolidBox(NamedTuple):
 
 def boxes(scenario: Scenario, layout: Layout) -> Iterator[SolidBox]:
     """Yield the boxes of a site with a layout; one without height is see-through up to the air."""
-    for feature in on_levels(site_features(scenario, layout), scenario.structures):
+    for feature in in_boxes(on_levels(site_features(scenario, layout), scenario.structures)):
         bounds_m = feature.bounds_m
         if feature.kind is Kinds.SITE:
             yield _box(bounds_m, -_GROUND_M, 0.0, _GROUND, 1.0, "site")

@@ -233,11 +233,26 @@ class Calibration(CalibrationSection):
             obstacle: The structure, after a blast.
             charge: The charge.
         """
-        footprint_m = obstacle.rectangle_m
-        distance_m = float(distance_to_rectangle(np.array([charge.position_m]), footprint_m)[0])
-        width_m = seen_width_m(footprint_m, charge.position_m)
+        centre_m = np.array([charge.position_m])
+        boxes_m = obstacle.boxes_m
+        distance_m = min(float(distance_to_rectangle(centre_m, box)[0]) for box in boxes_m)
+        width_m = _seen_width_m(obstacle, charge.position_m)
         impulse_sim: float = getattr(obstacle, self.simulated)
         return self.convert(impulse_sim, width_m, distance_m, charge.tnt_kg)
+
+
+def _seen_width_m(obstacle: ModularObstacle, charge_m: tuple[float, float]) -> float:
+    """Return the `seen_width_m` of a structure of any shape, m."""
+    if obstacle.cells is None:
+        return seen_width_m(obstacle.rectangle_m, charge_m)
+    (x0, y0), (x1, y1) = charge_m, obstacle.rectangle_m.centre
+    left, bottom, right, top = np.array(obstacle.boxes_m).T
+    x_m, y_m = (
+        np.concatenate((left, right, left, right)),
+        np.concatenate((bottom, bottom, top, top)),
+    )
+    across_m = ((x_m - x0) * (y1 - y0) - (y_m - y0) * (x1 - x0)) / hypot(x1 - x0, y1 - y0)
+    return float(np.ptp(across_m))
 
 
 def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:
@@ -405,7 +420,7 @@ class LoadUnit:
             charge: The charge.
             convert: Returns the impulse per area on a structure.
         """
-        structures = [obstacle for obstacle in obstacles if obstacle.cells is None]
+        structures = [obstacle for obstacle in obstacles if not obstacle.is_barrier]
         protected = [obstacle for obstacle in structures if obstacle.protected] or structures
         main = max(protected, key=lambda obstacle: obstacle.impulse)
         if main.impulse == 0.0:
@@ -415,7 +430,7 @@ class LoadUnit:
             for each in structures
             if each.impulse > 0.0
         }
-        width_m = seen_width_m(main.rectangle_m, charge.position_m)
+        width_m = _seen_width_m(main, charge.position_m)
         factor = loads[main.name].factor * width_m / MODULE_SIDE_M
         return cls(factor, f"impulse per module (Pa s, calibrated on {main.name})", loads)
 

@@ -308,7 +308,9 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         """Print a table of the buildings' loads, and the end of the run."""
         blast, scene = result.blast, result.blast.scene
         scaled = {
-            each.name: _scaled(result, each.name) for each in result.obstacles if each.cells is None
+            each.name: _scaled(result, each.name)
+            for each in result.obstacles
+            if not each.is_barrier
         }
         names = blast.scenario.building_names
         buildings: dict[str, list[ModularObstacle]] = {}

@@ -79,7 +79,7 @@ class PublishedBlasts:
         loads = tuple(
             StructureLoad.on(each, *known[each.name], in_range=True) for each in structures
         )
-        modules = sum(each.rows * each.columns for each in structures)
+        modules = sum(each.modules for each in structures)
         return BlastLoads(loads, np.zeros(modules))  # the tables have no loads per module
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:

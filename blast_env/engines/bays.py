@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.engines.gas_tables import KNOWN_COLUMN
-from blast_env.engines.oblique_walls import ObliqueLoads
 from blast_env.errors import UnknownNameError
 from blast_env.physics.gas.ending import is_known
 from blast_env.physics.gas.settings import FACE_NAMES
@@ -60,27 +59,19 @@ class BayLoads:
 
     Attributes:
         bays: The bays that air touches.
-        recorder: Their histories, one patch each.
-        oblique: Loads on oblique walls; `None` without such a wall.
-        on_oblique: Index of the oblique-wall bay that holds each of these bays, -1 for none
-            (bays,).
+        recorder: Their histories along the normals of the walls, one patch each.
     """
 
     bays: tuple[FilledBay, ...]
     recorder: "PatchHistories"
-    oblique: ObliqueLoads | None
-    on_oblique: NDArray[np.int64]
 
     @classmethod
-    def begin(
-        cls, run: "GasRun", bays: Sequence[FilledBay], oblique: ObliqueLoads | None = None
-    ) -> "BayLoads":
+    def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
         """Return the loads of a run that has not begun, to be recorded by `GasRun.record`.
 
         Args:
             run: The run.
             bays: The bays of its scenario.
-            oblique: Its loads on oblique walls, which it records as well.
         """
         from blast_env.physics.gas.probes import PatchHistories
 
@@ -89,20 +80,12 @@ class BayLoads:
         renumbered = np.full(len(bays) + 1, -1)  # the last is for no bay
         renumbered[seen] = np.arange(len(seen))
         shown = tuple(bays[index] for index in seen.tolist())
-        patch = renumbered[patch]
-        on_oblique = (
-            np.full(len(shown), -1) if oblique is None else oblique.bay_of(patch, len(shown))
-        )
-        return cls(shown, PatchHistories(patch, len(shown)), oblique, on_oblique)
+        return cls(shown, PatchHistories(renumbered[patch], len(shown), run.table.share))
 
     @property
     def history_pa(self) -> NDArray[np.float32]:
-        """Mean overpressures, Pa, on oblique walls along the wall's normal (bays, steps)."""
-        history_pa = self.recorder.history_pa
-        if self.oblique is not None:
-            chosen = self.on_oblique >= 0
-            history_pa[chosen] = self.oblique.recorder.history_pa[self.on_oblique[chosen]]
-        return history_pa
+        """Mean overpressures along the normals of the walls, Pa (bays, steps)."""
+        return self.recorder.history_pa
 
     @cached_property
     def response(self) -> FacadeResponse:
@@ -290,17 +273,23 @@ def bay_patches(
             (table.structure == structures.index(structure))
             & (table.face == FACE_NAMES.index(wall))
         )
-        along = table.centre_m[own, 1 if wall in ("west", "east") else 0]
-        height = table.centre_m[own, 2]
         for index in members:
-            patch[own[_inside(bays[index].bay, along, height)]] = index
+            bay = bays[index].bay
+            patch[own[_inside(bay, table, own)]] = index
     return patch
 
 
-def _inside(bay: Bay, along_m: FloatArray, height_m: FloatArray) -> NDArray[np.bool_]:
-    return (
-        (along_m >= bay.left_m)
-        & (along_m < bay.right_m)
-        & (height_m >= bay.floor_m)
-        & (height_m < bay.top_m)
-    )
+def _inside(bay: Bay, table: "FaceTable", own: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of some faces of its side lie in a bay (own,)."""
+    places_m, height_m = table.centre_m[own, :2], table.centre_m[own, 2]
+    inside = (height_m >= bay.floor_m) & (height_m < bay.top_m)
+    left_m, right_m = bay.left_m, bay.right_m
+    if bay.line is None:
+        along_m = places_m[:, 1 if bay.wall in ("west", "east") else 0]
+    else:
+        along_m = bay.line.along_m(places_m)
+        inside &= table.wall[own] == bay.line_number
+        # Steps at corners may lie beyond the ends of the wall.
+        left_m = -np.inf if left_m == 0.0 else left_m
+        right_m = np.inf if right_m >= bay.line.length_m else right_m
+    return np.asarray(inside & (along_m >= left_m) & (along_m < right_m))

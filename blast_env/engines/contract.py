@@ -217,7 +217,7 @@ class BlastLoads:
         """
         found = find_scenario(scenario)
         names = [structure.name for structure in found.structures]
-        modules = sum(structure.rows * structure.columns for structure in found.structures)
+        modules = sum(structure.modules for structure in found.structures)
         impulses = np.array([load.impulse_pa_s for load in self.structures])
         return (
             [load.name for load in self.structures] == names

@@ -39,7 +39,7 @@ from blast_env.engines.gas_tables import (
     structure_table,
     wall_table,
 )
-from blast_env.engines.oblique_walls import ObliqueLoads
+from blast_env.engines.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
 from blast_env.engines.pieces import PIECE_COLUMNS, PieceLoads
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Element, layout_text
@@ -63,7 +63,6 @@ from blast_env.scenario import (
     find_scenario,
 )
 from blast_env.scenario.build_scene import build_site, draw_threat, outlines
-from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.tables import table_of
 
@@ -208,7 +207,7 @@ class GasBlast:
         """
         run = self.engine.start_on(self.site, recorders, response_time_s(self.scenario))
         oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
-        bays = BayLoads.begin(run, self.scenario.bays_with(self.layout), oblique)
+        bays = BayLoads.begin(run, self.scenario.bays_with(self.layout))
         if bays.bays:
             run.record(bays.recorder)
         pieces = PieceLoads.begin(run, self.scenario, self.layout)
@@ -283,10 +282,8 @@ class GasResult:
 
     @cached_property
     def on_walls(self) -> "pd.DataFrame":
-        """`faces` with loads on oblique walls along their normals, and the area `share`."""
-        return (
-            self.faces.assign(share=1.0) if self.oblique is None else self.oblique.table(self.faces)
-        )
+        """`faces` with loads on oblique walls along their normals."""
+        return self.faces if self.oblique is None else self.oblique.table(self.faces)
 
     @cached_property
     def modules(self) -> "pd.DataFrame":
@@ -352,13 +349,12 @@ class GasResult:
     def unjudged(self) -> tuple[UnjudgedWalls, ...]:
         """Counted walls in no bay, one item per building with a facade and such walls."""
         scenario, table = self.blast.scenario, self.run.table
-        share = np.ones(len(table.face)) if self.oblique is None else self.oblique.share
         return unjudged_walls(
             table,
             self.run.site.structures,
             scenario.building_names,
             scenario.bays_with(self.blast.layout),
-            share * self.run.grid.cell_m**2,
+            self._share * self.run.grid.cell_m**2,
         )
 
     def bay_history(self, name: str) -> "pd.DataFrame":
@@ -401,7 +397,7 @@ class GasResult:
         Raises:
             UnknownNameError: If there is no structure of that name.
         """
-        names = [each.name for each in self.run.site.structures if each.cells is None]
+        names = [each.name for each in self.run.site.structures if not each.is_barrier]
         if structure not in names:
             raise UnknownNameError("structure", structure, names)
         return self._scaled(names.index(structure))
@@ -419,7 +415,7 @@ class GasResult:
                 self._area_m2(index),
             )
             for index, outline in enumerate(self.run.site.structures)
-            if outline.cells is None
+            if not outline.is_barrier
             for scaled in [self._scaled(index)]
         )
         bays: tuple[BayDamage, ...] = ()
@@ -458,7 +454,7 @@ class GasResult:
     @cached_property
     def _share(self) -> FloatArray:
         """Ratio of the area of the real wall to that of each face (faces,)."""
-        return np.ones(len(self.run.table.faces)) if self.oblique is None else self.oblique.share
+        return self.run.table.share
 
     @cached_property
     def module_impulse_n_s(self) -> FloatArray:
@@ -468,12 +464,12 @@ class GasResult:
         """
         table, sums = self.run.table, []
         for index, outline in enumerate(self.run.site.structures):
-            if outline.cells is None:
+            if not outline.is_barrier:
                 own = (table.structure == index) & (table.face < len(WALLS))
                 momentum = np.zeros((outline.rows, outline.columns))
                 values = self.run.loads.impulse_pa_s[own] * self.run.grid.cell_m**2
                 np.add.at(momentum, (table.row[own], table.column[own]), values)
-                sums.append(momentum.ravel())
+                sums.append(momentum[tuple(np.array(outline.filled).T)])
         return np.concatenate(sums) if sums else np.zeros(0)
 
     @cached_property

@@ -141,6 +141,9 @@ def face_table(run: "GasRun") -> "pd.DataFrame":
             **loads,
             "row": table.row,
             "column": table.column,
+            "share": table.share,
+            "outward_x": table.outward[:, 0],
+            "outward_y": table.outward[:, 1],
             "net_impulse_pa_s": run.loads.net_impulse_pa_s,
             "known": has_come & is_known(loads["impulse_pa_s"], run.loads.net_impulse_pa_s),
         }
@@ -190,9 +193,9 @@ def wall_table(run: "GasRun", faces: "pd.DataFrame") -> "pd.DataFrame":
 
     Args:
         run: The run.
-        faces: Its `face_table` with a column `share`, the area ratio of real wall to face.
+        faces: Its `face_table`, whose column `share` is the area ratio of real wall to face.
     """
-    counting = {each.name: each.faces for each in run.site.structures if each.cells is None}
+    counting = {each.name: each.faces for each in run.site.structures if not each.is_barrier}
     own = faces[faces["structure"].isin(list(counting))]
     table = _grouped(run, own, ["structure", "face"])
     walls = zip(table["structure"], table["face"], strict=True)
@@ -216,7 +219,7 @@ def structure_table(
     """
     together: dict[str, list[StructureOutline]] = {}
     for outline in run.site.structures:
-        if outline.cells is None:
+        if not outline.is_barrier:
             owner = outline.name if buildings is None else buildings[outline.name]
             together.setdefault(owner, []).append(outline)
     rows = [

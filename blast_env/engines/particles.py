@@ -352,7 +352,7 @@ class BlastResult:
                 other parameters or another engine.
         """
         obstacle = self.obstacle(structure)
-        if obstacle.cells is not None:
+        if obstacle.is_barrier:
             raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
         law = self.calibration if calibration is None else calibration
         if not isinstance(law, Calibration):
@@ -370,7 +370,7 @@ class BlastResult:
             calibration: By default the scenario's.
         """
         law = self.calibration if calibration is None else calibration
-        structures = [obstacle for obstacle in self.obstacles if obstacle.cells is None]
+        structures = [obstacle for obstacle in self.obstacles if not obstacle.is_barrier]
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
         return BlastLoads(
             structures=tuple(

@@ -113,7 +113,7 @@ class PieceLoads:
             for cell in zone.catalogue.cells(element):
                 owner[cell] = index
         table = run.table
-        barrier = next(k for k, each in enumerate(run.site.structures) if each.cells is not None)
+        barrier = next(k for k, each in enumerate(run.site.structures) if each.is_barrier)
         ways = tuple(_ways(scenario, elements, run.grid.cell_m))
         pushed = np.zeros((len(elements), len(WALLS)), dtype=bool)
         for way in ways:

@@ -67,7 +67,8 @@ def _map(
     zone, free, taken = scenario.zone, placement.open_ground, set(placement.cells)
     for structure in scenario.structures:
         if structure.carries:
-            characters[_inside(structure.rectangle_m, x, y)] = "S"
+            for box in structure.boxes_m:
+                characters[_inside(box, x, y)] = "S"
     for cell in zone.cells():
         sign = "M" if cell in taken else "." if free[cell] else "x"
         characters[_inside(zone.cell_rectangle_m(cell), x, y)] = sign
@@ -78,7 +79,8 @@ def _map(
     for structure in scenario.structures:
         if not structure.carries:
             sign = "P" if structure.protected else "S"
-            characters[_inside(structure.rectangle_m, x, y)] = sign
+            for box in structure.boxes_m:
+                characters[_inside(box, x, y)] = sign
     return characters
 
 

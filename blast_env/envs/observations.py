@@ -517,9 +517,14 @@ class GridWithLoadObservation(GridObservation):
         first = 0
         for structure in observable.scenario.structures:
             rows, columns = structure.rows, structure.columns
-            values = shares[first : first + rows * columns].reshape(rows, columns)
+            own = shares[first : first + structure.modules]
+            if structure.cells is None:
+                values = own.reshape(rows, columns)
+            else:
+                values = np.zeros((rows, columns))
+                values[tuple(np.array(structure.cells).T)] = own
             plane += grid.lattice(structure.corner_m, rows, columns).plane(values)
-            first += rows * columns
+            first += structure.modules
         episode.show(episode.static, ("unprotected_load",), plane)
         return episode
 
@@ -585,7 +590,7 @@ def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane,
     protected, others, heights = np.zeros((3, grid.rows, grid.columns), dtype=np.float32)
     weights = [structure.weight for structure in scenario.structures if structure.protected]
     for structure in scenario.structures:
-        covered = grid.rectangle(structure.rectangle_m)
+        covered = np.sum([grid.rectangle(box) for box in structure.boxes_m], axis=0)
         below = 0.0 if is_open_below(structure, scenario.structures) else structure.base_m
         rise = height_share(structure.height_m) - height_share(below)  # on top of a terrace
         heights += np.float32(rise) * covered

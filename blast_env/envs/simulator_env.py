@@ -92,9 +92,8 @@ class Unfolding(ABC):
         return tuple(
             outline.module_name(row, column)
             for outline in self.site.structures
-            if outline.cells is None
-            for row in range(outline.rows)
-            for column in range(outline.columns)
+            if not outline.is_barrier
+            for row, column in outline.filled
         )
 
     @property
@@ -328,7 +327,7 @@ def _plan_shape(scenario: Scenario, cell_m: float) -> tuple[int, int]:
 
 
 def _module_count(scenario: Scenario) -> int:
-    return sum(section.rows * section.columns for section in scenario.structures)
+    return sum(section.modules for section in scenario.structures)
 
 
 _OPTIONS: Final = ("layout", "charge_position_m")

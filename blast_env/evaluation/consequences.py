@@ -30,6 +30,7 @@ from blast_env.arrays import FloatArray
 from blast_env.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
 from blast_env.engines.contract import Engine
 from blast_env.engines.gas_tables import means_by_wall
+from blast_env.engines.oblique_walls import STEPPED, stepped_buildings
 from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.governing import Severity, governing
@@ -49,7 +50,6 @@ from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.scenario.facade import with_glass
 from blast_env.scenario.sections import buildings_of
-from blast_env.scenario.staircase import STEPPED, stepped_buildings
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # a third of a second to import
@@ -190,7 +190,7 @@ class Consequences:
         """Notes on a verdict: walls not covered, oblique walls, loads out of range or not known."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
         notes = [f"{each.building}: {each.words}" for each in self.unjudged]
-        notes += [f"{name}: {STEPPED}; each step is a bay" for name in stepped]
+        notes += [f"{name}: {STEPPED}" for name in stepped]
         reasons: dict[str, list[str]] = {}
         for building, reason in self.unchecked:
             reasons.setdefault(building, []).append(reason)
@@ -459,7 +459,7 @@ def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, st
 
     reasons: dict[str, dict[str, None]] = {}
     for outline in result.run.site.structures:
-        if outline.cells is None:
+        if not outline.is_barrier:
             name = scenario.building_names.get(outline.name, outline.name)
             own = reasons.setdefault(name, {})
             own.update(dict.fromkeys(result.impulse(outline.name).notes))

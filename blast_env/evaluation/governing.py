@@ -17,6 +17,7 @@ from blast_env.physics.scene import OUTWARDS, BlastSite, Charge, StructureOutlin
 from blast_env.physics.sight import in_sight
 from blast_env.scenario import ObjectiveSection, Scenario
 from blast_env.scenario.build_scene import build_site
+from blast_env.units import MODULE_SIDE_M
 
 _STEP_M: Final = 1.0
 """Distance between the points of a wall over which a load in the open is averaged."""
@@ -97,7 +98,14 @@ def _points(site: BlastSite, structure: StructureOutline) -> tuple[FloatArray, F
     high_m = structure.height_m or site.air_height_m
     z_m = _middles(structure.base_m, high_m)
     points, outwards = [], []
-    for wall in structure.faces:
+    for line in (each for each in structure.walls if each.side in structure.faces):
+        # Before the modules, whose steps may reach beyond the wall.
+        along_m, away_m = _middles(0.0, line.length_m), MODULE_SIDE_M * np.array(line.normal)
+        plan_m = np.array([line.point_at(each) for each in along_m.tolist()]) + away_m
+        grid = np.hstack((np.repeat(plan_m, len(z_m), axis=0), np.tile(z_m, len(plan_m))[:, None]))
+        points.append(grid)
+        outwards.append(np.tile([*line.normal, 0.0], (len(grid), 1)))
+    for wall in () if structure.walls else structure.faces:
         x_m, y_m = (_middles(*ends) for ends in ((left, right), (bottom, top)))
         if wall in ("west", "east"):
             x_m = np.array([left if wall == "west" else right])

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, inf, pi, tan
 from pathlib import Path
@@ -92,15 +92,31 @@ def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[CornerM, ...], ...]:
 
     The clearance is the least distance of any two points of module and structure. So the outline
     is a rectangle whose corners are rounded by the clearance: four sides and four arcs,
-    counterclockwise from the left end of the lower side.
+    counterclockwise from the left end of the lower side. Around the modules of a polygon it is a
+    line with short sides in the place of arcs, and further lines in its courtyards.
     """
     zone = plan.scenario.build_zone
     if zone is None or zone.clearance_m == 0.0:
         return ()
     return tuple(
-        _rounded_outline(structure.rectangle_m, zone.clearance_m)
+        outline
         for structure in plan.scenario.structures
+        for outline in (
+            (_rounded_outline(structure.rectangle_m, zone.clearance_m),)
+            if structure.footprint is None
+            else _lines_around(structure.boxes_m, zone.clearance_m)
+        )
     )
+
+
+def _lines_around(boxes_m: Sequence[Rectangle], distance_m: float) -> Iterator[tuple[CornerM, ...]]:
+    """Yield the lines at a distance around rectangles that touch."""
+    import shapely  # a tenth of a second, for polygons alone
+
+    around = shapely.union_all([shapely.box(*each) for each in boxes_m]).buffer(distance_m)
+    for ring in shapely.get_rings(around):
+        places = shapely.get_coordinates(ring)[:-1].tolist()
+        yield tuple((round(x, _DIGITS), round(y, _DIGITS), 0.0) for x, y in places)
 
 
 def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]:
@@ -326,13 +342,15 @@ def _draw(space: Modelspace, feature: Feature) -> None:
     elif len(places) == 2:
         space.add_line(*places, attributes)
     else:
-        outline = space.add_lwpolyline(places, close=True, dxfattribs=attributes)
-        outline.dxf.elevation = feature.base_m
-        height_m = feature.properties.get("height_m")
-        if isinstance(height_m, float):
-            outline.dxf.thickness = height_m - feature.base_m  # extruded to its top
-        if feature.kind is Kinds.BARRIER:
-            outline.set_xdata(APPLICATION, [(_STRING, text) for text in _barrier_texts(feature)])
+        for ring in (places, *feature.holes_m):
+            outline = space.add_lwpolyline(ring, close=True, dxfattribs=attributes)
+            outline.dxf.elevation = feature.base_m
+            height_m = feature.properties.get("height_m")
+            if isinstance(height_m, float):
+                outline.dxf.thickness = height_m - feature.base_m  # extruded to its top
+            if feature.kind is Kinds.BARRIER:
+                texts = [(_STRING, text) for text in _barrier_texts(feature)]
+                outline.set_xdata(APPLICATION, texts)
 
 
 def _barrier_texts(feature: Feature) -> list[str]:

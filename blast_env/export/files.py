@@ -86,7 +86,10 @@ def _feature(
             **feature.properties,
             "coordinate_system": coordinate_words,
         },
-        "geometry": _geometry(_on_map(feature.places_m, georeference)),
+        "geometry": _geometry(
+            _on_map(feature.places_m, georeference),
+            [_on_map(each, georeference) for each in feature.holes_m],
+        ),
     }
 
 
@@ -103,12 +106,13 @@ def _on_map(places_m: Sequence[PointM], georeference: AnyGeoreference | None) ->
     ]
 
 
-def _geometry(places: list[list[float]]) -> dict[str, Any]:
+def _geometry(places: list[list[float]], holes: list[list[list[float]]]) -> dict[str, Any]:
     if len(places) == 1:
         return {"type": "Point", "coordinates": places[0]}
     if len(places) == 2:
         return {"type": "LineString", "coordinates": places}
-    return {"type": "Polygon", "coordinates": [[*places, places[0]]]}
+    rings = [[*each, each[0]] for each in (places, *holes)]
+    return {"type": "Polygon", "coordinates": rings}
 
 
 def _write_json(plan: LayoutPlan, path: Path) -> None:

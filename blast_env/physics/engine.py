@@ -155,9 +155,8 @@ def can_reach(balls: BallStates, scene: Scene, within_s: float) -> bool:
     """
     distance = np.full(len(balls), np.inf)
     for outline in scene.structures:
-        if outline.cells is None:
-            rectangle = outline.rectangle_m.scaled(UNITS_PER_M)
-            to_this = distance_to_rectangle(balls.position, rectangle)
+        for box in () if outline.is_barrier else outline.boxes_m:
+            to_this = distance_to_rectangle(balls.position, box.scaled(UNITS_PER_M))
             distance = np.minimum(distance, to_this)
     reach = 2.0 * balls.speed * within_s
     return bool(((reach > 0.0) & (distance - balls.radius <= reach)).any())

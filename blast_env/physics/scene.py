@@ -3,15 +3,18 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Cell, Rectangle, WallLine
 from blast_env.physics.parameters import SimulationParameters
 from blast_env.physics.particles import Balls
-from blast_env.physics.structure import ModularObstacle, module_name
+from blast_env.physics.structure import BARRIER_NAME, ModularObstacle, module_name
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M, in_units
+
+if TYPE_CHECKING:  # shapely takes a tenth of a second to import
+    from blast_env.physics.footprint import Footprint
 
 WallName = Literal["west", "east", "south", "north"]
 """A wall of a structure, by the side that it faces: west is towards smaller x."""
@@ -134,6 +137,8 @@ class Block(NamedTuple):
 class StructureOutline:
     """A structure before any blast, in metres; attributes as in `ModularObstacle`.
 
+    `footprint` is its polygon, `None` for a rectangle and for a barrier.
+
     Six more are for gas dynamics: `height_m`, the height of its top, `None` for as high as the air;
     `base_m`, the height of its base above the ground; `heights_m` and `bases_m`, the same for
     single cells, in the order of `cells`, if they differ; `faces`, the walls whose load counts; and
@@ -156,6 +161,29 @@ class StructureOutline:
     base_m: float = 0.0
     bases_m: tuple[float, ...] | None = None
     is_lasting: bool = True
+    footprint: "Footprint | None" = None
+
+    @property
+    def is_barrier(self) -> bool:
+        """Whether it is the barrier of a layout."""
+        return self.name == BARRIER_NAME
+
+    @property
+    def walls(self) -> tuple[WallLine, ...]:
+        """The walls of its polygon; none for a rectangle, whose walls are its sides."""
+        return () if self.footprint is None else self.footprint.walls
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """Its plan in rectangles: of a barrier, the whole grid."""
+        return (self.rectangle_m,) if self.footprint is None else self.footprint.boxes_m
+
+    @property
+    def filled(self) -> tuple[Cell, ...]:
+        """Rows and columns of its modules, row by row."""
+        if self.cells is not None:
+            return self.cells
+        return tuple((row, column) for row in range(self.rows) for column in range(self.columns))
 
     @property
     def rectangle_m(self) -> Rectangle:
@@ -173,8 +201,8 @@ class StructureOutline:
     @property
     def blocks(self) -> tuple[Block, ...]:
         """The whole structure; the pieces of a barrier, or its modules if it has no pieces."""
-        if self.cells is None:
-            return (Block(self.name, self.rectangle_m, self.height_m, self.base_m),)
+        if self.cells is None or self.footprint is not None:
+            return tuple(Block(self.name, box, self.height_m, self.base_m) for box in self.boxes_m)
         count = len(self.cells)
         heights_m = self.heights_m or (self.height_m,) * count
         bases_m = self.bases_m or (self.base_m,) * count

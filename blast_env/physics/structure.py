@@ -256,6 +256,11 @@ class ModularObstacle:
         return type(self).__name__
 
     @property
+    def is_barrier(self) -> bool:
+        """Whether it is the barrier of a layout."""
+        return self.name == BARRIER_NAME
+
+    @property
     def rectangle(self) -> Rectangle:
         """The rectangle of the whole grid, units."""
         size = (self.columns * MODULE_SIDE_UNITS, self.rows * MODULE_SIDE_UNITS)
@@ -265,6 +270,13 @@ class ModularObstacle:
     def rectangle_m(self) -> Rectangle:
         """The rectangle of the whole grid."""
         return self.rectangle.scaled(1.0 / UNITS_PER_M)
+
+    @property
+    def boxes_m(self) -> list[Rectangle]:
+        """Its plan: the whole grid, or its modules if they do not fill it."""
+        if self.cells is None:
+            return [self.rectangle_m]
+        return [part.rectangle_m for part in self.parts]
 
     @property
     def hits(self) -> int:

@@ -120,6 +120,9 @@ def _tile(scenario: Scenario, bay: Bay, colour: Colour) -> Tile:
     at_m = {"west": left, "east": right, "south": bottom, "north": top}[bay.wall]
     sides = [(bay.left_m, bay.floor_m), (bay.right_m, bay.floor_m)]
     sides += [(bay.right_m, bay.top_m), (bay.left_m, bay.top_m)]
+    if bay.line is not None:
+        corners = [(*bay.line.point_at(along), z) for along, z in sides]
+        return Tile(bay.wall, np.array(corners), colour)
     across = bay.wall in ("west", "east")
     corners = [(at_m, along, z) if across else (along, at_m, z) for along, z in sides]
     return Tile(bay.wall, np.array(corners), colour)
@@ -128,20 +131,20 @@ def _tile(scenario: Scenario, bay: Bay, colour: Colour) -> Tile:
 def _draw(plot: Axes, facade: FacadeResponse) -> None:
     """Draw the walls side by side, seen from outside."""
     begin, ticks = 0.0, []
-    places = dict.fromkeys((each.bay.structure, each.bay.wall) for each in facade.bays)
+    places = dict.fromkeys(_place_of(each.bay) for each in facade.bays)
     top_m = max(each.bay.top_m for each in facade.bays)
-    for structure, wall in places:
+    for structure, wall, line_number in places:
         own = [
             index
             for index, each in enumerate(facade.bays)
-            if (each.bay.structure, each.bay.wall) == (structure, wall)
+            if _place_of(each.bay) == (structure, wall, line_number)
         ]
         low = min(facade.bays[index].bay.left_m for index in own)
         high = max(facade.bays[index].bay.right_m for index in own)
         for index in own:
             bay = facade.bays[index].bay
             # Seen from outside: x runs to the right on south walls, to the left on north ones.
-            mirrored = wall in ("north", "west")
+            mirrored = line_number is None and wall in ("north", "west")
             left_m = begin + (high - bay.right_m if mirrored else bay.left_m - low)
             level = facade.wall_levels.get(index)
             colour = _NOTHING if level is None else LEVEL_COLOURS[level]
@@ -155,6 +158,11 @@ def _draw(plot: Axes, facade: FacadeResponse) -> None:
     plot.set_xticks([place for place, _ in ticks], [words for _, words in ticks])
     plot.set_ylabel("height (m)")
     plot.spines[["top", "right"]].set_visible(False)
+
+
+def _place_of(bay: Bay) -> tuple[str, str, int | None]:
+    """Return the structure, the side and, of a polygon, the number of a bay's wall."""
+    return bay.structure, bay.wall, bay.line_number
 
 
 def _add_panes(plot: Axes, left_m: float, facade: FacadeResponse, index: int) -> None:

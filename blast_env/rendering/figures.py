@@ -91,7 +91,7 @@ def model_scheme(scene: Scene) -> Figure:
 def _feature_of(outline: StructureOutline) -> Feature:
     """Return a structure as a feature whose label is its name; a barrier has none."""
     kind = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE
-    if outline.cells is not None:
+    if outline.is_barrier:
         return area_feature(Kinds.BARRIER, outline.rectangle_m, outline.name)
     return replace(area_feature(kind, outline.rectangle_m, outline.name), label=outline.name)
 
@@ -189,8 +189,8 @@ def _targets(scene: Scene, site_m: Rectangle) -> list[tuple[int, NDArray[np.floa
 
 def _numbered_structures(scene: Scene) -> list[StructureOutline]:
     """Return the barrier, and one structure that a line from above reaches without an obstacle."""
-    barrier = [outline for outline in scene.structures if outline.cells is not None]
-    structures = [outline for outline in scene.structures if outline.cells is None]
+    barrier = [outline for outline in scene.structures if outline.is_barrier]
+    structures = [outline for outline in scene.structures if not outline.is_barrier]
     structures.sort(key=lambda outline: (not outline.protected, -outline.rectangle_m.top))
     for outline in structures:
         last = outline.build().parts[-1]
@@ -259,7 +259,7 @@ def impulse_over_time(result: BlastResult) -> Figure:
     The normal of a collision determines its facade. At most six structures are shown: the
     protected ones first, then those with the largest impulses.
     """
-    structures = [obstacle for obstacle in result.obstacles if obstacle.cells is None]
+    structures = [obstacle for obstacle in result.obstacles if not obstacle.is_barrier]
     structures.sort(key=lambda obstacle: (not obstacle.protected, -obstacle.impulse))
     shown = structures[:_MOST_PANELS]
     columns = min(len(shown), 3 if len(shown) > 4 else 2)

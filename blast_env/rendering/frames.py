@@ -208,7 +208,7 @@ def _signs(scene: Scene) -> list[Artist]:
         signs[-1].set_label(label)
     outlines = {}
     for each in scene.structures:
-        if each.cells is not None:
+        if each.is_barrier:
             outlines["barrier module"] = (BARRIER, 1.0)
         elif each.protected:
             outlines[Kinds.PROTECTED_STRUCTURE.words] = (PROTECTED, 2.0)

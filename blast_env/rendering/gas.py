@@ -284,7 +284,7 @@ class _Walled:
 def _walled(result: GasResult, name: str | None) -> _Walled:
     """Return the structure or building with a name, or by default the worst building."""
     site, scenario = result.run.site, result.blast.scenario
-    known = {each.name: (each,) for each in site.structures if each.cells is None}
+    known = {each.name: (each,) for each in site.structures if not each.is_barrier}
     buildings = {
         building: tuple(outline for each in parts for outline in known[each.name])
         for building, parts in buildings_of(scenario.structures_with(result.blast.layout)).items()
@@ -312,9 +312,10 @@ def _wall(result: GasResult, walled: _Walled, wall: WallName, kind: Kind) -> Flo
     low = walled.rectangle_m["xy".index(axis)]
     shape = (round(walled.height_m / cell_m), round(_length_m(walled, wall) / cell_m))
     values = np.full(shape, np.nan)
-    own = result.faces
+    own = result.on_walls
     own = own[own["structure"].isin(walled.parts) & (own["face"] == wall)]
     along = np.floor((own[f"{axis}_m"].to_numpy() - low) / cell_m).astype(int)
+    along = along.clip(0, shape[1] - 1)  # steps of oblique walls may lie on the border
     up = np.floor(own["z_m"].to_numpy() / cell_m).astype(int)
     np.fmax.at(values, (up, along), kind.factor * own[kind.column].to_numpy())
     return values

@@ -16,6 +16,7 @@ from blast_env.plan import (
     STANDING,
     Feature,
     Kinds,
+    in_boxes,
     on_levels,
     site_features,
     vehicle_features,
@@ -251,8 +252,8 @@ def draw_oblique(
     features = (*_raised(scenario, layout), *vehicle_features(scenario, layout))
     standing = [each for each in features if each.kind in STANDING]
     boxes = [
-        box._replace(tiles=tiles.get(each.name, ()))
-        for box, each in zip(_boxes_of(standing), standing, strict=True)
+        box._replace(tiles=own)
+        for box, own in zip(_boxes_of(standing), _tiles_of(standing, tiles), strict=True)
     ]
     flat = without(features, *STANDING)
     lids = [each for each in flat if each.base_m > 0.0]
@@ -261,6 +262,19 @@ def draw_oblique(
     _draw_boxes(axes, view, boxes, _lids_of(lids))
     _draw_scale(axes, view)
     return view, features
+
+
+def _tiles_of(standing: Sequence[Feature], tiles: Mapping[str, Sequence[Tile]]) -> list[list[Tile]]:
+    """Return the tiles on each box; each tile of a structure is on the nearest of its boxes."""
+    found: list[list[Tile]] = [[] for _ in standing]
+    for name, own in tiles.items():
+        numbers = [number for number, each in enumerate(standing) if each.name == name]
+        for tile in own:
+            x_m, y_m, _ = tile.corners_m.mean(axis=0).tolist()
+            away_m = {each: standing[each].bounds_m.distance_to((x_m, y_m)) for each in numbers}
+            if away_m:
+                found[min(away_m, key=lambda each: away_m[each])].append(tile)
+    return found
 
 
 def boxes_of(scenario: Scenario, layout: Sequence[Element] = ()) -> list[Box]:
@@ -273,7 +287,7 @@ def _raised(scenario: Scenario, layout: Sequence[Element]) -> tuple[Feature, ...
     air = {"height_m": scenario.air_height_m}
     return tuple(
         replace(each, properties={**air, **each.properties}) if each.kind in STANDING else each
-        for each in on_levels(site_features(scenario, layout), scenario.structures)
+        for each in in_boxes(on_levels(site_features(scenario, layout), scenario.structures))
     )
 
 

@@ -183,7 +183,7 @@ def _free_field_peak_kpa(site: BlastSite) -> float:
     It is that of the incident wave of Kingery and Bulmash at the nearest structure that counts,
     within the range of their curves; reflections exceed it.
     """
-    solids = [each for each in site.structures if each.cells is None]
+    solids = [each for each in site.structures if not each.is_barrier]
     chosen = [each for each in solids if each.protected] or solids
     x_y_m = site.charge.position_m
     distances_m = (each.rectangle_m.distance_to(x_y_m) for each in chosen)

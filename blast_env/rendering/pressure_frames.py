@@ -102,7 +102,7 @@ class VerticalSection:
 def default_section(site: BlastSite) -> VerticalSection:
     """Return the section through the charge that is best aligned with the protected structures."""
     x_m, y_m = site.charge.position_m
-    solids = [each for each in site.structures if each.cells is None]
+    solids = [each for each in site.structures if not each.is_barrier]
     chosen = [each for each in solids if each.protected] or solids
     centres = [each.rectangle_m.centre for each in chosen]
     if not centres:
@@ -437,7 +437,7 @@ class PressurePainter:
     ) -> None:
         """Draw a solid: filled if the plane cuts it, its outline alone if not."""
         patch = PathPatch(outline_path(parts))
-        if outline.cells is not None:
+        if outline.is_barrier:
             patch.set(edgecolor=unit_interval(BARRIER), linewidth=0.8)
             colour = unit_interval(BARRIER)
         else:
@@ -487,7 +487,7 @@ def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
     found: dict[object, tuple[StructureOutline, list[Block]]] = {}
     for outline in site.structures:
         for block in outline.blocks:
-            alone = (outline.name, block) if outline.cells is not None else outline.name
+            alone = (outline.name, block) if outline.is_barrier else outline.name
             key = whole.get(outline.name, alone), outline.protected
             found.setdefault(key, (outline, []))[1].append(block)
     return sorted(found.values(), key=lambda each: each[1][0].base_m)
@@ -497,7 +497,7 @@ def _solids(site: BlastSite) -> list[Feature]:
     """Return the solids as features, in their colours in a cut."""
     found = []
     for outline in site.structures:
-        if outline.cells is not None:
+        if outline.is_barrier:
             kind, fill = Kinds.BARRIER, BARRIER
         else:
             kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT

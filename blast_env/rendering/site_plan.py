@@ -269,9 +269,9 @@ def draw_outlines(
     whole = {each.name: each.part_of for each in features if each.part_of}
     alike: dict[tuple[str, bool], list[Rectangle]] = {}
     for each in obstacles:
-        if each.cells is None:
+        if not each.is_barrier:
             key = whole.get(each.name, each.name), each.protected
-            alike.setdefault(key, []).append(each.rectangle_m)
+            alike.setdefault(key, []).extend(each.boxes_m)
     drawn: list[Artist] = []
     for (_, protected), rectangles in alike.items():
         patch = PathPatch(outline_path(rectangles), fill=False, zorder=3.0)
@@ -300,7 +300,7 @@ def draw_loads(
     Returns:
         The modules, and the crosses on destroyed ones.
     """
-    is_barrier = obstacle.cells is not None
+    is_barrier = obstacle.is_barrier
     left, bottom, right, top = np.array([part.rectangle_m for part in obstacle.parts]).T
     corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
     modules = PolyCollection(

@@ -87,9 +87,10 @@ def free_flight_impulse(scene: Scene) -> float:
     momentum = float((balls.mass[explosive] * speed).sum())
     centre_m = np.array([scene.charge.position_m])
     distance_m = min(
-        float(distance_to_rectangle(centre_m, outline.rectangle_m)[0])
+        float(distance_to_rectangle(centre_m, box)[0])
         for outline in scene.structures
-        if outline.cells is None
+        if not outline.is_barrier
+        for box in outline.boxes_m
     )
     share = min(MODULE_SIDE_M / (2.0 * pi * max(distance_m, MODULE_SIDE_M)), 1.0)
     return momentum * share

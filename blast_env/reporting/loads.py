@@ -3,9 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,7 @@ from blast_env.errors import UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.physics.gas.probes import ARRIVAL_PA
 from blast_env.physics.gas.solver import Gas
-from blast_env.physics.scene import WALLS, WallName
+from blast_env.physics.scene import WALLS, BlastSite, WallName
 from blast_env.reporting.peaks import CountedPeak, counted_peak
 from blast_env.scenario import AnyStructure, Scenario
 from blast_env.scenario.sections import buildings_of
@@ -125,11 +124,12 @@ class WallHistories:
 
     Args:
         targets: The buildings.
+        site: Their site.
     """
 
-    def __init__(self, targets: Sequence[ReportedBuilding]) -> None:
-        self._targets = tuple(targets)
-        self._members: dict[tuple[str, WallName], NDArray[np.int64]] | None = None
+    def __init__(self, targets: Sequence[ReportedBuilding], site: BlastSite) -> None:
+        self._targets, self._site = tuple(targets), site
+        self._members: dict[tuple[str, WallName], _Members] | None = None
         self._times: list[float] = []
         self._means: list[list[float]] = []
 
@@ -139,7 +139,9 @@ class WallHistories:
             self._members = self._walls(solver)
         pressure = solver.wall_overpressure_pa()
         self._times.append(solver.time_s - 0.5 * step_s)
-        self._means.append([float(pressure[each].mean()) for each in self._members.values()])
+        self._means.append(
+            [float((share * pressure[own]).mean()) for own, share in self._members.values()]
+        )
 
     @property
     def time_s(self) -> FloatArray:
@@ -153,25 +155,31 @@ class WallHistories:
             return None
         return np.array(self._means)[:, keys.index((target, wall))]
 
-    def _walls(self, solver: Gas) -> dict[tuple[str, WallName], NDArray[np.int64]]:
-        faces = solver.faces
-        behind_m = np.asarray(solver.grid.origin_m) + solver.grid.cell_m * (faces.solid + 0.5)
-        number = 2 * faces.axis + (faces.side > 0)  # of `WALLS`; 4 and 5 look down and up
+    def _walls(self, solver: Gas) -> dict[tuple[str, WallName], "_Members"]:
+        from blast_env.physics.gas.engine import face_table_of  # Numba takes half a second
+
+        table = face_table_of(solver.grid, self._site)
+        names = [each.name for each in self._site.structures]
         members = {}
         for target in self._targets:
             for index, wall in enumerate(WALLS):
-                inside = np.zeros(len(faces), dtype=bool)
-                for structure in target.structures:
-                    if wall in structure.faces:
-                        left, bottom, right, top = structure.rectangle_m
-                        top_m = inf if structure.height_m is None else structure.height_m
-                        x_m, y_m, z_m = behind_m.T
-                        here = (left < x_m) & (x_m < right) & (bottom < y_m) & (y_m < top)
-                        inside |= here & (structure.base_m < z_m) & (z_m < top_m)
-                chosen = np.flatnonzero(inside & (number == index))
+                parts = [
+                    names.index(each.name)
+                    for each in target.structures
+                    if wall in each.faces and each.name in names
+                ]
+                chosen = np.flatnonzero(np.isin(table.structure, parts) & (table.face == index))
                 if len(chosen):
-                    members[target.name, wall] = chosen
+                    share = table.share[chosen]
+                    members[target.name, wall] = _Members(chosen, share / share.mean())
         return members
+
+
+class _Members(NamedTuple):
+    """The faces of a wall, and their weights in its mean, 1 on average."""
+
+    faces: NDArray[np.int64]
+    share: FloatArray
 
 
 @dataclass(frozen=True)
@@ -316,7 +324,7 @@ def measure(
     progress: Callable[[float], None] | None = None,
 ) -> MeasuredBlast:
     """Run a blast and return the loads on buildings."""
-    histories = WallHistories(targets)
+    histories = WallHistories(targets, blast.site)
     from blast_env.physics.gas.probes import GroundMap  # Numba takes half a second to import
 
     result = blast.run(progress, lambda grid: (histories, GroundMap(grid)))

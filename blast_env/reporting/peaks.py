@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from blast_env.calibration.references import largest_reflected_peak_pa
-from blast_env.physics.scene import OUTWARDS, BlastSite
+from blast_env.physics.scene import BlastSite
 from blast_env.physics.sight import in_sight
 from blast_env.response.facade import peak_factor
 
@@ -50,7 +50,8 @@ def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> Counted
     """
     charge = site.charge
     points_m = faces[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
-    outward = np.array([(*OUTWARDS[face], 0.0) for face in faces["face"]])
+    outward = np.zeros((len(faces), 3))
+    outward[:, :2] = faces[["outward_x", "outward_y"]]
     seen = in_sight(site, points_m, outward)
     away_m = np.linalg.norm(points_m - [*charge.position_m, charge.height_m], axis=1)
     gas_pa = faces["peak_pa"].to_numpy(dtype=np.float64)

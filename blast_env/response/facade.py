@@ -5,7 +5,7 @@ panels, or both side by side. Its load is the mean overpressure over the bay; al
 share that history.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import cbrt, floor
@@ -15,7 +15,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, WallLine
 from blast_env.response.buildings import LevelOfProtection, level_of_protection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane, glazing_responses
@@ -41,11 +41,15 @@ class Bay:
         structure: Name of the structure.
         wall: The side that it faces: west, east, south or north.
         storey: Counted from 1 at the ground.
-        number: Counted from 1 along the wall, from west to east or from south to north.
-        left_m: Its beginning along the wall: x or y on the site.
+        number: Counted from 1 along the wall, from west to east or from south to north; for a
+            polygon around it, over all walls that mostly face this side.
+        left_m: Its beginning along the wall: x or y on the site, or the distance from the start of
+            the wall of a polygon.
         right_m: Its end along the wall.
         floor_m: Height of its floor above the ground.
         top_m: Height of its upper edge.
+        line_number: Index of the wall of a polygon; `None` for a rectangle.
+        line: That wall.
     """
 
     structure: str
@@ -56,6 +60,8 @@ class Bay:
     right_m: float
     floor_m: float
     top_m: float
+    line_number: int | None = None
+    line: WallLine | None = None
 
     @property
     def name(self) -> str:
@@ -91,8 +97,9 @@ def divide(
     storey_m: float = STOREY_M,
     bay_m: float = BAY_M,
     base_m: float = 0.0,
+    lines: Sequence[WallLine] = (),
 ) -> tuple[Bay, ...]:
-    """Return the bays of a block, wall by wall, storey by storey.
+    """Return the bays of a building, wall by wall, storey by storey.
 
     A remaining height of at least half a storey is the uppermost storey; a smaller one is added to
     the storey below. The bays of a wall have equal widths, as close as possible to `bay_m`.
@@ -105,6 +112,7 @@ def divide(
         storey_m: Height of a storey.
         bay_m: Intended width of a bay.
         base_m: Height of its base above the ground.
+        lines: The walls of a polygon; without them it is a block with four walls.
 
     Raises:
         BlastEnvError: If a size is not positive.
@@ -117,28 +125,41 @@ def divide(
     floors = [base_m + storey_m * storey for storey in range(storeys)] + [height_m]
     bays: list[Bay] = []
     for wall in walls:
-        low, high = (
-            (ground_m.bottom, ground_m.top)
-            if wall in ("west", "east")
-            else (ground_m.left, ground_m.right)
-        )
-        count = max(1, round((high - low) / bay_m))
-        ends = np.linspace(low, high, count + 1).tolist()
-        bays += [
-            Bay(
-                structure,
-                wall,
-                storey + 1,
-                number + 1,
-                ends[number],
-                ends[number + 1],
-                floors[storey],
-                floors[storey + 1],
-            )
-            for storey in range(storeys)
-            for number in range(count)
-        ]
+        before = 0
+        for line_number, line, low, high in _stretches(ground_m, wall, lines):
+            count = max(1, round((high - low) / bay_m))
+            ends = np.linspace(low, high, count + 1).tolist()
+            bays += [
+                Bay(
+                    structure,
+                    wall,
+                    storey + 1,
+                    before + number + 1,
+                    ends[number],
+                    ends[number + 1],
+                    floors[storey],
+                    floors[storey + 1],
+                    line_number,
+                    line,
+                )
+                for storey in range(storeys)
+                for number in range(count)
+            ]
+            before += count
     return tuple(bays)
+
+
+def _stretches(
+    ground_m: Rectangle, side: str, lines: Sequence[WallLine]
+) -> Iterator[tuple[int | None, WallLine | None, float, float]]:
+    """Yield number and line of each wall on a side, and its ends; of a block, the side itself."""
+    if lines:
+        own = ((number, each) for number, each in enumerate(lines) if each.side == side)
+        yield from ((number, each, 0.0, each.length_m) for number, each in own)
+    elif side in ("west", "east"):
+        yield None, None, ground_m.bottom, ground_m.top
+    else:
+        yield None, None, ground_m.left, ground_m.right
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Distances and overlaps between one rectangle and arrays of rectangles."""
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -29,6 +30,12 @@ def overlapping(rectangle: Rectangle, boxes: Boxes) -> BoolArray:
     along_x = (left < rectangle.right - TOLERANCE_M) & (right > rectangle.left + TOLERANCE_M)
     along_y = (bottom < rectangle.top - TOLERANCE_M) & (top > rectangle.bottom + TOLERANCE_M)
     return along_x & along_y
+
+
+def overlapping_any(rectangles: Sequence[Rectangle], boxes: Boxes) -> BoolArray:
+    """Return whether each rectangle overlaps any of some others, at least one."""
+    found: BoolArray = np.any([overlapping(each, boxes) for each in rectangles], axis=0)
+    return found
 
 
 def covered_m2(rectangle: Rectangle, boxes: Boxes) -> FloatArray:

@@ -237,7 +237,8 @@ def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
     x_m, y_m = charge.position_m
     place = PointSource.at(charge)
     for structure in scenario.structures:
-        if distance_m(place, structure.rectangle_m) < scenario.charge_radius_m - TOLERANCE_M:
+        away_m = min(distance_m(place, box) for box in structure.boxes_m)
+        if away_m < scenario.charge_radius_m - TOLERANCE_M:
             message = (
                 f"is at ({x_m:g}, {y_m:g}) m, {charge.height_m:g} m high, over {structure.name!r}"
                 f" of {structure.height_m:g} m: the particle engines know no heights and would put"
@@ -250,8 +251,8 @@ def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]
     """Return rectangles that cover the modules, in simulation units."""
     rectangles: list[Rectangle] = []
     for outline in structures:
-        if outline.cells is None:
-            rectangles.append(outline.rectangle_m.scaled(UNITS_PER_M))
+        if not outline.is_barrier:
+            rectangles.extend(box.scaled(UNITS_PER_M) for box in outline.boxes_m)
         else:
             rectangles.extend(part.rectangle for part in outline.build().parts)
     return rectangles
@@ -277,12 +278,13 @@ def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
         columns=section.columns,
         protected=section.protected,
         weight=section.weight,
-        cells=None,
+        cells=section.cells,
         capacity=section.module_capacity,
         height_m=section.height_m,
         faces=section.faces,
         base_m=section.base_m,
         is_lasting=is_lasting,
+        footprint=section.footprint,
     )
 
 

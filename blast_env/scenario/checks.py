@@ -28,6 +28,7 @@ from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, extent, unknown_name
 from blast_env.scenario.reach import places_on
 from blast_env.scenario.sections import (
+    MOST_MODULES,
     AnySource,
     AnyStructure,
     GaugeSection,
@@ -55,9 +56,6 @@ Checked = TypeVar("Checked")
 
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""
-
-MOST_MODULES: Final = 250_000
-"""Most modules of a scene: 250 m x 250 m of buildings, which add 2 s to a blast."""
 
 _MOST_ITEMS: Final = 100
 """Most items of an array that are examined; longer arrays are errors anyway."""
@@ -253,19 +251,30 @@ def _repeated_names(
 def _structure_problems(parts: Parts) -> Iterator[Problem]:
     """Check that structures lie inside the site without overlaps, and their number of modules."""
     stock = 0 if parts.build_zone is None else parts.build_zone.stock
-    modules = sum(each.rows * each.columns for each in parts.structures.values()) + stock
+    modules = sum(each.modules for each in parts.structures.values()) + stock
     if modules > MOST_MODULES:
         with_stock = f", the stock of {stock:,} among them" if stock else ""
         message = f"have {modules:,} modules together{with_stock}, must have at most"
         yield Problem("structures", f"{message} {MOST_MODULES:,}")
     for index, structure in parts.structures.items():
+        plans_m = [structure.rectangle_m]
+        if structure.footprint is not None:
+            plans_m.append(Rectangle(*structure.footprint.polygon.bounds))
+        described = _described(structure)
         yield from _outside_site(
-            parts, f"structures[{index}]", _described(structure), structure.rectangle_m
+            parts, f"structures[{index}]", described, Rectangle.around(plans_m)
         )
     for (i, one), (j, other) in combinations(parts.structures.items(), 2):
-        if one.rectangle_m.overlaps(other.rectangle_m) and not _are_above_each_other(one, other):
+        if _overlap(one, other) and not _are_above_each_other(one, other):
             message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"
             yield Problem(f"structures[{j}]", message)
+
+
+def _overlap(one: AnyStructure, other: AnyStructure) -> bool:
+    """Return whether modules of two structures overlap."""
+    return one.rectangle_m.overlaps(other.rectangle_m) and any(
+        own.overlaps(box) for own in one.boxes_m for box in other.boxes_m
+    )
 
 
 def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
@@ -305,7 +314,7 @@ def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Pro
         message = f"its centre may be at {where}, must lie inside the site ({site}){words}"
         yield Problem(key, message)
     for j, structure in parts.structures.items():
-        distance = distance_m(source, structure.rectangle_m)
+        distance = min(distance_m(source, box) for box in structure.boxes_m)
         if distance < radius - TOLERANCE_M and not is_over_or_below(source.height_m, structure):
             message = (
                 f"its centre comes as near as {distance:g} m to structures[{j}],"

@@ -100,7 +100,10 @@ def with_glass(window: Glazing, glass: Glazing) -> Glazing:
 
 
 def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
-    """Return the bays of a structure with the names of their components; none without a facade."""
+    """Return the bays of a structure with the names of their components; none without a facade.
+
+    Walls of a polygon that are shorter than half a bay have no windows.
+    """
     facade = structure.facade
     if facade is None or structure.height_m is None:
         return ()
@@ -112,6 +115,7 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
         facade.storey_m,
         facade.bay_m,
         structure.base_m,
+        () if structure.footprint is None else structure.footprint.walls,
     )
     named = []
     for bay in bays:
@@ -119,7 +123,10 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
         for part in facade.parts:
             if part.covers(bay):
                 glazing, wall = part.glazing or glazing, part.wall or wall
-        named.append(NamedBay(bay, glazing, glazing, wall))
+        if bay.line is not None and bay.width_m < 0.5 * facade.bay_m:
+            glazing = None
+        if glazing or wall or bay.line is None:
+            named.append(NamedBay(bay, glazing, glazing, wall))
     return tuple(named)
 
 

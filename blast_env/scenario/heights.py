@@ -48,7 +48,8 @@ def highest_grounds_m(zone: BuildZone, structures: Iterable[AnyStructure]) -> tu
     Charges and vehicles are ignored. An item that fits nowhere has 0.
     """
     structures = tuple(structures)
-    here = (each.rectangle_m.overlaps(zone.rectangle_m) for each in structures if each.carries)
+    terraces_m = (box for each in structures if each.carries for box in each.boxes_m)
+    here = (box.overlaps(zone.rectangle_m) for box in terraces_m)
     return _grounds_m(zone, structures) if any(here) else (0.0,) * max(len(zone.items), 1)
 
 
@@ -85,8 +86,13 @@ def depth_inside_m(position_m: tuple[float, float, float], structure: AnyStructu
     It is negative or 0 outside. The ground is no surface.
     """
     x_m, y_m, z_m = position_m
-    left, bottom, right, top = structure.rectangle_m
-    depth_m = min(x_m - left, right - x_m, y_m - bottom, top - y_m)
+    depth_m = max(
+        min(x_m - left, right - x_m, y_m - bottom, top - y_m)
+        for left, bottom, right, top in structure.boxes_m
+    )
+    if structure.footprint is not None and depth_m > 0.0:  # boxes of a polygon share sides
+        place_m = np.array([(x_m, y_m)])
+        depth_m = min(float(each.distances_m(place_m)[0]) for each in structure.footprint.walls)
     if structure.base_m > 0.0:
         depth_m = min(depth_m, z_m - structure.base_m)
     return depth_m if structure.height_m is None else min(depth_m, structure.height_m - z_m)

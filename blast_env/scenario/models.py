@@ -55,6 +55,7 @@ from blast_env.scenario.sections import (
     Name,
     PointM,
     PointSource,
+    PolygonSection,
     RectangleSource,
     Section,
     SegmentSource,
@@ -85,6 +86,7 @@ __all__ = [
     "ObjectiveSection",
     "PointM",
     "PointSource",
+    "PolygonSection",
     "RectangleSource",
     "Scenario",
     "Section",
@@ -119,7 +121,7 @@ if the response of facades counts."""
 
 _BUILT: Final = {
     *("kind", "name", "corner_m", "rows", "columns", "side_modules"),
-    *("height_m", "base_m", "carries"),
+    *("height_m", "base_m", "carries", "outline_m", "courtyards_m"),
 }
 """Keys of a structure for its shape and place."""
 
@@ -343,6 +345,8 @@ class Scenario(Section):
         single = len(self.charge) == len(self.structures) == 1
         if not (single and isinstance(source, PointSource)):
             raise BlastEnvError(f"{self.name}: needs one point charge and one structure to move")
+        if isinstance(structure, PolygonSection):
+            raise BlastEnvError(f"{self.name}: the structure to move must be a rectangle")
         x_m, near_m = source.position_m[0], structure.rectangle_m.left
         if near_m <= x_m:
             raise BlastEnvError(f"{self.name}: the structure must stand to the right of the charge")

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import chain
-from typing import Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -22,10 +22,11 @@ from pydantic import (
     StrictInt,
     ValidationError,
     model_serializer,
+    model_validator,
 )
 
 from blast_env.errors import type_word
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Cell, Rectangle
 from blast_env.physics.parameters import PRESETS, SimulationParameters, preset, with_overrides
 from blast_env.physics.scene import WALLS, Charge, WallName
 from blast_env.response.facade import BAY_M, STOREY_M, Bay
@@ -39,6 +40,9 @@ from blast_env.scenario.problems import (
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import STEERING
 
+if TYPE_CHECKING:  # shapely takes a tenth of a second to import
+    from blast_env.physics.footprint import Footprint
+
 Coordinate = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
 Length = Annotated[StrictFloat, Field(gt=0.0, le=2000.0)]
 PointM = tuple[Coordinate, Coordinate]
@@ -48,6 +52,9 @@ Height = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
 """Height of a structure or barrier, m: at least a module's side."""
 
 Count = Annotated[StrictInt, Field(ge=1, le=1000)]
+
+MOST_MODULES: Final = 250_000
+"""Most modules of a scene: 250 m x 250 m of buildings, which add 2 s to a blast."""
 
 VehicleMass = Annotated[StrictFloat, Field(ge=50.0, le=200_000.0)]
 """Mass of a vehicle, kg."""
@@ -430,7 +437,6 @@ class StructureSection(Section):
 
     Attributes:
         name: Name in tables and pictures; `barrier` is taken by the modules of a layout.
-        corner_m: Lower left corner.
         protected: Whether the load on it counts.
         weight: Weight of its load among the protected structures.
         peak_weight: Weight of its peak overpressure, if the objective counts peaks; `weight` unless
@@ -449,7 +455,6 @@ class StructureSection(Section):
     """
 
     name: Name
-    corner_m: PointM
     protected: StrictBool = False
     weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
     peak_weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] | None = None
@@ -480,13 +485,34 @@ class StructureSection(Section):
         """Weight of its peak: `peak_weight`, or `weight` unless given."""
         return self.weight if self.peak_weight is None else self.peak_weight
 
+    @property
+    def footprint(self) -> "Footprint | None":
+        """Its polygon; `None` for a rectangle of modules."""
+        return None
+
+    @property
+    def cells(self) -> tuple[Cell, ...] | None:
+        """Rows and columns of its modules, row by row; `None` for all of its grid."""
+        return None
+
 
 class ModularObstacleSection(StructureSection):
     """A `ModularObstacle`: a rectangle of rows x columns modules."""
 
     kind: Literal["ModularObstacle"]
+    corner_m: PointM
     rows: Count
     columns: Count
+
+    @property
+    def modules(self) -> int:
+        """Number of its modules."""
+        return self.rows * self.columns
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """The footprint, as for every structure in rectangles of modules."""
+        return (self.rectangle_m,)
 
     @property
     def rectangle_m(self) -> Rectangle:
@@ -499,7 +525,18 @@ class ConcreteSquareSection(StructureSection):
     """A `ConcreteSquare`: a square of modules."""
 
     kind: Literal["ConcreteSquare"]
+    corner_m: PointM
     side_modules: Count
+
+    @property
+    def modules(self) -> int:
+        """Number of its modules."""
+        return self.rows * self.columns
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """The footprint, as for every structure in rectangles of modules."""
+        return (self.rectangle_m,)
 
     @property
     def rows(self) -> int:
@@ -518,8 +555,85 @@ class ConcreteSquareSection(StructureSection):
         return Rectangle.from_corner(self.corner_m, (side, side))
 
 
+Corners = Annotated[tuple[PointM, ...], Field(min_length=3, max_length=5000)]
+"""Corners of a closed line."""
+
+
+class PolygonSection(StructureSection):
+    """A building with a polygon in plan, in modules whose centres it covers.
+
+    Attributes:
+        outline_m: Corners of its outline, in either order.
+        courtyards_m: Corners of each of its courtyards.
+    """
+
+    kind: Literal["polygon"]
+    outline_m: Corners
+    courtyards_m: Annotated[tuple[Corners, ...], Field(max_length=100)] = ()
+
+    @model_validator(mode="after")
+    def _check_rings(self) -> Self:
+        """Refuse outlines that cross themselves, and those without a module or with too many."""
+        from blast_env.physics.footprint import footprint_problem
+
+        problem = footprint_problem(self.outline_m, self.courtyards_m)
+        if not problem and self.footprint.area_m2 > MOST_MODULES * MODULE_SIDE_M**2:
+            most_m2 = MOST_MODULES * MODULE_SIDE_M**2
+            problem = f"encloses {self.footprint.area_m2:,.0f} m2, must be at most {most_m2:,.0f}"
+        if not problem and not self.footprint.cells:
+            problem = (
+                f"encloses {self.footprint.area_m2:.3g} m2 and the centre of no module, must cover"
+                f" the centre of a square of the grid of {MODULE_SIDE_M:g} m"
+            )
+        if problem:
+            raise ScenarioError(self.name, [Problem("outline_m", problem)])
+        return self
+
+    @property
+    def footprint(self) -> "Footprint":
+        """Its polygon."""
+        from blast_env.physics.footprint import footprint_of
+
+        return footprint_of(self.outline_m, self.courtyards_m)
+
+    @property
+    def corner_m(self) -> PointM:
+        """Lower left corner of the grid of its modules."""
+        return self.footprint.corner_m
+
+    @property
+    def rows(self) -> int:
+        """Rows of the grid of its modules."""
+        return self.footprint.shape[0]
+
+    @property
+    def columns(self) -> int:
+        """Columns of the grid of its modules."""
+        return self.footprint.shape[1]
+
+    @property
+    def modules(self) -> int:
+        """Number of its modules."""
+        return len(self.footprint.cells)
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Rows and columns of its modules, row by row."""
+        return self.footprint.cells
+
+    @property
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """Its modules in few rectangles."""
+        return self.footprint.boxes_m
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle around its modules."""
+        return Rectangle.around(self.boxes_m)
+
+
 AnyStructure = Annotated[
-    ModularObstacleSection | ConcreteSquareSection, Field(discriminator="kind")
+    ModularObstacleSection | ConcreteSquareSection | PolygonSection, Field(discriminator="kind")
 ]
 
 

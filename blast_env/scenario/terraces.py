@@ -76,17 +76,14 @@ def lie_wholly_on(
 
 def is_open_below(structure: AnyStructure, structures: Iterable[AnyStructure]) -> bool:
     """Return whether there is air below a structure: it is not on the ground or on a terrace."""
-    boxes = _as_boxes(structure.rectangle_m)
-    return structure.base_m > 0.0 and not lie_wholly_on(structures, structure.base_m, boxes).all()
+    boxes = tuple(np.array(sides) for sides in zip(*structure.boxes_m, strict=True))
+    left, bottom, right, top = boxes
+    whole = lie_wholly_on(structures, structure.base_m, (left, bottom, right, top))
+    return structure.base_m > 0.0 and not whole.all()
 
 
 def _terraces(structures: Iterable[AnyStructure]) -> Iterator[tuple[Rectangle, float]]:
     """Yield plan and height of each terrace."""
     for each in structures:
         if each.carries and each.height_m is not None:
-            yield each.rectangle_m, each.height_m
-
-
-def _as_boxes(rectangle: Rectangle) -> Boxes:
-    left, bottom, right, top = (np.array([side]) for side in rectangle)
-    return left, bottom, right, top
+            yield from ((box, each.height_m) for box in each.boxes_m)

@@ -203,7 +203,9 @@ class VehicleGround:
     @cached_property
     def standing_m(self) -> tuple[Rectangle, ...]:
         """The structures that it cannot pass below."""
-        return tuple(each.rectangle_m for each in self.structures if not each.lets_through)
+        return tuple(
+            box for each in self.structures if not each.lets_through for box in each.boxes_m
+        )
 
     @cached_property
     def always_closed_m(self) -> tuple[Rectangle, ...]:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, WallLine
 from blast_env.physics.scene import Charge, WallName
 from blast_env.scenario.sections import AnyStructure, PointM, VehicleSource
 
@@ -89,7 +89,11 @@ def _rough_distance_m(places_m: FloatArray, structures: Iterable[AnyStructure]) 
     square_m2 = np.full(len(places_m), np.inf)
     for structure in structures:
         if structure.protected:
-            for left, bottom, right, top in _walls(structure):
+            for wall in _walls(structure):
+                if isinstance(wall, WallLine):
+                    np.minimum(square_m2, wall.distances_m(places_m) ** 2, out=square_m2)
+                    continue
+                left, bottom, right, top = wall
                 across_m, along_m = x_m - x_m.clip(left, right), y_m - y_m.clip(bottom, top)
                 np.minimum(square_m2, across_m**2 + along_m**2, out=square_m2)
     distance_m: FloatArray = np.sqrt(square_m2)
@@ -110,11 +114,16 @@ def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> P
     """
     x_m, y_m = position_m
     walls = [wall for each in structures if each.protected for wall in _walls(each)]
-    points = [
-        (min(max(x_m, left), right), min(max(y_m, bottom), top))
-        for left, bottom, right, top in walls
-    ]
+    points = [_nearest_m(wall, position_m) for wall in walls]
     return min(points, key=lambda point: hypot(point[0] - x_m, point[1] - y_m))
+
+
+def _nearest_m(wall: Rectangle | WallLine, place_m: PointM) -> PointM:
+    """Return the point of a wall nearest to a place."""
+    if isinstance(wall, WallLine):
+        return wall.point_at(float(wall.along_m(np.array([place_m]))[0].clip(0.0, wall.length_m)))
+    left, bottom, right, top = wall
+    return min(max(place_m[0], left), right), min(max(place_m[1], bottom), top)
 
 
 def nearest_wall(
@@ -131,14 +140,14 @@ def nearest_wall(
     protected = [each for each in structures if each.protected]
 
     def least_m(structure: AnyStructure) -> FloatArray:
-        left, bottom, right, top = structure.rectangle_m
+        left, bottom, right, top = _around_m(structure)
         across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
         along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
         distances_m: FloatArray = np.sqrt(across_m**2 + along_m**2)
         return distances_m
 
     for structure in protected:
-        left, bottom, right, top = structure.rectangle_m
+        left, bottom, right, top = _around_m(structure)
         # No wall of the structure is farther from a place than this.
         diagonal_m = hypot(right - left, top - bottom) + 2.0 * _EQUAL_M
         np.minimum(most_m, least_m(structure) + diagonal_m, out=most_m)
@@ -155,10 +164,15 @@ def _nearer_wall(
 ) -> tuple[FloatArray, FloatArray]:
     """Return both distances of `nearest_wall`, updated with one more structure."""
     x_m, y_m = places_m.T
-    for left, bottom, right, top in _walls(structure):
-        across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
-        along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
-        wall_m = np.hypot(across_m, along_m)
+    for wall in _walls(structure):
+        if isinstance(wall, WallLine):
+            left, bottom, right, top = wall.bounds_m
+            wall_m = wall.distances_m(places_m)
+        else:
+            left, bottom, right, top = wall
+            across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
+            along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
+            wall_m = np.hypot(across_m, along_m)
         aside_m = np.hypot(x_m - (left + right) / 2.0, y_m - (bottom + top) / 2.0)
         nearer = wall_m < nearest_m - _EQUAL_M
         as_near = np.abs(wall_m - nearest_m) <= _EQUAL_M
@@ -169,8 +183,18 @@ def _nearer_wall(
     return nearest_m, middle_m
 
 
-def _walls(structure: AnyStructure) -> Iterator[Rectangle]:
-    """Yield the loaded walls as rectangles of width 0."""
+def _around_m(structure: AnyStructure) -> Rectangle:
+    """Return the rectangle around the walls of a structure."""
+    if structure.footprint is None:
+        return structure.rectangle_m
+    return Rectangle.around([each.bounds_m for each in structure.footprint.walls])
+
+
+def _walls(structure: AnyStructure) -> Iterator[Rectangle | WallLine]:
+    """Yield the loaded walls: of a rectangle as rectangles of width 0."""
+    if structure.footprint is not None:
+        yield from (each for each in structure.footprint.walls if each.side in structure.faces)
+        return
     left, bottom, right, top = structure.rectangle_m
     sides: dict[WallName, Rectangle] = {
         "west": Rectangle(left, bottom, left, top),
@@ -178,4 +202,4 @@ def _walls(structure: AnyStructure) -> Iterator[Rectangle]:
         "south": Rectangle(left, bottom, right, bottom),
         "north": Rectangle(left, top, right, top),
     }
-    return (sides[wall] for wall in structure.faces)
+    yield from (sides[wall] for wall in structure.faces)

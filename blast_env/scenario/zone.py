@@ -21,7 +21,13 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Cell, Element, Piece, Rectangle, Removal
 from blast_env.response.barriers import RigidPiece
 from blast_env.scenario.access_way import AccessWay, any_in_windows, counts_before
-from blast_env.scenario.boxes import TOLERANCE_M, Boxes, box_distances_m, overlapping
+from blast_env.scenario.boxes import (
+    TOLERANCE_M,
+    Boxes,
+    box_distances_m,
+    overlapping,
+    overlapping_any,
+)
 from blast_env.scenario.catalogue import (
     MOST_ITEMS,
     AnyMeasure,
@@ -432,7 +438,7 @@ def empty_zone(surroundings: Surroundings) -> EmptyZone:
     passable = np.ones_like(usable)
     for structure in surroundings.structures:
         if not structure.lets_through:
-            passable &= ~overlapping(structure.rectangle_m, boxes)
+            passable &= ~overlapping_any(structure.boxes_m, boxes)
     ground = ground_m(surroundings.structures, boxes)
     heights_m = np.unique(ground)
     levels = ground == heights_m[len(heights_m) == 1 :, np.newaxis, np.newaxis]
@@ -478,7 +484,7 @@ def _blocked(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, Bo
     for keep_out in zone.keep_outs:
         yield f"must stay empty: {keep_out.reason}", overlapping(keep_out.rectangle_m, boxes)
     for structure in surroundings.structures:
-        own = overlapping(structure.rectangle_m, boxes)
+        own = overlapping_any(structure.boxes_m, boxes)
         if structure.carries:
             whole = lie_wholly_on(surroundings.structures, structure.height_m, boxes)
             yield f"lies only partly on the terrace {structure.name!r}", own & ~whole
@@ -519,7 +525,7 @@ def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, 
     clearance_m = surroundings.zone.clearance_m
     ground = ground_m(surroundings.structures, boxes)
     for structure in surroundings.structures:
-        distances = box_distances_m(structure.rectangle_m, boxes)
+        distances = np.min([box_distances_m(each, boxes) for each in structure.boxes_m], axis=0)
         if structure.carries:  # cells on a terrace need no clearance from it
             distances = np.where(ground < (structure.height_m or inf), distances, inf)
         yield (

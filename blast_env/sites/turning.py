@@ -11,7 +11,6 @@ from blast_env.scenario import (
     AnySource,
     AnyStructure,
     BuildZone,
-    ConcreteSquareSection,
     GaugeSection,
     PointSource,
     Scenario,
@@ -20,7 +19,14 @@ from blast_env.scenario import (
     find_scenario,
 )
 from blast_env.scenario.catalogue import Hardening
-from blast_env.scenario.sections import Entry, FacadePart, Ground, PointM
+from blast_env.scenario.sections import (
+    Entry,
+    FacadePart,
+    Ground,
+    ModularObstacleSection,
+    PointM,
+    PolygonSection,
+)
 
 _Covering = TypeVar("_Covering", FacadePart, Hardening)
 
@@ -93,11 +99,14 @@ def _entry(entry: Entry, height_m: float) -> Entry:
 
 
 def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
-    changes: dict[str, Any] = {
-        "corner_m": _corner(structure.rectangle_m, height_m),
-        "faces": tuple(_TURNED_WALL[wall] for wall in structure.faces),
-    }
-    if not isinstance(structure, ConcreteSquareSection):
+    changes: dict[str, Any] = {"faces": tuple(_TURNED_WALL[wall] for wall in structure.faces)}
+    if isinstance(structure, PolygonSection):
+        rings = (structure.outline_m, *structure.courtyards_m)
+        outline, *courtyards = (tuple(_point(each, height_m) for each in ring) for ring in rings)
+        changes |= {"outline_m": outline, "courtyards_m": tuple(courtyards)}
+    else:
+        changes["corner_m"] = _corner(structure.rectangle_m, height_m)
+    if isinstance(structure, ModularObstacleSection):
         changes |= {"rows": structure.columns, "columns": structure.rows}
     if structure.facade is not None:
         parts = tuple(map(_with_walls, structure.facade.parts))

@@ -147,7 +147,7 @@ def _draw_plan(
                 part.hits = int(part.impulse > 0.0)
             draw_loads(axes, obstacle, scale, linewidth=0.2)
             continue
-        colour = unit_interval(STRUCTURE if obstacle.cells is None else BARRIER)
+        colour = unit_interval(BARRIER if obstacle.is_barrier else STRUCTURE)
         parts = [rectangle_patch(part.rectangle_m) for part in obstacle.parts]
         axes.add_collection(PatchCollection(parts, color=colour, linewidth=0.3, zorder=4))
     protected = [each for each in scene.structures if each.protected]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.engines.bays import bay_patches
 from blast_env.engines.gas import GasBlast, GasEngine
-from blast_env.geometry import stacked_runs
 from blast_env.physics.gas.engine import GasRun
 from blast_env.response.sdof import Resistance, System, responses
 from blast_env.scenario import Scenario
@@ -43,26 +42,21 @@ def _depths_m(places_m: FloatArray, angle_deg: float) -> tuple[FloatArray, Float
 
 
 def turned_block(angle_deg: float) -> Scenario:
-    """Return the modules of a block, turned against the grid, whose facade faces the charge."""
-    count = round(_SIDE_M / MODULE_SIDE_M)
-    centres = MODULE_SIDE_M * (np.arange(count) + 0.5)
-    places = np.stack(np.meshgrid(centres, centres), axis=-1)
-    behind, beside = _depths_m(places, angle_deg)
-    inside: BoolArray = (behind >= 0.0) & (behind < DEPTH_M) & (np.abs(beside) < 0.5 * FACADE_M)
-    runs = stacked_runs(inside).tolist()
+    """Return a block, turned against the grid, whose facade faces the charge."""
+    middle, inwards, along = _block(angle_deg)
+    corners = [
+        middle + depth * DEPTH_M * inwards + side * 0.5 * FACADE_M * along
+        for depth, side in ((0, 1), (0, -1), (1, -1), (1, 1))
+    ]
     structures: list[dict[str, Any]] = [
         {
-            "kind": "ModularObstacle",
-            "name": f"part_{number}",
-            "building": "block",
-            "corner_m": (column * MODULE_SIDE_M, row * MODULE_SIDE_M),
-            "rows": rows,
-            "columns": columns,
+            "kind": "polygon",
+            "name": "block",
+            "outline_m": np.round(corners, 9).tolist(),
             "height_m": HEIGHT_M,
             "protected": True,
             "facade": {"storey_m": BAY_M, "bay_m": BAY_M, "wall": "concrete_200"},
         }
-        for number, (row, column, rows, columns) in enumerate(runs, start=1)
     ]
     document = {
         "schema_version": 2,
@@ -85,8 +79,7 @@ class FacadeLoads:
         told_pa_s: Mean impulse in the tables of the engine, along the facade's normal.
         told_peak_pa: Mean over the bays of the largest mean overpressure along that normal.
         largest_told_pa: The largest of these peaks.
-        stepped_m: Largest deflection of an elastic component of 10 ms on any step of the staircase.
-        told_m: The same in any bay along that normal.
+        told_m: Largest deflection of an elastic component of 10 ms in any bay along that normal.
     """
 
     impulse_pa_s: float
@@ -95,7 +88,6 @@ class FacadeLoads:
     told_pa_s: float
     told_peak_pa: float
     largest_told_pa: float
-    stepped_m: float
     told_m: float
 
 
@@ -119,7 +111,7 @@ def oblique_loads(
     patch = bay_patches(result.run.table, names, bays.bays)
     own = [bool(chosen[patch == index].all()) for index in range(len(bays.bays))]
     history_pa = bays.history_pa[own]
-    peaks_pa = np.unique(history_pa.max(axis=1))
+    peaks_pa = history_pa.max(axis=1)
     return FacadeLoads(
         impulse_pa_s=float(impulse[chosen].mean()),
         mean_peak_pa=float(peak[chosen].mean()),
@@ -127,7 +119,6 @@ def oblique_loads(
         told_pa_s=float(np.average(told["impulse_pa_s"], weights=told["share"])),
         told_peak_pa=float(peaks_pa.mean()),
         largest_told_pa=float(peaks_pa.max()),
-        stepped_m=_deflection_m(bays.recorder.time_s, bays.recorder.history_pa[own]),
         told_m=_deflection_m(bays.recorder.time_s, history_pa),
     )
 

@@ -97,7 +97,7 @@ class SurrogateEngine(Engine):
             StructureLoad.on(*told, notes=("a prediction of the surrogate, not a blast",))
             for told in zip(scenario.structures, impulse_pa_s, peak_pa, strict=True)
         )
-        modules = [each.rows * each.columns for each in scenario.structures]
+        modules = [each.modules for each in scenario.structures]
         bays = guess.bays(site, 0) if scenario.objective.is_response else ()
         return BlastLoads(structures, np.repeat(impulse_pa_s, modules), bays)
 

@@ -1,6 +1,6 @@
 """Sites as the surrogate represents them: points on protected walls, and obstacles to the blast."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,12 +13,13 @@ from blast_env.arrays import FloatArray, IntArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.engines.contract import structure_response
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Measure, standing
+from blast_env.geometry import Element, Measure, WallLine, standing
 from blast_env.physics.scene import OUTWARDS, Charge
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.scenario import AnyStructure, Scenario
 from blast_env.scenario.facade import NamedBay
 from blast_env.scenario.terraces import ground_below_m, is_open_below
+from blast_env.units import MODULE_SIDE_M
 
 _ALONG_M: Final = 1.0
 _UP_M: Final = 1.5
@@ -94,19 +95,33 @@ def _points(structure: AnyStructure, height_m: float, apart: float) -> FloatArra
     levels = max(1, round(rise_m / (_UP_M * apart)))
     z_m = structure.base_m + (np.arange(levels) + 0.5) * rise_m / levels
     rows = []
-    for face in structure.faces:
-        x_out, y_out = OUTWARDS[face]
-        length_m = top - bottom if x_out else right - left
+    for length_m, (x_out, y_out), line in _walls(structure):
         number = max(1, round(length_m / (_ALONG_M * apart)))
         area_m2 = length_m * rise_m / (number * levels)
         for along_m in (np.arange(number) + 0.5) * length_m / number:
-            if x_out:
+            if line is not None:
+                before_m = MODULE_SIDE_M if line.is_oblique else _BEFORE_M  # of the steps
+                x_m, y_m = line.point_at(along_m) + before_m * np.array(line.normal)
+            elif x_out:
                 x_m, y_m = (left if x_out < 0 else right) + _BEFORE_M * x_out, bottom + along_m
             else:
                 x_m, y_m = left + along_m, (bottom if y_out < 0 else top) + _BEFORE_M * y_out
             edge_m = min(along_m, length_m - along_m)
             rows += [(x_m, y_m, z, x_out, y_out, area_m2, edge_m, height_m - z) for z in z_m]
     return np.array(rows)
+
+
+def _walls(
+    structure: AnyStructure,
+) -> Iterator[tuple[float, tuple[float, float], WallLine | None]]:
+    """Yield length, outward normal and, of a polygon, line of each counted wall."""
+    left, bottom, right, top = structure.rectangle_m
+    if structure.footprint is not None:
+        own = (each for each in structure.footprint.walls if each.side in structure.faces)
+        yield from ((each.length_m, each.normal, each) for each in own)
+        return
+    for face in structure.faces:
+        yield top - bottom if OUTWARDS[face][0] else right - left, OUTWARDS[face], None
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,9 +231,10 @@ class SurrogateSite:
         air_m = scenario.air_height_m
         self._solids = np.array(
             [
-                [*each.rectangle_m, each.height_m or air_m]
+                [*box, each.height_m or air_m]
                 for each in scenario.structures
                 if not is_open_below(each, scenario.structures)
+                for box in each.boxes_m
             ]
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
@@ -326,11 +342,7 @@ def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> fl
     """Return the factor on the spacing of points that keeps their number near `MOST_POINTS`."""
     area_m2 = 0.0
     for structure, height_m in zip(structures, heights_m, strict=True):
-        left, bottom, right, top = structure.rectangle_m
-        lengths_m = [
-            top - bottom if OUTWARDS[face][0] else right - left for face in structure.faces
-        ]
-        area_m2 += height_m * sum(lengths_m)
+        area_m2 += height_m * sum(length_m for length_m, *_ in _walls(structure))
     return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
 
 

@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
 from blast_env.physics.scene import BlastSite
 
 FALLEN: Final = 0.1
@@ -65,7 +66,7 @@ def watched_structures(site: BlastSite, until: str | float) -> list[int]:
 
     They are the protected ones, or all without the barrier if none is or if `until` is "walls".
     """
-    structures = [k for k, outline in enumerate(site.structures) if outline.cells is None]
+    structures = [k for k, outline in enumerate(site.structures) if not outline.is_barrier]
     protected = [k for k in structures if site.structures[k].protected]
     return structures if until == "walls" else protected or structures
 
@@ -74,7 +75,13 @@ def corners_m(site: BlastSite, structures: Sequence[int]) -> list[tuple[float, f
     """Return the corners of structures in plan."""
     return [
         (x, y)
-        for left, bottom, right, top in (site.structures[k].rectangle_m for k in structures)
+        for left, bottom, right, top in (box for k in structures for box in _boxes_m(site, k))
         for x in (left, right)
         for y in (bottom, top)
     ]
+
+
+def _boxes_m(site: BlastSite, structure: int) -> Sequence[Rectangle]:
+    """Return the rectangle of a structure, or those around the walls of a polygon."""
+    outline = site.structures[structure]
+    return [each.bounds_m for each in outline.walls] or [outline.rectangle_m]

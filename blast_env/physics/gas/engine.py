@@ -9,7 +9,7 @@ until the loads on the structures are known.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import cbrt, ceil, hypot
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,11 @@ from blast_env.physics.gas.source import (
     least_clearance_m,
     set_charge,
 )
-from blast_env.physics.scene import WALLS, BlastSite, StructureOutline
+from blast_env.physics.scene import OUTWARDS, WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:
+    from blast_env.physics.footprint import Footprint
 
 _HOTTEST: Final = 4.0  # temperature limit of settled products, in units of still air's
 _LOOK_EVERY: Final = 4  # steps between two checks of the loads
@@ -62,8 +65,11 @@ class FaceTable:
         structure: Index into the site's structures (n,).
         row: Row of the module in its structure (n,).
         column: Column of the module (n,).
-        face: Index into `FACE_NAMES` (n,).
+        face: Index into `FACE_NAMES`; of a wall of a polygon, the side that it mostly faces (n,).
         centre_m: Centres (n, 3).
+        wall: Index of the wall of a polygon, -1 for other faces (n,).
+        share: Area of the wall per area of the face: the cosine between their normals (n,).
+        outward: Normals of the walls in plan, 0 for roofs and undersides (n, 2).
     """
 
     faces: Faces
@@ -72,6 +78,9 @@ class FaceTable:
     column: NDArray[np.int64]
     face: NDArray[np.int64]
     centre_m: FloatArray
+    wall: NDArray[np.int64]
+    share: FloatArray
+    outward: FloatArray
 
 
 class GasRun:
@@ -114,7 +123,7 @@ class GasRun:
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
         self.handover_radius_m = largest_radius_m(self.grid, self.charge, reserved)
         self.notes = self._notes()
-        self.table = _face_table(self.grid, site)
+        self.table = face_table_of(self.grid, site)
         self.loads = FaceLoads(len(self.table.faces))
         self.gauges = _gauges(self.grid, site)
         scale = self._scale = cbrt(self.charge.mass_kg / 100.0)
@@ -242,7 +251,7 @@ def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
 
     The distance is that of its nearest point: in plan, and below its base or above its top.
     """
-    distance_m = structure.rectangle_m.distance_to(site.charge.position_m)
+    distance_m = min(box.distance_to(site.charge.position_m) for box in structure.boxes_m)
     height_m, top_m = site.charge.height_m, structure.height_m or site.air_height_m
     up_m = max(structure.base_m - height_m, height_m - top_m, 0.0)
     return hypot(distance_m, up_m) / cbrt(site.charge.tnt_kg)
@@ -310,7 +319,8 @@ def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
     return ends_m
 
 
-def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
+def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
+    """Return the cell faces of the structures and the barrier of a site."""
     faces = exposed_faces(grid, grid.solid)
     behind = tuple(faces.solid.T)
     z_m = grid.centres_m(2)[behind[2]]
@@ -324,7 +334,31 @@ def _face_table(grid: GasGrid, site: BlastSite) -> FaceTable:
     # West, east, south, north by axis and side; upward faces are roofs, downward ones undersides.
     upright = 2 * faces.axis + (faces.side > 0)
     face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
-    return FaceTable(faces, structure, row, column, face, faces.centres_m(grid))
+    table = FaceTable(
+        faces=faces,
+        structure=structure,
+        row=row,
+        column=column,
+        face=face,
+        centre_m=faces.centres_m(grid),
+        wall=np.full(len(faces), -1),
+        share=np.ones(len(faces)),
+        outward=np.array([*OUTWARDS.values(), (0.0, 0.0), (0.0, 0.0)])[face],
+    )
+    for index, outline in enumerate(site.structures):
+        if outline.footprint is not None:
+            _assign_walls(table, index, outline.footprint)
+    return table
+
+
+def _assign_walls(table: FaceTable, index: int, footprint: "Footprint") -> None:
+    """Assign the upright faces of a structure to the walls of its polygon."""
+    own = np.flatnonzero((table.structure == index) & (table.face < len(WALLS)))
+    places_m = table.centre_m[own, :2]
+    table.wall[own], table.share[own] = footprint.walls_of(places_m, table.outward[own])
+    sides = np.array([WALLS.index(each.side) for each in footprint.walls])
+    table.face[own] = sides[table.wall[own]]
+    table.outward[own] = np.array([each.normal for each in footprint.walls])[table.wall[own]]
 
 
 def _groups(
