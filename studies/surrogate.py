@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 import torch
 import typer
-from blast_agents.league import find_tracks, known_track
+from blast_agents.league import find_tracks
 from blast_agents.league.trained import TrainedRun, check_runs
 from blast_agents.rules import random_layout
-from blast_agents.search import SamplingAgent, layouts_by_rule
+from blast_agents.search import layouts_by_rule
 from blast_agents.search.moves import Moves, random_walls
 from blast_agents.surrogate.fitting import ErrorsOfBoth, Samples, errors, fit, folds
 from blast_agents.surrogate.network import Check, Fit, Surrogate, load_surrogate
@@ -38,17 +38,15 @@ from blast_env.sites import HELD_OUT_SITES
 from blast_env.statistics import Estimate, mean_estimate, reductions
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
-from blast_env.values import whole_number
 from studies.blast_table import COLUMNS, scenario_of, site_name
 
 DATA: Final = tuple(
     Path(f"docs/data/{name}_blasts.parquet")
-    for name in ("site", "site_agent", "many_site", "close_site")
+    for name in ("site", "many_site", "close_site", "front_site")
 )
 """Training data of the packaged surrogate: blasts on generated sites."""
 
 _FOLDS: Final = 5
-_MOST_DRAWN: Final = 10_000
 _EVERY: Final = 10
 
 Processes = Annotated[int, typer.Option(min=1)]
@@ -462,80 +460,6 @@ def _mean_promise(shares: Iterable[float | None]) -> str:
 
 def _interval(estimate: Estimate) -> str:
     return f"{estimate.value:.1f} % ({estimate.low:.1f} to {estimate.high:.1f})"
-
-
-@app.command()
-def draws(
-    run: Annotated[Path, typer.Argument(help="Run folder of an agent for told charges.")],
-    surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
-    cases: Annotated[int, typer.Option(min=2, help="Those of the league's track `known`.")] = 16,
-    counts: Annotated[str, typer.Option(help="How many layouts the agent draws.")] = "16,64,256",
-    changes: Annotated[int, typer.Option(min=1, help="Of the best draws, by guesses alone.")] = 60,
-    top: Annotated[int, typer.Option(min=1, help="Layouts that all get a blast.")] = 12,
-    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
-    processes: Processes = 2,
-    cluster: ClusterAddress = None,
-) -> None:
-    """Judge by gas dynamics which of an agent's draws the surrogate picks, to find the limit."""
-    with user_errors(), running_on(cluster):
-        agent, guessing = load_agent(run), load_surrogate(surrogate)
-        track = known_track(agent.representative, cases, 1, noisy=False)
-        check_runs([TrainedRun.load(run)], [track])
-        evaluator = BlastEvaluator(agent.representative, "gas", cache=cache)
-        numbers = [_count(each) for each in counts.split(",")]
-        found: list[dict[str, float]] = []
-        with progress_bar(track.title) as progress:
-            for case in track.cases:
-                picked, liked = choices(agent, guessing, case, numbers, changes)
-                gains = reductions_of(evaluator, case, [*picked.values(), *liked[:top]], processes)
-                of_top = gains[len(picked) :]
-                found.append(
-                    dict(zip(picked, gains, strict=False))
-                    | {f"mean of the {top} liked best": fmean(of_top)}
-                    | {f"best of these {top} by gas dynamics": max(of_top)}
-                )
-                progress(len(found) / len(track.cases))
-    rows = []
-    for name in found[0]:
-        gain = mean_estimate(np.array([each[name] for each in found])).scaled(100.0)
-        rows.append((name, f"{gain.value:.1f} %", f"{gain.low:.1f} to {gain.high:.1f} %"))
-    print_line(markdown_table(("layout", "reduction", "95 % interval"), rows))
-
-
-def _count(text: str) -> int:
-    """Return a number of draws from a part of `--counts`."""
-    if not text.strip().isdecimal():
-        raise BlastEnvError(f"--counts has {text.strip()!r}, must be whole numbers and commas")
-    return whole_number("--counts", int(text), 1, _MOST_DRAWN)
-
-
-def choices(
-    agent: SamplingAgent, surrogate: Surrogate, case: Case, counts: Sequence[int], changes: int
-) -> tuple[dict[str, Layout], list[Layout]]:
-    """Return proposals for a case that need no blast, by the way of choosing them.
-
-    Args:
-        agent: Proposes and draws layouts.
-        surrogate: Ranks the draws.
-        case: The case, with a known charge.
-        counts: Numbers of layouts to draw.
-        changes: Number of changes of the largest draw to evaluate at the end.
-
-    Returns:
-        The layouts by name, and the largest draw, best first by the surrogate.
-    """
-    scenario, charge = case.scenario, case.threats[0].charge
-    proposed: Layout = tuple(sorted(agent.propose(scenario, charge)))
-    picked, liked = {"proposal": proposed}, [proposed]
-    guesses = Guesses.of(surrogate, case)
-    for count in sorted(counts):
-        drawn = [tuple(sorted(each)) for each in agent.sample(scenario, charge, count, 0)]
-        own = [*dict.fromkeys([proposed, *drawn])]
-        liked = [own[index] for index in np.argsort(guesses.loads(own), kind="stable")]
-        picked[f"liked best of {count} draws"] = liked[0]
-    changed = improved(guesses, liked, changes, np.random.default_rng(0))
-    picked[f"liked best after {changes} changes"] = changed[0]
-    return picked, liked
 
 
 def reductions_of(

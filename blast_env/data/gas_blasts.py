@@ -15,18 +15,14 @@ if TYPE_CHECKING:
 TABLES: Final = (
     "gas_blasts",
     "site_blasts",
-    "site_agent_blasts",
     "many_site_blasts",
     "close_site_blasts",
-    "liked_site_blasts",
     "front_site_blasts",
-    "street_blasts",
-    "street_agent_blasts",
 )
 """Files of the set, named after the origin of their blasts."""
 
 COLUMNS: Final = (
-    Column("table", "", "file that the row is from: bundled sites, generated ones, a street"),
+    Column("table", "", "file that the row is from: bundled or generated sites"),
     Column("split", "", "train, validation or test; all rows of a site are in one"),
     Column("scenario", "", "name of the site"),
     Column("scenario_hash", "", "content hash of the scenario"),

@@ -68,7 +68,7 @@ from blast_env.geometry import Layout, Piece
 from blast_env.physics.scene import Charge
 from blast_env.scenario import AnyCharge, Placement, Scenario, load_scenario
 from studies.blast_table import COLUMNS, scenario_of, site_name
-from studies.surrogate import Recipe, choices, reductions_of, verdict
+from studies.surrogate import Recipe, verdict
 from tests.agents.test_self_labelling import wide_yard
 from tests.office_park import office_park
 
@@ -709,33 +709,8 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     assert best < tenth < Guesses.of(by_hand(), case()).loads([*ruled]).min()
 
 
-def test_the_street_where_peaks_count_differs_by_nothing_else() -> None:
-    street, peaks = (
-        load_scenario(f"studies/school_street{each}.toml").model_dump() for each in ("", "_peak")
-    )
-    assert peaks.pop("objective")["quantity"] == "peak"
-    assert "objective" not in street  # impulses count where none is named
-    assert peaks.pop("name") == f"{street.pop('name')}_peak"
-    assert peaks == street
-
-
-@pytest.mark.parametrize("counts", ["16,many", "0", "-1", "1e3"])
-def test_a_wrong_number_of_draws_is_told(
-    counts: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    surrogate = by_hand().save(tmp_path / "surrogate.json")
-    agent = SimpleNamespace(representative=YARD)
-    monkeypatch.setattr(studies.surrogate, "load_agent", lambda _: agent)
-    monkeypatch.setattr(studies.surrogate, "check_runs", lambda *_: None)
-    monkeypatch.setattr(TrainedRun, "load", lambda _: agent)
-    options = ["draws", str(tmp_path), "--surrogate", str(surrogate), "--counts", counts]
-    done = CliRunner().invoke(studies.surrogate.app, options)
-    assert done.exit_code == 2
-    assert "--counts" in done.output
-
-
 def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
-    table = pq.read_table("docs/data/liked_site_blasts.parquet")
+    table = pq.read_table("docs/data/many_site_blasts.parquet")
     names = table["scenario"].unique()[:2]
     pq.write_table(table.filter(pc.is_in(table["scenario"], names)), tmp_path / "few.parquet")
     surrogate = packaged_surrogate().save(tmp_path / "surrogate.json")
@@ -784,34 +759,6 @@ def test_scenarios_of_the_table_are_found_by_their_names() -> None:
     assert scenario_of(site_name(10_000)).name == "site_10000"
     large = scenario_of(site_name(10_001, 42.5))
     assert (large.name, large.site.width_m) == ("site_10001", 42.5)
-
-
-def test_what_the_surrogate_picks_from_draws_is_what_it_likes_best_of_just_these() -> None:
-    charge = Charge((1.5, 5.0), 5.0)
-    told = Case(YARD, (Threat(charge, 0),), charge=charge)
-    picked, liked = choices(Drawing(), by_hand(), told, [3, 1], 4)
-    guesses = Guesses.of(by_hand(), told)
-    assert list(picked) == [
-        "proposal",
-        "liked best of 1 draws",
-        "liked best of 3 draws",
-        "liked best after 4 changes",
-    ]
-    proposed, of_one, of_three, changed = picked.values()
-    drawn = [tuple(sorted(each)) for each in Drawing().sample(YARD, charge, 3)]
-    assert proposed == ()
-    assert of_one == drawn[0]  # a wall is better than none
-    assert set(liked) == {(), *drawn}
-    assert (np.diff(guesses.loads(liked)) >= 0.0).all()
-    assert liked[0] == of_three
-    assert guesses.loads([changed]).item() <= guesses.loads([of_three]).item()
-    evaluator = BlastEvaluator(YARD, FAST)
-    bare, behind = (
-        evaluator.loads(each, told.threats[0]).protected_impulse_pa_s for each in ((), of_three)
-    )
-    assert reductions_of(evaluator, told, [(), of_three], 1) == pytest.approx(
-        [0.0, 1.0 - behind / bare]
-    )
 
 
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:

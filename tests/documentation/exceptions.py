@@ -55,9 +55,6 @@ _LABEL: Final = (
     " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
 )
 _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
-_STREET: Final = (
-    "blast-env train --engine surrogate --scenario studies/school_street.toml --run agent"
-)
 _LEAGUE_AGENTS: Final = {
     "out/runs/ppo_courtyard": "--scenario courtyard",
     "out/runs/ppo_perimeter_gate": "--scenario perimeter_gate",
@@ -101,24 +98,6 @@ GIVEN: Final = (
         "agent",
         "blast-env train --algo self_labelling --engine gas --scenario courtyard"
         f" --run agent {_LABEL}",
-    ),
-    *(
-        Given(("docs/studies/league_gas.md",), path, "agent", f"{_STREET} {options}")
-        for path, options in {
-            "out/street": f"--algo self_labelling {_LABEL}",
-            "out/street_ppo": _TRAIN,
-            "out/street_hidden": f"--threat hidden {_TRAIN}",
-            "out/street_on_ppo": _TRAIN,
-        }.items()
-    ),
-    *(
-        Given(
-            ("docs/studies/league_gas.md",),
-            path,
-            "street.json",
-            "python -m studies.surrogate fit --epochs 1 --no-check --out street.json",
-        )
-        for path in ("street.json", "street_on.json")
     ),
     *(
         Given(
@@ -237,12 +216,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.surrogate fit --out surrogate.json": (
         "--data docs/data/site_blasts.parquet --epochs 1 --no-check"
     ),
-    "python -m studies.surrogate_limits --seeds 1 --sites 546": (
-        "--data docs/data/site_blasts.parquet --sites 4 --epochs 1"
-    ),
-    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet --no-check"
-    " --out few.json": "--epochs 1",
-    "python -m studies.surrogate compare surrogate.json few.json --run out/sites --rules": (
+    "python -m studies.surrogate compare surrogate.json --rules": (
         "--cases 2 --threats 1 --changes 0"
     ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
@@ -271,58 +245,8 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env league --track all --cases 16 --seeds 16 --budgets 50,200,1000 --out out/league": (
         _LEAGUE
     ),
-    "blast-env train --algo self_labelling --engine surrogate --scenario item_sites --threat hidden"
-    " --envs 1 --steps 100000 --set cases=300 --set cases_per_round=150 --set samples=8"
-    " --set neighbours=16 --set hidden_threats=4 --set first_updates=400 --set updates=150"
-    " --set evaluation_interval=4 --set evaluation_cases=12 --run out/sites": (
-        f"{_LABEL} --set hidden_threats=2"
-    ),
-    "blast-env train --algo maskable_ppo --engine surrogate --scenario item_sites --threat hidden"
-    " --start-from out/sites --envs 1 --steps 122880 --set hidden_threats=4"
-    " --set learning_rate=5.0e-4 --set n_steps=480 --set evaluation_interval=32"
-    " --set evaluation_cases=12 --run out/sites_ppo": _TRAIN_SITES,
-    "blast-env league --engine gas --track item_sites --cases 48 --seeds 2 --methods best_rule"
-    " --budgets 16 --run out/sites --run out/sites_ppo"
-    " --surrogate agents/blast_agents/surrogate/gas.json"
-    " --out out/sites_league": "--cases 2 --seeds 1 --budgets 2",
-    "blast-env train --algo self_labelling --engine gas --scenario item_sites --threat hidden"
-    " --start-from out/sites_ppo --envs 2 --steps 1300 --seed 1 --set cases=100"
-    " --set cases_per_round=100 --set samples=4 --set neighbours=1 --set borrowed=0"
-    " --set hidden_threats=1 --set first_updates=1 --set updates=1 --set evaluation_interval=100"
-    " --set evaluation_cases=2 --run out/sites_on": _LABEL,
-    "blast-env league --engine gas --first-engine event --track known --scenario courtyard"
-    " --cases 3 --seeds 1 --methods annealing --budgets 50 --out out/first_engine": (
-        "--cases 1 --budgets 3"
-    ),
     "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
     " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
-    "blast-env league --engine gas --track known --scenario studies/school_street.toml --cases 16"
-    " --seeds 1 --methods best_rule --budgets 16 --run out/street --run out/street_ppo"
-    " --surrogate street.json --out out/street_league": "--cases 1 --budgets 1",
-    "blast-env league --engine gas --track hidden --scenario studies/school_street.toml --seeds 12"
-    " --methods best_rule --budgets 200 --run out/street_hidden --surrogate street.json"
-    " --out out/street_league": "--seeds 1 --budgets 16",
-    "blast-env league --engine gas --track known --scenario studies/school_street.toml --cases 6"
-    " --seeds 1 --methods winners_from_rules --budgets 1000 --agent-search 50"
-    " --run out/street_on_ppo --surrogate street_on.json --out out/street_league": (
-        "--cases 1 --budgets 2 --agent-search 2"
-    ),
-    "python -m studies.surrogate draws out/street_ppo --surrogate street.json --cases 16"
-    " --counts 16,64,256": "--cases 2 --counts 2 --changes 2 --top 1",
-    "blast-env train --algo maskable_ppo --engine street.json --scenario"
-    " studies/school_street_peak.toml --threat hidden --start-from out/street --envs 1"
-    " --steps 12288 --set hidden_threats=4 --set learning_rate=1.0e-3 --set n_steps=512"
-    " --set evaluation_interval=8 --set evaluation_cases=8 --run out/street_peak": _TRAIN,
-    "blast-env league --engine gas --track hidden --scenario studies/school_street_peak.toml"
-    " --seeds 12 --methods best_rule,winners_from_rules --budgets 200 --agent-search 50"
-    " --run out/street_peak --surrogate street.json --out out/peak_league": (
-        "--seeds 1 --methods best_rule --budgets 2 --agent-search 2"
-    ),
-    "blast-env league --engine gas --track hidden --scenario studies/demo_site.toml --seeds 8"
-    " --methods winners_from_rules --budgets 200 --agent-search 50"
-    " --surrogate agents/blast_agents/surrogate/gas.json --out out/kerb_league": (
-        "--seeds 1 --budgets 2 --agent-search 2"
-    ),
     "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
     " --envs 1 --steps 300 --set cases=1 --set cases_per_round=1 --set samples=4"
     " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=300"
@@ -335,11 +259,6 @@ SMALLER: Final[dict[str, str]] = {
     " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
     " --set evaluation_cases=2 --run out/hotel_ppo": _TRAIN,
-    "blast-env league --engine gas --track vehicle --scenario hotel_forecourt --seeds 4"
-    " --methods best_rule,winners_from_rules,genetic --budgets 200 --agent-search 50"
-    " --run out/hotel --run out/hotel_ppo --surrogate out/hotel.json --out out/hotel_league": (
-        "--seeds 1 --methods best_rule --budgets 2 --agent-search 2"
-    ),
     "blast-env league --budgets 50 --methods random,genetic --method own_optimiser:Descent"
     " --scenario courtyard --out out/own": f"{_LEAGUE} --methods random",
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
@@ -350,48 +269,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env train --algo maskable_ppo --scenario courtyard --run runs/courtyard": _TRAIN,
     "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
     " --run runs/own_best": _LABEL,
-    "blast-env train --algo maskable_ppo --engine event --scenario courtyard --envs 1"
-    " --steps 20480 --set evaluation_cases=8 --set evaluation_interval=4 --run out/particle": (
-        _TRAIN
-    ),
-    "blast-env train --algo self_labelling --engine gas --scenario courtyard"
-    " --start-from out/particle --envs 1 --steps 100 --set evaluation_cases=4"
-    " --set evaluation_interval=3 --set cases=8 --set cases_per_round=8 --set samples=2"
-    " --set neighbours=3 --set borrowed=1 --set first_updates=50 --set updates=50"
-    " --run out/particle_gas": _LABEL,
-    "blast-env train --algo self_labelling --engine gas --scenario courtyard --envs 1 --steps 220"
-    " --set evaluation_cases=4 --set evaluation_interval=3 --set cases=8 --set cases_per_round=8"
-    " --set samples=2 --set neighbours=3 --set borrowed=1 --set first_updates=200"
-    " --set updates=50 --run out/gas_alone": _LABEL,
-    "blast-env league --engine gas --track known --scenario courtyard --cases 8 --seeds 1"
-    " --methods best_rule --budgets 8 --run out/particle --run out/particle_gas"
-    " --run out/gas_alone --out out/fidelity": "--cases 1 --budgets 1",
-    "blast-env train --algo self_labelling --engine gas --scenario studies/school_street.toml"
-    " --envs 1 --steps 1800 --set cases=96 --set cases_per_round=32 --set samples=2"
-    " --set neighbours=4 --set borrowed=2 --set first_updates=600 --set updates=200"
-    " --set evaluation_interval=2 --set evaluation_cases=8 --run out/street": _LABEL,
-    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet"
-    " --data docs/data/street_blasts.parquet --no-check --out street.json": "--epochs 1",
-    "blast-env train --algo maskable_ppo --engine street.json --scenario"
-    " studies/school_street.toml --start-from out/street --envs 1 --steps 12288"
-    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
-    " --set evaluation_cases=8 --run out/street_ppo": _TRAIN,
-    "blast-env train --algo self_labelling --engine gas --scenario studies/school_street.toml"
-    " --start-from out/street_ppo --envs 1 --steps 740 --seed 1 --set cases=40"
-    " --set cases_per_round=40 --set samples=6 --set neighbours=4 --set borrowed=0"
-    " --set first_updates=1 --set updates=1 --set evaluation_interval=2 --set evaluation_cases=8"
-    " --run out/street_on": _LABEL,
-    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet"
-    " --data docs/data/street_blasts.parquet --data docs/data/street_agent_blasts.parquet"
-    " --no-check --out street_on.json": "--epochs 1",
-    "blast-env train --algo maskable_ppo --engine street_on.json --scenario"
-    " studies/school_street.toml --start-from out/street_ppo --envs 1 --steps 12288 --seed 1"
-    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
-    " --set evaluation_cases=8 --run out/street_on_ppo": _TRAIN,
-    "blast-env train --algo maskable_ppo --engine street_on.json --scenario"
-    " studies/school_street.toml --start-from out/street_ppo --envs 1 --steps 61440 --seed 1"
-    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=16"
-    " --set evaluation_cases=8 --run out/street_long": _TRAIN,
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),
@@ -479,8 +356,6 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m studies.pack_agent RUN NAME --league out/league --track known_NAME": (
         "writes into the package; tests/agents has it"
     ),
-    "python -m studies.blast_table out/street/blasts --scenario studies/school_street.toml"
-    " --out FILE": "FILE is a placeholder; tests/studies/test_blast_table.py",
     "python -m studies.blast_again docs/data/site_blasts.parquet --layouts 8": (
         "80 sites; tests/studies/test_blast_again.py"
     ),
