@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from blast_env.engines.gas import GasResult
@@ -60,6 +61,13 @@ def glazed_hut() -> Scenario:
         "wall": "brick_215",
     }
     return Scenario.from_document(document, "glazed_hut")
+
+
+def column(name: str, x_m: float, y_m: float, diameter_m: float) -> dict[str, Any]:
+    """Return a column of eight corners."""
+    turns = np.pi / 8.0 + np.pi / 4.0 * np.arange(8)
+    places = [x_m, y_m] + 0.5 * diameter_m * np.stack((np.cos(turns), np.sin(turns)), axis=1)
+    return {"kind": "polygon", "name": name, "outline_m": places.round(6).tolist()}
 
 
 def net_on_modules(result: GasResult) -> pd.DataFrame:

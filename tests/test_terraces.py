@@ -28,7 +28,7 @@ from blast_env.scenario.build_scene import build_site, vehicle_drive
 from blast_env.scenario.heights import highest_top_m
 from blast_env.sites import Visibility
 from tests.catalogue_sites import item
-from tests.gas_sites import net_on_modules
+from tests.gas_sites import column, net_on_modules
 from tests.importing.maps import charge, outline, rectangle, written
 from tests.scenario.test_driving import LORRY
 from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
@@ -273,12 +273,12 @@ def test_terraces_of_one_height_side_by_side_are_one() -> None:
     )
 
 
-def test_a_round_terrace_carries_what_lies_wholly_on_it() -> None:
-    disc = {"kind": "round", "name": "mound", "centre_m": [6.0, 6.0], "diameter_m": 4.0}
+def test_a_terrace_of_any_outline_carries_what_lies_wholly_on_it() -> None:
+    disc = column("mound", 6.0, 6.0, 4.0)
     flat = {key: each for key, each in HALL.items() if key != "base_m"}
     scenario = terraced(structures=[flat, disc | {"height_m": 1.0, "carries": True}])
     ground = Placement.empty(scenario).ground_m
-    modules = sum(each.rows * each.columns for each in scenario.structures if each.carries)
+    modules = sum(each.modules for each in scenario.structures if each.carries)
     assert int(ground.sum()) == modules
 
 
@@ -519,19 +519,25 @@ def test_a_map_says_what_is_a_terrace_in_the_words_of_the_format(said: Any, tmp_
     assert "terraces without a height, on which nothing stands: 1" in imported.notes
 
 
-def test_walls_of_a_building_on_it_weigh_as_on_the_ground(tmp_path: Path) -> None:
-    """An L of two rectangles, whose common side looks at no air."""
+def test_a_building_on_it_is_imported_again_as_on_the_ground(tmp_path: Path) -> None:
+    """An L of two rectangles is one polygon."""
     wing = {"name": "wing", "rows": 4, "columns": 4, "corner_m": [10.5, 3.5]}
     found = []
     for base_m, terraces in ((1.0, [TERRACE]), (0.0, [])):
         parts = [HALL | {"base_m": base_m, "building": "l", "columns": 4}]
         parts.append(parts[0] | wing)
         path = tmp_path / "plan.geojson"
-        export_layout(LayoutPlan(terraced(structures=[*parts, *terraces]), ()), path)
-        again = import_site(path, ImportOptions(stock=6)).scenario.structures
-        found.append({each.name: each.weight for each in again if each.protected})
+        scenario = terraced(structures=[*parts, *terraces])
+        export_layout(LayoutPlan(scenario, ()), path)
+        (own,) = (
+            each
+            for each in import_site(path, ImportOptions(stock=6)).scenario.structures
+            if each.protected
+        )
+        assert own.base_m == base_m
+        assert own.modules == sum(each.modules for each in scenario.structures if each.protected)
+        found.append(own.boxes_m)
     assert found[0] == found[1]
-    assert len(found[0]) == 2
 
 
 def test_lines_of_sight_go_over_it_or_stop_at_it() -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _HEADERS = (
     *("building", "protected", "parts", "height (m)", "area (m2)", "modules (m2)"),
-    *("area off (%)", "outline off (m)", "blocks (m)"),
+    *("area off (%)", "outline off (m)"),
 )
 
 
@@ -30,8 +30,8 @@ _HEADERS = (
 class ImportCommand(ImportOptions, Command):
     """Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.
 
-    The site is turned to the direction of most walls, and buildings are cut into modules of 0.5 m;
-    the table gives the deviation of each building from its outline.
+    The site is turned to the direction of most walls, and buildings are polygons; the table gives
+    the deviation of the modules of each building from its outline.
     """
 
     file: Path = argument(".geojson, .osm, .osm.pbf or .dxf.")
@@ -75,13 +75,12 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
         table.add_row(
             each.name + (" (cut)" if each.is_cut else ""),
             "yes" if each.protected else "no",
-            f"{len(each.rectangles)}",
+            f"{len(each.polygons)}",
             "air" if each.height_m is None else f"{each.height_m:g}",
             f"{each.outline.area:,.1f}",
             f"{each.area_m2:,.1f}",
             f"{100.0 * each.deviation.area_share:.1f}",
             f"{each.deviation.outline_m:.2f}",
-            f"{each.block_m:g}",
         )
     result_console().print(table)
     print_line(
@@ -118,6 +117,5 @@ def _building(building: "FittedBuilding") -> dict[str, Any]:
         "modules_m2": building.area_m2,
         "area_deviation": building.deviation.area_share,
         "outline_deviation_m": building.deviation.outline_m,
-        "block_m": building.block_m,
         "is_cut": building.is_cut,
     }

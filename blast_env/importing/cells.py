@@ -20,7 +20,7 @@ LEAST_SHARE: Final = 0.5
 """Least covered share of a cell that becomes a module."""
 
 COARSER: Final = (1, 2, 3, 4, 6, 8)
-"""Candidate sides of the blocks of an outline, in modules; the first within the limits is used."""
+"""Candidate sides of the blocks of an area, in modules; the first within the limits is used."""
 
 MOST_CROSSED: Final = 2_000_000
 """Most cells along all outlines together: 1,000 km of walls."""
@@ -233,25 +233,6 @@ def _lines_between(starts: FloatArray, ends: FloatArray, most: int) -> tuple[Int
     return edge, (low[edge] + np.arange(len(edge)) - first).astype(np.float64)
 
 
-def owners(outlines: Sequence[BaseGeometry], shape: tuple[int, int]) -> NDArray[np.int32]:
-    """Return the index of each cell's outline, -1 where there is none (rows, columns).
-
-    A cell is built on if the outlines together cover half of it, so that adjoining houses leave no
-    gap. It belongs to the outline that covers most of it, or the first of equal ones.
-    """
-    owner = np.full(shape, -1, dtype=np.int32)
-    most = np.zeros(shape, dtype=np.float32)
-    together = np.zeros(shape, dtype=np.float32)
-    for index, outline in enumerate(outlines):
-        window, shares = covered_shares(outline, shape)
-        more = shares > most[window]
-        owner[window][more] = index
-        most[window] = np.maximum(most[window], shares)
-        together[window] += shares
-    owner[together < LEAST_SHARE - len(outlines) / _SHARE_STEPS] = -1
-    return owner
-
-
 def in_blocks(cells: BoolArray, side: int, least: float = LEAST_SHARE) -> BoolArray:
     """Return cells in whole blocks of side x side: those of which a share `least` is set."""
     if side == 1:
@@ -275,11 +256,6 @@ def rectangles_of(cells: BoolArray) -> IntArray:
     """
     by_rows, by_columns = stacked_runs(cells), stacked_runs(cells.T)
     return by_rows if len(by_rows) <= len(by_columns) else by_columns[:, [1, 0, 3, 2]]
-
-
-def outline_of(rectangles: Sequence[CellRectangle]) -> BaseGeometry:
-    """Return the outline of rectangles of cells, in metres from the grid's lower left corner."""
-    return shapely.union_all([shapely.box(*each.rectangle_m) for each in rectangles])
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
     """Return the site of a map or drawing.
 
     The site is turned to the direction of most walls, its grid is aligned with most walls, and the
-    buildings are cut into modules. Large and packed files are read in a separate process with
+    buildings are polygons. Large and packed files are read in a separate process with
     limits on time and memory; see `ReadingLimits`.
 
     Args:
@@ -67,10 +67,9 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
         options: Options of the import.
 
     Raises:
-        BlastEnvError: If the file cannot be read, the site cannot be placed, a building deviates
-            too far from its outline, none is protected, there is no place for a charge, the
-            scenario would be invalid (`ScenarioError`), or the import takes too much time or
-            memory (`ReadingError`).
+        BlastEnvError: If the file cannot be read, the site cannot be placed, no building is
+            protected, there is no place for a charge, the scenario would be invalid
+            (`ScenarioError`), or the import takes too much time or memory (`ReadingError`).
     """
     path, options = path_of(path), options or ImportOptions()
     is_plain = path.suffix.lower() in _PLAIN_SUFFIXES
@@ -172,28 +171,22 @@ def _selectors(site_map: SiteMap, options: ImportOptions) -> Selectors:
 
 
 def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
-    """Return a building's rectangles as structures with a total weight of 1.
-
-    The load on a building is the mean over its walls, so the weight of a rectangle is its share of
-    them. A rectangle hidden on all sides has no load and is not protected.
-    """
+    """Return the structures of a building, with a total weight of 1."""
+    length_m = sum(each.polygon.length for each in building.polygons)
     parts = []
-    for name, each, share in zip(
-        building.part_names, building.rectangles, building.wall_shares, strict=True
-    ):
-        left, bottom, _, _ = each.rectangle_m
+    for name, each in zip(building.part_names, building.polygons, strict=True):
+        outline, *courtyards = ([list(place) for place in ring] for ring in each.rings)
         part: dict[str, Any] = {
-            "kind": "ModularObstacle",
+            "kind": "polygon",
             "name": name,
-            "corner_m": [left, bottom],
-            "rows": each.rows,
-            "columns": each.columns,
-            "protected": building.protected and share > 0.0,
+            "outline_m": outline,
+            "protected": building.protected,
         }
-        if len(building.rectangles) > 1:
+        if courtyards:
+            part["courtyards_m"] = courtyards
+        if len(building.polygons) > 1:
             part["building"] = building.name
-            if part["protected"]:
-                part["weight"] = round(share, 6)
+            part["weight"] = round(each.polygon.length / length_m, 6)
         if building.height_m is not None:
             part["height_m"] = building.height_m
         if building.base_m:
@@ -212,10 +205,9 @@ def _description(
     worst = max(buildings, key=lambda each: each.deviation.area_share)
     farthest = max(buildings, key=lambda each: each.deviation.outline_m)
     protected = ", ".join(each.name for each in buildings if each.protected)
-    parts = sum(len(each.rectangles) for each in buildings)
     text = (
         f"Imported from {path.name} (SHA-256 {digest}...) by blast-env {package_version()}: "
-        f"{len(buildings)} buildings as {parts} rectangles, protected: {protected}. The site's x "
+        f"{len(buildings)} buildings, protected: {protected}. The site's x "
         f"axis is turned by {site.rotation_deg:.2f} degrees from the map's. Modules miss at most "
         f"{worst.deviation.area_share:.1%} of a building's area ({worst.name}) and "
         f"{farthest.deviation.outline_m:.2f} m of its outline ({farthest.name}). Charges of "

@@ -1,8 +1,8 @@
-"""Fitting of a map's buildings with rectangles of modules on the grid of a site."""
+"""Polygons of a map's buildings on a site."""
 
 import re
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -10,20 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
-from blast_env.importing.cells import (
-    COARSER,
-    CellRectangle,
-    Deviation,
-    check_outlines,
-    in_blocks,
-    mended,
-    outline_of,
-    owners,
-    rectangles_of,
-)
+from blast_env.geometry import Rectangle
+from blast_env.importing.cells import Deviation, check_outlines, mended
 from blast_env.importing.options import ImportOptions
 from blast_env.importing.placing import PlacedSite
 from blast_env.importing.roles import Role, Thing
+from blast_env.physics.footprint import Footprint, footprint_of
 from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):
@@ -35,27 +27,30 @@ MOST_STRUCTURES: Final = 100
 
 _MOST_NAME: Final = 34  # characters, which leaves room for the letters of parts
 _BARRIER: Final = "barrier"
+_DIGITS: Final = (3, 6)  # of coordinates; more where millimetres make modules overlap
+_JOINED_M: Final = 0.05  # gap between buildings that is closed
+_MUCH_AREA: Final = 0.2
+_FAR_M: Final = 1.0
+_LEAST_PART_M2: Final = 0.5 * MODULE_SIDE_M**2
 _QUARTER_SIDES: Final = 4
 """A circle is a polygon of 16 sides."""
 
 
 @dataclass(frozen=True)
 class FittedBuilding:
-    """A building as modules.
+    """A building as polygons.
 
     Attributes:
         name: Its name in the scenario.
         title: Its name on the map, or an empty string.
         place: Its place in the file.
         outline: Its outline in site metres, cut at the site's border.
-        rectangles: The modules.
-        wall_shares: Share of each rectangle in the building's exposed wall area.
+        polygons: The polygons of its structures: several if the border cuts it apart.
         height_m: Its height, m; `None` for the height of the air.
         base_m: Height of its underside above the ground, m.
         protected: Whether its load counts.
         carries: Whether it is a terrace.
         deviation: Deviation of the modules from the outline.
-        block_m: Side of its blocks, m; a module's side, unless that takes too many rectangles.
         is_cut: Whether the site's border cuts it.
     """
 
@@ -63,45 +58,42 @@ class FittedBuilding:
     title: str
     place: str
     outline: BaseGeometry
-    rectangles: tuple[CellRectangle, ...]
-    wall_shares: tuple[float, ...]
+    polygons: tuple[Footprint, ...]
     height_m: float | None
     base_m: float
     protected: bool
     carries: bool
     deviation: Deviation
-    block_m: float
     is_cut: bool
 
     @property
     def part_names(self) -> tuple[str, ...]:
-        """Names of the rectangles: the building's name, with letters if there are several."""
-        if len(self.rectangles) == 1:
+        """Names of the structures: the building's name, with letters if there are several."""
+        if len(self.polygons) == 1:
             return (self.name,)
         joint = "" if self.name[-1].isdigit() else "_"
         return tuple(
-            f"{self.name}{joint}{_letters(number)}" for number in range(len(self.rectangles))
+            f"{self.name}{joint}{_letters(number)}" for number in range(len(self.polygons))
         )
 
     @property
-    def modules(self) -> BaseGeometry:
-        """The outline of the modules in site metres."""
-        return outline_of(self.rectangles)
+    def boxes_m(self) -> tuple[Rectangle, ...]:
+        """The modules in rectangles, site metres."""
+        return tuple(box for each in self.polygons for box in each.boxes_m)
 
     @property
     def area_m2(self) -> float:
         """Area of the modules."""
-        return float(self.modules.area)
+        return MODULE_SIDE_M**2 * sum(len(each.cells) for each in self.polygons)
 
 
 def fit_buildings(
     site: PlacedSite, options: ImportOptions
 ) -> tuple[tuple[FittedBuilding, ...], tuple[str, ...]]:
-    """Return the buildings of a site as modules, and notes on omissions.
+    """Return the buildings of a site as polygons, and notes on omissions.
 
     Raises:
-        BlastEnvError: If there is no building, one deviates too far from its outline, or they
-            take too many rectangles.
+        BlastEnvError: If there is no building, or there are too many.
     """
     kept, notes = _kept(site, options)
     if not kept:
@@ -115,39 +107,37 @@ def fit_buildings(
     if topless:
         notes.append(f"terraces without a height, on which nothing stands: {topless}")
     kept.sort(key=lambda each: (each.carries, -each.geometry.area))
-    cut = []
-    for carries in (False, True):  # a building on a terrace takes no ground from it
-        level = [each for each in kept if each.carries == carries]
-        owner = owners([each.geometry for each in level], site.shape)
-        cut += [_cut(site, index, thing, owner, options) for index, thing in enumerate(level)]
-    count = sum(len(rectangles) for rectangles, _ in cut)
+    polygons = _polygons(kept)
+    lost = [each for each, own in zip(kept, polygons, strict=True) if not own]
+    if lost:
+        notes.append(
+            "buildings below others, or that cover the centre of no module, which were left out: "
+            + ", ".join(f"{each.place} ({shortened(each.name)})" for each in lost)
+        )
+    kept = [each for each, own in zip(kept, polygons, strict=True) if own]
+    polygons = [own for own in polygons if own]
+    count = sum(map(len, polygons))
     if count > MOST_STRUCTURES:
-        raise _too_many(site, f"the buildings take {count} rectangles, must take")
+        raise _too_many(site, f"the buildings take {count} structures, must take")
     heights = [_height_m(each, options) for each in kept]
     titles = [each.name for each in kept]
-    walls = _wall_areas([rectangles for rectangles, _ in cut], heights, site.shape)
     buildings = [
         FittedBuilding(
             name=name,
             title=thing.name,
             place=thing.place,
             outline=thing.geometry,
-            rectangles=rectangles,
-            wall_shares=shares,
+            polygons=own,
             height_m=height_m,
             base_m=_base_m(thing, height_m),
             protected=thing.protected,
             carries=thing.carries,
-            deviation=Deviation.between(thing.geometry, outline_of(rectangles)),
-            block_m=block * MODULE_SIDE_M,
+            deviation=Deviation.between(thing.geometry, _modules(own)),
             is_cut=_touches_border(thing.geometry, site),
         )
-        for name, thing, (rectangles, block), shares, height_m in zip(
-            _names(titles), kept, cut, walls, heights, strict=True
-        )
+        for name, thing, own, height_m in zip(_names(titles), kept, polygons, heights, strict=True)
     ]
-    for building in buildings:
-        _check_deviation(site, building, options)
+    notes += _far_off(buildings)
     without = sum(height_m is None for height_m in heights)
     if without:
         notes.append(
@@ -235,8 +225,7 @@ def _together(parts: NDArray[np.object_]) -> BaseGeometry:
 def _too_many(site: PlacedSite, what: str) -> BlastEnvError:
     return BlastEnvError(
         f"{site.path}: {what} at most {MOST_STRUCTURES}, as many structures as a scenario has: "
-        "make the site smaller (--size), leave out small buildings (--least-area), or take fewer "
-        "rectangles for each (--most-rectangles)"
+        "make the site smaller (--size), or leave out small buildings (--least-area)"
     )
 
 
@@ -263,63 +252,76 @@ def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
     return words.pop() if len(words) == 1 else ""
 
 
-def _cut(
-    site: PlacedSite,
-    index: int,
-    thing: Thing,
-    owner: NDArray[np.int32],
-    options: ImportOptions,
-) -> tuple[tuple[CellRectangle, ...], int]:
-    """Return a building as rectangles, and the side of its blocks in modules.
+def _polygons(kept: Sequence[Thing]) -> list[tuple[Footprint, ...]]:
+    """Return the polygons of buildings, none of whose modules overlap; empty for a lost building.
 
-    The blocks are as fine as `most_rectangles` allows. Cells of the building outside its blocks
-    become air; blocks take no cells of other buildings.
-
-    Raises:
-        BlastEnvError: If the outline covers no module, or takes too many rectangles.
+    Buildings and terraces are separate: a building on a terrace takes no ground from it.
     """
-    own = owner == index
-    if not own.any():
-        raise BlastEnvError(
-            f"{site.path}: {thing.place}: covers half of no module, or lies under another "
-            "building: leave it out with --least-area"
+    apart: list[BaseGeometry] = []
+    for number, thing in enumerate(kept):
+        others = [
+            before
+            for before, other in zip(apart, kept[:number], strict=False)
+            if other.carries == thing.carries and before.distance(thing.geometry) <= _JOINED_M
+        ]
+        apart.append(_beside(thing.geometry, shapely.union_all(others)))
+    polygons: list[tuple[Footprint, ...]] = []
+    for digits in _DIGITS:
+        polygons = [_footprints(each, digits) for each in apart]
+        levels = (
+            [own for own, each in zip(polygons, kept, strict=True) if each.carries == carries]
+            for carries in (False, True)
         )
-    least = 0
-    for side in COARSER:
-        cells = in_blocks(own, side) & (own | (owner == -1))
-        table = rectangles_of(cells)
-        if 0 < len(table) <= options.most_rectangles:
-            owner[own & ~cells] = -1
-            owner[cells] = index
-            return CellRectangle.each(table), side
-        least = min(least, len(table)) or len(table)
-    words = f" ({shortened(thing.name)})" if thing.name else ""
-    raise BlastEnvError(
-        f"{site.path}: {thing.place}{words}: takes {least} rectangles even in blocks of "
-        f"{COARSER[-1] * MODULE_SIDE_M:g} m, must take at most {options.most_rectangles} "
-        "(--most-rectangles)"
-    )
+        if not any(map(_overlap, levels)):
+            break
+    return polygons
 
 
-def _check_deviation(site: PlacedSite, building: FittedBuilding, options: ImportOptions) -> None:
-    """Refuse a building whose modules deviate too far from its outline.
+def _beside(outline: BaseGeometry, others: BaseGeometry) -> BaseGeometry:
+    """Return an outline without the ground of others; a narrow gap between them is closed."""
+    if shapely.is_empty(others):
+        return outline
+    joined = shapely.snap(outline, others, _JOINED_M)
+    sound = joined if shapely.is_valid(joined) else outline
+    return shapely.difference(sound, others)
 
-    Raises:
-        BlastEnvError: If the deviation of area or outline is above its limit.
-    """
-    deviation = building.deviation
-    words = f"{site.path}: {building.place}: {shortened(building.title) or building.name}"
-    if deviation.area_share > options.most_area_deviation:
-        raise BlastEnvError(
-            f"{words}: modules miss {deviation.area_share:.1%} of its area, must miss at most "
-            f"{options.most_area_deviation:.1%} (--most-area-deviation, --most-rectangles)"
-        )
-    if deviation.outline_m > options.most_outline_deviation_m:
-        raise BlastEnvError(
-            f"{words}: the outline of its modules is {deviation.outline_m:.2f} m off, must be at "
-            f"most {options.most_outline_deviation_m:g} m off (--most-outline-deviation, "
-            "--most-rectangles)"
-        )
+
+def _footprints(outline: BaseGeometry, digits: int) -> tuple[Footprint, ...]:
+    """Return the polygons of an outline that cover a module, with rounded coordinates."""
+    found = []
+    for part in shapely.get_parts(shapely.set_precision(outline, 10.0**-digits)):
+        if part.geom_type == "Polygon" and part.area >= _LEAST_PART_M2:
+            rings = [
+                tuple((round(x, digits), round(y, digits)) for x, y in ring.coords[:-1])
+                for ring in (part.exterior, *part.interiors)
+                if shapely.Polygon(ring).area >= _LEAST_PART_M2
+            ]
+            found.append(footprint_of(rings[0], tuple(rings[1:])))
+    return tuple(each for each in found if each.cells)
+
+
+def _overlap(buildings: Iterable[Sequence[Footprint]]) -> bool:
+    """Return whether modules of buildings overlap."""
+    boxes = [shapely.box(*box) for own in buildings for each in own for box in each.boxes_m]
+    area_m2 = float(shapely.area(boxes).sum())
+    return bool(area_m2 > shapely.area(shapely.union_all(boxes)) + 0.5 * MODULE_SIDE_M**2)
+
+
+def _modules(polygons: Sequence[Footprint]) -> BaseGeometry:
+    """Return the outline of the modules of polygons in site metres."""
+    return shapely.union_all([shapely.box(*box) for each in polygons for box in each.boxes_m])
+
+
+def _far_off(buildings: Iterable[FittedBuilding]) -> Iterator[str]:
+    """Yield a note on each building that modules cannot show well, such as a thin wall."""
+    for each in buildings:
+        own = each.deviation
+        if own.area_share > _MUCH_AREA or own.outline_m > _FAR_M:
+            yield (
+                f"{each.place}: {shortened(each.title) or each.name}: modules miss"
+                f" {own.area_share:.1%} of its area and are up to {own.outline_m:.2f} m off its"
+                " outline"
+            )
 
 
 def _height_m(thing: Thing, options: ImportOptions) -> float | None:
@@ -332,49 +334,6 @@ def _base_m(thing: Thing, height_m: float | None) -> float:
     """Return the base of a building, m, in whole modules, at least one module below its top."""
     base_m = round(thing.base_m / MODULE_SIDE_M) * MODULE_SIDE_M
     return base_m if height_m is None else max(min(base_m, height_m - MODULE_SIDE_M), 0.0)
-
-
-def _wall_areas(
-    parts: Sequence[Sequence[CellRectangle]],
-    heights: Sequence[float | None],
-    shape: tuple[int, int],
-) -> list[tuple[float, ...]]:
-    """Return the share of each rectangle in its building's exposed wall area.
-
-    A wall beside a lower building is exposed above that building's roof.
-    """
-    # A building as high as the air is the highest.
-    known = [height_m for height_m in heights if height_m is not None]
-    tops_m = [max(known, default=0.0) + 1.0 if each is None else each for each in heights]
-    height = np.zeros((shape[0] + 2, shape[1] + 2), dtype=np.float32)
-    for rectangles, top_m in zip(parts, tops_m, strict=True):
-        for each in rectangles:
-            here = height[1:-1, 1:-1][each.cells]
-            np.maximum(here, top_m, out=here)
-    shares = []
-    for rectangles, top_m in zip(parts, tops_m, strict=True):
-        areas = np.array([_open_m2(each, top_m, height) for each in rectangles])
-        shares.append(tuple(float(area) for area in areas / (areas.sum() or 1.0)))
-    return shares
-
-
-def _open_m2(each: CellRectangle, top_m: float, height: NDArray[np.float32]) -> float:
-    """Return the exposed wall area of a rectangle, in module sides times metres.
-
-    Args:
-        each: The rectangle.
-        top_m: Its height, m.
-        height: Height of the buildings, m, on each cell and on a frame of one cell (rows + 2,
-            columns + 2).
-    """
-    rows, columns = (slice(each.start + 1, each.stop + 1) for each in each.cells)
-    beside = (
-        height[rows, columns.start - 1],
-        height[rows, columns.stop],
-        height[rows.start - 1, columns],
-        height[rows.stop, columns],
-    )
-    return float(sum(np.maximum(top_m - side, 0.0).sum(dtype=np.float64) for side in beside))
 
 
 def _touches_border(outline: BaseGeometry, site: PlacedSite) -> bool:

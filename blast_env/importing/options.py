@@ -36,9 +36,6 @@ _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
         "default_height_m": (MODULE_SIDE_M, MOST_SITE_M),
         "level_height_m": (1.0, 100.0),
         "least_area_m2": (MODULE_SIDE_M**2, 1e6),
-        "most_area_deviation": (0.001, 1.0),
-        "most_outline_deviation_m": (0.05, 100.0),
-        "most_rectangles": (1, 100),
     }
 )
 
@@ -100,13 +97,6 @@ class ImportOptions:
     )
     level_height_m: float = option(3.0, "Height of a storey, m.")
     least_area_m2: float = option(4.0, "Leave out smaller buildings, m2.")
-    most_area_deviation: float = option(
-        0.2, "Refuse a building of which modules miss more, share of area."
-    )
-    most_outline_deviation_m: float = option(
-        1.0, "Refuse a building whose outline is farther off, m."
-    )
-    most_rectangles: int = option(16, "Rectangles that a building may take; coarser blocks beyond.")
     repair: bool = option(False, "Put outlines right that cross themselves.")
 
     def __post_init__(self) -> None:

@@ -102,11 +102,7 @@ def _free(site: PlacedSite, buildings: Sequence[FittedBuilding], radius_m: float
     gap_m = radius_m + _CLEAR_M
     inside = shapely.box(gap_m, gap_m, width_m - gap_m, height_m - gap_m)
     built = shapely.union_all(
-        [
-            shapely.box(*each.rectangle_m.grown(gap_m))
-            for building in buildings
-            for each in building.rectangles
-        ]
+        [shapely.box(*each.grown(gap_m)) for building in buildings for each in building.boxes_m]
     )
     return shapely.difference(inside, built)
 

@@ -225,7 +225,7 @@ def _window_around(
     site: PlacedSite, buildings: Sequence[FittedBuilding], reach_m: float
 ) -> tuple[slice, slice]:
     """Return the rows and columns around the protected buildings, within the site."""
-    chosen = [each.rectangle_m for own in buildings if own.protected for each in own.rectangles]
+    chosen = [each for own in buildings if own.protected for each in own.boxes_m]
     around = Rectangle(
         min(each.left for each in chosen),
         min(each.bottom for each in chosen),

@@ -9,7 +9,7 @@ from blast_env.rendering.site_plan import (
     PLAN,
     draw_plan,
     legend_of,
-    rectangle_patch,
+    outline_path,
     write_heading,
     write_legend,
 )
@@ -20,10 +20,10 @@ with render_extra():
     from matplotlib import patheffects
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.collections import LineCollection, PatchCollection
+    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+    from matplotlib.patches import Patch, PathPatch
 
 _WIDTH_IN = 10.0
 _LEAST_IN, _MOST_IN = 5.0, 11.0
@@ -72,10 +72,9 @@ def imported_plan(imported: ImportedSite) -> Figure:
 
 def _draw_building(axes: Axes, building: FittedBuilding) -> None:
     colour = unit_interval(PROTECTED if building.protected else STRUCTURE)
-    patches = [rectangle_patch(each.rectangle_m) for each in building.rectangles]
-    modules = PatchCollection(patches, facecolor=(*colour, _FAINT), edgecolor=colour)
-    modules.set(linewidth=0.8, zorder=2)
-    axes.add_collection(modules)
+    modules = PathPatch(outline_path(building.boxes_m))
+    modules.set(facecolor=(*colour, _FAINT), edgecolor=colour, linewidth=0.8, zorder=2)
+    axes.add_patch(modules)
     rings = [
         shapely.get_coordinates(ring)
         for ring in shapely.get_rings(shapely.get_parts(building.outline))

@@ -42,7 +42,6 @@ from blast_env.scenario.facade import NamedBay, named_bays
 from blast_env.scenario.heights import air_height_m, default_air_height_m, height_notes
 from blast_env.scenario.objective import ObjectiveSection
 from blast_env.scenario.problems import Problem, ScenarioError, problems_from
-from blast_env.scenario.round import WithoutRound
 from blast_env.scenario.sections import (
     FOR_PEOPLE,
     AnyGeoreference,
@@ -315,17 +314,12 @@ class Scenario(Section):
         Raises:
             ScenarioError: If it is invalid; the error has all problems.
         """
-        changed = WithoutRound.of(document)
         try:
-            scenario = cls.model_validate(changed.document)
-            if not changed.problems:
-                return scenario
-            problems: tuple[Problem, ...] = ()
+            return cls.model_validate(document)
         except ValidationError as error:
             problems = problems_from(error, cls)
         # Pydantic skips the checks between sections if any section is invalid.
-        problems = changed.as_written((*problems, *check_parts(sound_parts(changed.document))))
-        raise ScenarioError(source, problems)
+        raise ScenarioError(source, (*problems, *check_parts(sound_parts(document))))
 
     def at_stand_off(self, distance_m: float) -> "Scenario":
         """Return the scenario with the structure at another distance from the charge.

@@ -16,7 +16,7 @@ from blast_env.app.solids import boxes
 from blast_env.geometry import Piece
 from blast_env.plan import STRUCTURE
 from blast_env.scenario import load_scenario
-from tests.gas_sites import WALL, hut, site_document
+from tests.gas_sites import WALL, column, hut, site_document
 from tests.vehicle_sites import POSTS, gate_site
 
 
@@ -174,14 +174,13 @@ def test_the_plan_says_nothing_that_a_browser_could_run() -> None:
     assert "<script" not in svg
 
 
-def test_the_plan_has_one_outline_of_a_round_structure() -> None:
-    silo = {"kind": "round", "name": "silo", "centre_m": [8.0, 1.5], "diameter_m": 2.0}
+def test_the_plan_has_the_outline_of_a_polygon() -> None:
+    silo = column("silo", 8.0, 1.5, 2.0)
     scenario = hut(structures=[*site_document()["structures"], silo])
-    assert len(scenario.structures) == 1 + 3
     svg = plan_svg(PixelView.of(scenario, 600, 450), scenario, (), None)
     line = "#{:02x}{:02x}{:02x}".format(*STRUCTURE)
     (path,) = (each for each in re.findall("<path[^>]*>", svg) if f'stroke="{line}"' in each)
-    assert (path.count("M"), path.count("L")) == (1, 11)  # a cross
+    assert (path.count("M"), path.count("L")) == (1, 7)
 
 
 def test_the_plan_shows_where_a_vehicle_gets_to() -> None:

@@ -15,7 +15,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.importing import ImportOptions, import_site
 from blast_env.scenario import LayoutFile, load_scenario
 
-_REPAIR: Final = ImportOptions(repair=True, most_rectangles=100)
+_REPAIR: Final = ImportOptions(repair=True)
 _DRAWING: Final = ImportOptions(units="m", buildings_from=("B",), charges_from=("S",))
 _HEADER: Final = """schema_version = 2
 name = "made"

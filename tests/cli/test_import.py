@@ -21,13 +21,13 @@ def test_table_says_how_far_each_building_is_off(tmp_path: Path) -> None:
     code, text, _ = run(BLOCK, "--protect", "Town Hall", "--out", out, "--picture", picture)
     assert code == 0
     rows = [line.split() for line in text.splitlines()]
-    assert ["Town_Hall", "yes", "3", "10.5", "339.2", "336.2", "0.9", "0.30", "0.5"] in rows
+    assert ["Town_Hall", "yes", "1", "10.5", "339.2", "336.0", "0.9", "0.22"] in rows
     assert "places of charges: 2" in text
     assert f"wrote {out}" in text
     assert picture.read_bytes().startswith(b"\x89PNG")
     scenario = load_scenario(out)
     assert scenario.description.startswith("Imported from market_street.geojson (SHA-256 ")
-    assert "0.37 m of its outline (Chapel)" in scenario.description
+    assert "0.33 m of its outline (Water_Tower)" in scenario.description
 
 
 def test_report_as_json_has_the_same(tmp_path: Path) -> None:

@@ -12,8 +12,6 @@ from blast_env.importing.cells import (
     Deviation,
     covered_shares,
     in_blocks,
-    outline_of,
-    owners,
     rectangles_of,
 )
 from blast_env.importing.placing import dominant_direction_deg, grid_offset_m
@@ -72,15 +70,6 @@ def test_shares_add_up_to_the_area(angle: float, width: float, height: float) ->
     assert shares.shape == (window[0].stop - window[0].start, window[1].stop - window[1].start)
 
 
-def test_outline_on_grid_lines_becomes_exactly_its_cells() -> None:
-    outline = shapely.box(1.0, 0.5, 3.5, 2.0)
-    owner = owners([outline], (6, 10))
-    (only,) = CellRectangle.each(rectangles_of(owner == 0))
-    assert only.rectangle_m == (1.0, 0.5, 3.5, 2.0)
-    deviation = Deviation.between(outline, outline_of([only]))
-    assert (deviation.area_share, deviation.outline_m) == pytest.approx((0.0, 0.0), abs=1e-12)
-
-
 def test_deviation_is_area_and_largest_distance_of_the_outlines() -> None:
     """A strip of 0.2 m beside a house of 4 m x 2 m, and a chimney that sticks out 0.75 m."""
     house = shapely.box(0.0, 0.0, 4.0, 2.0)
@@ -88,25 +77,6 @@ def test_deviation_is_area_and_largest_distance_of_the_outlines() -> None:
     assert (wider.area_share, wider.outline_m) == pytest.approx((0.05, 0.2))
     chimney = shapely.union(house, shapely.box(1.0, 2.0, 1.4, 2.75))
     assert Deviation.between(chimney, house).outline_m == pytest.approx(0.75)
-
-
-@given(st.floats(0.0, 1.0), st.floats(-40.0, 40.0))
-@settings(max_examples=60, deadline=None, derandomize=True)
-def test_houses_wall_to_wall_leave_no_gap(share: float, angle: float) -> None:
-    """Wherever their common wall runs, and in whatever direction."""
-    x = 4.0 + share
-    lean = 4.0 * np.tan(np.radians(angle)) / 2.0
-    left = shapely.Polygon([(0, 0), (x - lean, 0), (x + lean, 4), (0, 4)])
-    right = shapely.difference(shapely.box(0, 0, 9, 4), left)
-    owner = owners([left, right], (8, 18))
-    assert (owner >= 0).all()
-
-
-def test_cell_belongs_to_what_covers_most_of_it() -> None:
-    owner = owners([shapely.box(0.0, 0.0, 0.3, 0.5), shapely.box(0.3, 0.0, 1.0, 0.5)], (1, 2))
-    assert owner.tolist() == [[0, 1]]
-    assert owners([shapely.box(0.0, 0.0, 0.24, 0.5)], (1, 1)).tolist() == [[-1]]
-    assert owners([shapely.box(0.0, 0.0, 0.25, 0.5)], (1, 1)).tolist() == [[0]]
 
 
 def test_coarser_blocks_are_whole() -> None:

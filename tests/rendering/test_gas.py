@@ -43,7 +43,7 @@ from blast_env.rendering.style import unit_interval
 from blast_env.scenario import Scenario
 from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
-from tests.gas_sites import WALL, hut, site_document
+from tests.gas_sites import WALL, column, hut, site_document
 
 HEIGHT_M, CUT = 0.75, VerticalSection("y", 4.25)
 
@@ -373,9 +373,9 @@ def test_the_blast_goes_out_from_the_charge(shots: list[PressureShot]) -> None:
     assert all(before < after for before, after in pairwise(red))
 
 
-def test_parts_of_a_round_structure_have_one_outline_in_plan_and_section() -> None:
+def test_modules_of_a_polygon_have_one_outline_in_plan_and_section() -> None:
     """A cross of three rectangles, and the upright rectangle of a section through all of them."""
-    silo = {"kind": "round", "name": "silo", "centre_m": [8.0, 1.5], "diameter_m": 2.0}
+    silo = column("silo", 8.0, 1.5, 2.0)
     scenario = hut(structures=[*site_document()["structures"], silo | {"height_m": 3.0}])
     short = GasBlast(scenario, (), engine=GasEngine(margin_m=1.0, until=4e-3))
     shot = record_planes(short, HEIGHT_M, VerticalSection("x", 8.25))

@@ -34,7 +34,7 @@ from tests.scenario.documents import (
         (("structures", 1, "protected"), "yes", "structures[1].protected: is 'yes' (a string), mu"),
         (("structures", 1, "name"), "a b", "structures[1].name: is 'a b', must be 1 to 40 letter"),
         (("structures", 1, "kind"), "ConcretSquare", "did you mean 'ConcreteSquare'?"),
-        (("structures", 1, "kind"), 7, "structures[1].kind: is 7, must be 'ModularObstacle' or"),
+        (("structures", 1, "kind"), 7, "structures[1].kind: is 7, must be 'ModularObstacle',"),
         (("charge", 0, "position_m"), [1, 2, 3], "charge[0].position_m: has 3 values, must have"),
         (("charge", 0, "position_m"), [1.0], "charge[0].position_m[1]: missing"),
         (("charge", 0, "position_m"), [1, "a"], "charge[0].position_m[1]: is 'a' (a string), mus"),
@@ -109,8 +109,8 @@ def test_misspelt_kind_does_not_hide_the_rest_of_the_table() -> None:
     document = changed(full_document(), ("structures", 0, "kind"), "ModularObstacel")
     document = changed(document, ("structures", 0, "rows"), 0)
     assert lines_for(document) == [
-        "f.toml: structures[0].kind: is 'ModularObstacel', must be 'ModularObstacle' or"
-        " 'ConcreteSquare', did you mean 'ModularObstacle'?",
+        "f.toml: structures[0].kind: is 'ModularObstacel', must be 'ModularObstacle',"
+        " 'ConcreteSquare' or 'polygon', did you mean 'ModularObstacle'?",
         "f.toml: structures[0].rows: is 0, must be at least 1",
     ]
 
@@ -120,7 +120,8 @@ def test_misspelt_key_kind_does_not_hide_the_rest_of_the_table() -> None:
     document = changed(document, ("structures", 0, "knid"), "ModularObstacle")
     document = changed(document, ("structures", 0, "rows"), 0)
     assert lines_for(document) == [
-        "f.toml: structures[0].kind: missing, must be 'ModularObstacle' or 'ConcreteSquare'",
+        "f.toml: structures[0].kind: missing, must be 'ModularObstacle', 'ConcreteSquare' or"
+        " 'polygon'",
         "f.toml: structures[0].knid: unknown key, did you mean 'kind'?",
         "f.toml: structures[0].rows: is 0, must be at least 1",
     ]
