@@ -36,6 +36,9 @@ from blast_env.units import MODULE_SIDE_M
 NEAR_CHARGE: Final = 0.0
 """Position of `wall_near_charge`, as a share of the depth of the build zone."""
 
+IN_MIDDLE: Final = 0.5
+"""Position of `wall_in_middle`, as a share of the depth of the build zone."""
+
 NEAR_BUILDING: Final = 1.0
 """Position of `wall_near_building`, as a share of the depth of the build zone."""
 
@@ -51,7 +54,7 @@ WallKind = Literal["high", "long"]
 def line_of_sight_wall(
     scenario: AnyScenario,
     charge: AnyCharge | None,
-    share: float = 0.5,
+    share: float = IN_MIDDLE,
     kind: WallKind = "high",
 ) -> Layout:
     """Return a wall across the line of sight from a charge to the protected structures.
@@ -161,6 +164,11 @@ def wall_near_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE)
 
 
+def wall_in_middle(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
+    """Return the line-of-sight wall in the middle of the build zone."""
+    return line_of_sight_wall(scenario, charge, IN_MIDDLE)
+
+
 def wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return the line-of-sight wall as near to the protected structures as a module can stand."""
     return line_of_sight_wall(scenario, charge, NEAR_BUILDING)
@@ -169,6 +177,11 @@ def wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layou
 def long_wall_near_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     """Return `wall_near_charge` of the items with the largest length per cost."""
     return line_of_sight_wall(scenario, charge, NEAR_CHARGE, "long")
+
+
+def long_wall_in_middle(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
+    """Return `wall_in_middle` of the items with the largest length per cost."""
+    return line_of_sight_wall(scenario, charge, IN_MIDDLE, "long")
 
 
 def long_wall_near_building(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:

@@ -9,26 +9,20 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
-from blast_agents.posts import line_of_posts, posts_and_wall
-from blast_agents.rules import (
-    expected_charge,
-    line_of_sight_wall,
-    random_layout,
-    ring_around_building,
-    ring_around_charge,
-)
-from blast_agents.search import LayoutProblem, find_proposer
+from blast_agents.rules import expected_charge, random_layout
+from blast_agents.search import LayoutProblem, ProposerKind, find_proposer, proposers
 from blast_agents.search.registry import Rule
 
 from blast_env.arrays import FloatArray
 from blast_env.engines import Engine
+from blast_env.engines.contract import load_plugin
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.evaluation.comparison import check_something_arrives
@@ -42,7 +36,7 @@ from blast_env.scenario import (
     VehicleCharge,
     VehicleSource,
 )
-from studies.difficulty.study import STAND_OFFS, TaskResult, WayOutcome
+from studies.difficulty.study import TaskResult, WayOutcome
 
 METHOD: Final = "annealing"
 """Search method; it begins with the best of rules, random layouts and random walls."""
@@ -68,38 +62,26 @@ class NamedRule(NamedTuple):
     buys: Purchase | None
 
 
-def _walls(word: str, kind: str, buys: Purchase) -> dict[str, NamedRule]:
-    return {
-        f"{word} wall {where}": NamedRule(
-            partial(line_of_sight_wall, share=share, kind=kind),  # type: ignore[arg-type]
-            buys,
-        )
-        for share, where in STAND_OFFS.items()
-    }
-
-
-RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
+_BUYS: Final[Mapping[str, Purchase]] = MappingProxyType(
     {
-        **_walls("high", "high", Purchase.HEIGHT),
-        **_walls("long", "long", Purchase.LENGTH),
-        "ring around the charge": NamedRule(ring_around_charge, None),
-        "ring around the building": NamedRule(ring_around_building, None),
+        "wall_near_charge": Purchase.HEIGHT,
+        "wall_in_middle": Purchase.HEIGHT,
+        "wall_near_building": Purchase.HEIGHT,
+        "long_wall_near_charge": Purchase.LENGTH,
+        "long_wall_in_middle": Purchase.LENGTH,
+        "long_wall_near_building": Purchase.LENGTH,
+        "line_of_posts": Purchase.DISTANCE,
     }
 )
-"""Rules for placing items; sites with vehicles have `POST_RULES` as well."""
-
-
-POST_RULES: Final[Mapping[str, NamedRule]] = MappingProxyType(
-    {
-        "line of posts": NamedRule(line_of_posts, Purchase.DISTANCE),
-        "posts and a wall": NamedRule(posts_and_wall, None),
-    }
-)
+"""The purchase of rules with a single one, by their names in the registry."""
 
 
 def rules_of(scenario: Scenario) -> Mapping[str, NamedRule]:
-    """Return the rules applicable to a scenario."""
-    return {**RULES, **POST_RULES} if scenario.vehicles else RULES
+    """Return the rules of the registry that suit a scenario, by title."""
+    rows = proposers(ProposerKind.RULE, suiting=[scenario])
+    return {
+        row.title: NamedRule(load_plugin(row.place), _BUYS.get(name)) for name, row in rows.items()
+    }
 
 
 @dataclass(frozen=True)

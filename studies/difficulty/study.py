@@ -5,16 +5,20 @@ scenario. With a *visible* charge, every charge has its layout. Layouts are chos
 and compared on held-out seeds, all on the same threats.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from blast_agents.rules import expected_charge, line_of_sight_wall, random_layout
+from blast_agents.rules import expected_charge, random_layout
+from blast_agents.search import ProposerKind, proposers
+from blast_agents.search.registry import Rule
 
 from blast_env.arrays import FloatArray
+from blast_env.engines.contract import load_plugin
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Layout
@@ -100,7 +104,7 @@ class TaskResult:
     Attributes:
         bare: Without a barrier.
         random: Random layouts, unselected.
-        rules: Layouts by rules; without a catalogue, walls at `STAND_OFFS`.
+        rules: Layouts by rules; without a catalogue, `RULES`.
         searched: The best layouts of the search.
     """
 
@@ -125,8 +129,14 @@ class TaskResult:
         return max(self.best_rule, self.searched, key=lambda outcome: outcome.reduction.value)
 
 
-STAND_OFFS: Final = {0.0: "near the charge", 0.5: "in the middle", 1.0: "near the building"}
-"""Positions of the rules' walls as shares of the way through the build zone."""
+RULES: Final[Mapping[str, Rule]] = MappingProxyType(
+    {
+        row.title: load_plugin(row.place)
+        for row in proposers(ProposerKind.RULE).values()
+        if not row.needs
+    }
+)
+"""The rules of the registry for single modules, by title."""
 
 _BARE: Final = "no barrier"
 _RANDOM: Final = "random layouts (mean)"
@@ -161,7 +171,7 @@ class Effort:
     @property
     def blasts(self) -> int:
         """Number of blasts of a study; fewer if some ways give the same layout."""
-        others = 2 + len(STAND_OFFS)  # no barrier, the walls, the best
+        others = 2 + len(RULES)  # no barrier, the rules, the best
         return (
             self.charges * self.layouts
             + self.finalists * (self.hidden_round + self.charges * self.visible_round)
@@ -218,10 +228,7 @@ class DifficultyStudy:
         return TaskResult(
             bare=WayOutcome(_BARE, ((),), bare, bare[0]),
             random=outcome(_RANDOM, self._pool[: effort.random_hidden]),
-            rules=tuple(
-                outcome(f"wall {where}", [line_of_sight_wall(scenario, middle, share)])
-                for share, where in STAND_OFFS.items()
-            ),
+            rules=tuple(outcome(name, [rule(scenario, middle)]) for name, rule in RULES.items()),
             searched=outcome(f"best of {effort.layouts} random ones", [searched]),
         )
 
@@ -246,11 +253,8 @@ class DifficultyStudy:
             bare=WayOutcome(_BARE, ((),), bare[np.newaxis], bare),
             random=WayOutcome(_RANDOM, tuple(random), on_charges, bare),
             rules=tuple(
-                outcome(
-                    f"wall {where}",
-                    [line_of_sight_wall(scenario, charge, share) for charge in charges],
-                )
-                for share, where in STAND_OFFS.items()
+                outcome(name, [rule(scenario, charge) for charge in charges])
+                for name, rule in RULES.items()
             ),
             searched=outcome(f"best of {effort.layouts} random ones", searched),
         )

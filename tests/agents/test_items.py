@@ -58,17 +58,18 @@ def heights_m(scenario: Scenario, layout: Layout) -> list[float | None]:
 @pytest.mark.parametrize("name", YARDS)
 def test_every_rule_gives_a_legal_layout_of_pieces(name: str) -> None:
     layouts = layouts_by_rule(YARDS[name], CHARGE)
-    assert len(layouts) == 7
+    assert len(layouts) == 9
     for layout in layouts.values():
         assert layout
         assert Placement.of(YARDS[name], layout).layout == layout
     assert layouts_by_rule(YARDS[name], CHARGE) == layouts
 
 
-def test_without_a_catalogue_there_are_two_walls_as_before() -> None:
+def test_without_a_catalogue_there_are_three_walls() -> None:
     few, all_of_them = (proposers(ProposerKind.RULE, suiting=[each]) for each in (site(), yard()))
-    assert list(few) == ["wall_near_charge", "wall_near_building", "sight_lines"]
-    assert len(all_of_them) == 7
+    walls = [f"wall_{place}" for place in ("near_charge", "in_middle", "near_building")]
+    assert list(few) == [*walls, "sight_lines"]
+    assert len(all_of_them) == 9
     assert set(few) < set(all_of_them)
 
 

@@ -124,6 +124,7 @@ def test_every_entry_meets_the_same_threats_as_no_barrier(tmp_path: Path) -> Non
         "no barrier",
         "random layout",
         "wall near the charge",
+        "wall in the middle",
         "wall near the building",
         "most sight lines cut",
         "random, 6 blasts",

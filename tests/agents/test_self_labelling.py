@@ -319,7 +319,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
     scenario = tmp_path / "yard.toml"
     save_scenario(wide_yard(), scenario)
     small = own(cases=2, samples=1, neighbours=1, borrowed=0)
-    chosen = run_settings(scenario, engine="surrogate", steps=17, evaluation_interval=100)
+    chosen = run_settings(scenario, engine="surrogate", steps=21, evaluation_interval=100)
     result = train(chosen, small, tmp_path / "run")
     first, *_, last = result.progress.rollouts
     assert first.reward > 0.1  # the best rule of each case

@@ -27,7 +27,7 @@ def tiny(folder: Path) -> DemoSettings:
     return DemoSettings(
         out=folder / "out",
         scenario=str(folder / "yard.toml"),
-        steps=17,  # the rules, and one round
+        steps=21,  # the rules, and one round
         changes={**SMALL, "cases": 2, "samples": 0, "neighbours": 1, "borrowed": 0},
         evaluation_cases=2,
         threats=2,

@@ -13,8 +13,6 @@ from blast_env.scenario import Placement, Scenario, VehicleCharge
 from studies.difficulty.__main__ import elsewhere_text, item_rows, joint_rows, with_items
 from studies.difficulty.figure import items_figure
 from studies.difficulty.items import (
-    POST_RULES,
-    RULES,
     ItemEffort,
     ItemResult,
     ItemStudy,
@@ -60,7 +58,7 @@ def result(folder: Path) -> ItemResult:
 
 def test_all_is_judged_at_every_place(result: ItemResult) -> None:
     task = result.task
-    assert [row.name for row in task.rules] == list(RULES)
+    assert [row.name for row in task.rules] == list(rules_of(result.scenario))
     assert task.random.impulse_pa_s.shape == (SMALL.layouts, 2)
     assert len(result.of_places.layouts) == 2
     for row in (*task.rows, result.finalists, result.of_places):
@@ -99,7 +97,12 @@ def test_the_table_and_the_figure_have_every_layout(result: ItemResult) -> None:
     assert rows[0][3:] == (f"{result.task.bare.mean_pa_s.value:,.0f}", "-", "-")
     figure = items_figure(result)
     names = [label.get_text() for label in figure.axes[1].get_yticklabels()]
-    assert {*RULES, "no barrier", "random layouts", result.task.searched.name} == set(names)
+    assert {
+        *rules_of(result.scenario),
+        "no barrier",
+        "random layouts",
+        result.task.searched.name,
+    } == set(names)
 
 
 def test_places_of_vehicles_are_their_worst_ones() -> None:
@@ -107,7 +110,8 @@ def test_places_of_vehicles_are_their_worst_ones() -> None:
     charges = [place.charge for place in every_place(scenario)]
     assert all(isinstance(charge, VehicleCharge) for charge in charges)
     assert [charge.rank for charge in charges if isinstance(charge, VehicleCharge)] == [0, 1, 2, 3]
-    assert set(rules_of(scenario)) == {*RULES, *POST_RULES}
+    more = set(rules_of(scenario)) - set(rules_of(two_places()))
+    assert more == {"line of posts", "posts and a wall"}
 
 
 def test_places_must_be_listed_and_as_likely() -> None:
@@ -209,6 +213,8 @@ def test_rules_are_compared_with_the_best_found() -> None:
 
 def test_pieces_are_counted_by_item() -> None:
     scenario = load_scenario("visitor_entrance")
-    layout = RULES["high wall in the middle"].rule(scenario, every_place(scenario)[1].charge)
+    layout = rules_of(scenario)["wall in the middle"].rule(
+        scenario, every_place(scenario)[1].charge
+    )
     assert pieces_text(layout) == "4 t_wall_3_6, 2 t_wall_2_0"
     assert pieces_text(()) == "-"

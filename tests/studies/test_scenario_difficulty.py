@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blast_agents.rules import line_of_sight_wall
 from typer import Typer
 from typer.testing import CliRunner
 
@@ -22,7 +21,7 @@ from studies.difficulty.__main__ import (
     tables_path,
 )
 from studies.difficulty.figure import difficulty_figure
-from studies.difficulty.study import STAND_OFFS, DifficultyStudy, Effort, TaskResult, WayOutcome
+from studies.difficulty.study import RULES, DifficultyStudy, Effort, TaskResult, WayOutcome
 from studies.difficulty.verdict import difficulty_criteria
 from tests.agents.search_cases import ballistic
 
@@ -95,8 +94,9 @@ def test_every_visible_charge_gets_a_wall_of_its_own(
     study: DifficultyStudy, visible: TaskResult
 ) -> None:
     scenario, charges = study.evaluator.scenario, [each.charge for each in study._tried]
-    for wall, share in zip(visible.rules, STAND_OFFS, strict=True):
-        assert list(wall.layouts) == [line_of_sight_wall(scenario, at, share) for at in charges]
+    for wall, (name, rule) in zip(visible.rules, RULES.items(), strict=True):
+        assert wall.name == name
+        assert list(wall.layouts) == [rule(scenario, at) for at in charges]
         assert wall.impulse_pa_s.shape == (1, SMALL.charges)
     assert visible.random.impulse_pa_s.shape == (SMALL.random_visible, SMALL.charges)
 

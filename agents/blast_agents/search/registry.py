@@ -113,10 +113,11 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
             ProposerKind.LEARNT,
             (Need.CATALOGUE,),
         ),
-        **_rules(_RULES, "wall near the charge", "wall near the building"),
+        **_rules(_RULES, "wall near the charge", "wall in the middle", "wall near the building"),
         **_rules(
             _RULES,
             "long wall near the charge",
+            "long wall in the middle",
             "long wall near the building",
             "ring around the charge",
             "ring around the building",
