@@ -45,6 +45,7 @@ from blast_env.evaluation import (
     Threat,
     compare,
 )
+from blast_env.evaluation.cases import are_all, fixed_charges
 from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
@@ -128,6 +129,11 @@ def _report_cases(
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
     evaluators = Evaluators(_engine(settings, options), options.cache)
+    if not evaluators.engine.has_noise:  # the same charge again would be the same blast
+        distinct: dict[object, Case] = {}
+        for each in cases:
+            distinct.setdefault((each.scenario.content_hash, each.charge), each)
+        cases = [*distinct.values()]
     told = [(each.scenario, each.charge) for each in cases]
     proposals = [timed_proposal(partial(agent.propose, *each)) for each in told]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
@@ -148,6 +154,12 @@ def _report_cases(
         return
     title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
+    if are_all(cases[0].scenario, [each.charge for each in cases]):
+        print_line(
+            f"note: the site has {len(fixed_charges(cases[0].scenario))} fixed charges, which all "
+            "count here; training may have met them, and the interval is their spread, not an "
+            "uncertainty about others"
+        )
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
     print_written(written)

@@ -108,6 +108,12 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
             tracks = find_tracks(
                 self.track, self.cases, self.seeds, self.seed, self.scenario, noisy=engine.has_noise
             )
+            for each in tracks:
+                if each.name.startswith("known_") and len(each.cases) < self.cases:
+                    print_line(
+                        f"note: cases of {each.name}: {len(each.cases)}, not {self.cases}: the "
+                        "scenario has no more charges, and without noise none counts twice"
+                    )
             runs = _load_runs(self.run, tracks)
             store = ResultStore(self.out / "results")
             found = None if self.surrogate is None else load_surrogate(self.surrogate)

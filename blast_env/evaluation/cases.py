@@ -15,6 +15,7 @@ from blast_env.scenario import (
     AnyCharge,
     AnyScenario,
     Placement,
+    PointSource,
     ScenarioField,
     VehicleCharge,
     find_scenario,
@@ -93,6 +94,45 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, .
     found = find_scenario(scenario)
     charges = ranked(draw_threat(found, seed) for seed in plain)
     return tuple(Threat(charge, seed) for charge, seed in zip(charges, plain, strict=True))
+
+
+def fixed_charges(scenario: AnyScenario) -> tuple[Charge, ...]:
+    """Return the possible charges of a scenario whose sources are all points; otherwise none."""
+    sources = find_scenario(scenario).charge
+    points = [each for each in sources if isinstance(each, PointSource)]
+    if len(points) < len(sources):
+        return ()
+    charges = (Charge(each.position_m, each.tnt_kg, each.height_m) for each in points)
+    return tuple(dict.fromkeys(charges))
+
+
+def in_turn(scenario: AnyScenario, threats: Sequence[Threat]) -> tuple[Threat, ...]:
+    """Return threats with the fixed charges of a scenario in turn, each once before any repeats.
+
+    Their order is drawn by the seed of the first threat. Weights of the sources do not count.
+    Threats of a scenario whose charges are not all fixed are returned unchanged.
+
+    Args:
+        scenario: The scenario, or its bundled name or path.
+        threats: Threats drawn from it, at least one.
+    """
+    charges = fixed_charges(scenario)
+    if not charges:
+        return tuple(threats)
+    order = generator(threats[0].seed).permutation(len(charges)).tolist()
+    return tuple(
+        replace(threat, charge=charges[order[index % len(order)]])
+        for index, threat in enumerate(threats)
+    )
+
+
+def are_all(scenario: AnyScenario, charges: Iterable[AnyCharge | None]) -> bool:
+    """Return whether charges include all possible ones of a scenario, which are fixed.
+
+    An interval over them then describes their spread, not an uncertainty about others.
+    """
+    fixed = fixed_charges(scenario)
+    return bool(fixed) and set(fixed) <= set(charges)
 
 
 class SeedRange(Enum):

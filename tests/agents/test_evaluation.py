@@ -3,13 +3,15 @@
 from itertools import pairwise
 
 import pytest
-from blast_agents.training.cases import Selection, unseen_cases
+from blast_agents.training.cases import Selection, training_cases, unseen_cases
 from blast_agents.training.run_folder import TrainingSettings
 
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, SeedRange, compare, draw_threats, evaluate_layout
 from blast_env.evaluation.comparison import case_table, comparison_record
+from blast_env.physics.scene import Charge
+from blast_env.scenario import PointSource
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.training_runs import small_scenario
 
@@ -78,3 +80,17 @@ def test_the_weights_are_chosen_by_seeds_of_their_own() -> None:
     assert len(cases) == SETTINGS.evaluation_cases
     for case in cases:
         assert all(threat.seed in SeedRange.SELECTION.value for threat in case.threats)
+
+
+def test_fixed_charges_come_in_turn_in_training_selection_and_evaluation() -> None:
+    places = ((3.0, 6.5), (3.0, 9.0), (3.0, 11.5))
+    points = tuple(PointSource(kind="point", position_m=each, tnt_kg=20.0) for each in places)
+    source = SingleScenario(small_scenario().model_copy(update={"charge": points}))
+    for cases in (
+        training_cases(SETTINGS, source, 3),
+        unseen_cases(SETTINGS, source, range(3)),
+        Selection.of(SETTINGS.model_copy(update={"evaluation_cases": 3}), source).cases,
+    ):
+        met = {case.charge.position_m for case in cases if isinstance(case.charge, Charge)}
+        assert met == set(places)
+    assert len(training_cases(SETTINGS, source, 9)) == 3

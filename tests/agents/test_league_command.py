@@ -21,6 +21,7 @@ from tests.agents.training_runs import (
     settings,
     small_scenario,
 )
+from tests.gas_sites import hut
 
 SMALL = ("--cases", 2, "--seeds", 2, "--budgets", "4,8", "--methods", "random,genetic")
 
@@ -55,6 +56,7 @@ def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
         "no barrier",
         "random layout",
         "wall near the charge",
+        "wall in the middle",
         "wall near the building",
         "most sight lines cut",
         "random, 4 blasts",
@@ -64,7 +66,7 @@ def test_all_enter_and_all_is_written(run: Path, tmp_path: Path) -> None:
         "MaskablePPO (agent)",
     ]
     assert (summary["cases"] == 2).all()
-    assert len(pd.read_csv(out / "known_small_cases.csv")) == 20
+    assert len(pd.read_csv(out / "known_small_cases.csv")) == 22
     for name in ("league.md", "known_small.png"):
         assert f"wrote {out / name}" in result.stdout
     for other in ("wall near the", "random, 4 blasts"):
@@ -170,3 +172,17 @@ def test_bad_input_is_one_clear_message(
     assert result.exit_code == 2
     assert words in " ".join(result.stderr.split())
     assert "Traceback" not in result.output
+
+
+def test_a_league_says_that_there_are_fewer_cases(tmp_path: Path) -> None:
+    """Blasts of gas dynamics have no noise, so that a fixed charge is one case."""
+    save_scenario(hut(), tmp_path / "hut.toml")
+    result = league(
+        *("--cases", 8, "--seeds", 1, "--methods", "random", "--budgets", 1, "--engine", "gas"),
+        *("--scenario", tmp_path / "hut.toml", "--out", tmp_path / "out"),
+    )
+    assert result.exit_code == 0, result.output
+    shown = " ".join(result.stdout.split())
+    assert "note: cases of known_hut: 1, not 8: the scenario has no more charges" in shown
+    assert "Known threat at the only place: hut" in shown
+    assert "these are all fixed charges of the site" in shown

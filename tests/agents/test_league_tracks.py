@@ -163,7 +163,11 @@ def test_without_noise_a_known_charge_is_one_blast() -> None:
 def test_without_noise_a_charge_that_is_drawn_again_is_no_other_case() -> None:
     places = [PointSource(kind="point", position_m=(2.0, y), tnt_kg=5.0) for y in (4.0, 8.0)]
     scenario = SCENARIO.model_copy(update={"charge": tuple(places)})
-    cases = known_track(scenario, 16, 1, noisy=False).cases
+    track = known_track(scenario, 16, 1, noisy=False)
+    assert track.title == "Known threat at one of 2 fixed places: road"
+    assert track.has_all_charges
+    assert not known_track(scenario, 1, 1).has_all_charges
+    cases = track.cases
     met = [case.charge.position_m for case in cases if isinstance(case.charge, Charge)]
     assert sorted(met) == [(2.0, 4.0), (2.0, 8.0)]
     assert len(cases) == 2

@@ -10,7 +10,8 @@ import pytest
 from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
-from blast_env.evaluation.cases import practice_hidden
+from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, practice_hidden
+from blast_env.scenario import PointSource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk
 from tests.evaluation.cases import COURTYARD, SEEDS
 
@@ -121,3 +122,36 @@ def test_threats_out_of_order_are_refused() -> None:
         Case(scenario, threats, realisations=2)
     with pytest.raises(BlastEnvError, match="2 realisations of each charge"):
         Case(scenario, threats[:3], realisations=2)
+
+
+# --- Fixed charges.
+
+
+def points(*places_m: tuple[float, float]) -> Scenario:
+    sources = (PointSource(kind="point", position_m=each, tnt_kg=50.0) for each in places_m)
+    return COURTYARD.model_copy(update={"charge": tuple(sources)})
+
+
+@pytest.mark.parametrize("first", [0, 1, 17])
+def test_every_fixed_charge_comes_once_before_any_comes_again(first: int) -> None:
+    scenario = points((3.0, 8.0), (3.0, 12.0), (3.0, 20.0))
+    threats = in_turn(scenario, draw_threats(scenario, range(first, first + 7)))
+    charges = [each.charge for each in threats]
+    assert set(charges[:3]) == set(charges[3:6]) == set(fixed_charges(scenario))
+    assert charges[6] == charges[0]
+    assert [each.seed for each in threats] == [*range(first, first + 7)]
+    assert are_all(scenario, charges[:3])
+    assert not are_all(scenario, charges[:2])
+
+
+def test_their_order_depends_on_the_seed() -> None:
+    scenario = points((3.0, 8.0), (3.0, 12.0), (3.0, 20.0))
+    firsts = {in_turn(scenario, draw_threats(scenario, [seed]))[0].charge for seed in range(20)}
+    assert firsts == set(fixed_charges(scenario))
+
+
+def test_charges_along_a_line_are_as_drawn() -> None:
+    threats = draw_threats(COURTYARD, range(3))
+    assert in_turn(COURTYARD, threats) == threats
+    assert fixed_charges(COURTYARD) == ()
+    assert not are_all(COURTYARD, [each.charge for each in threats])

@@ -147,6 +147,11 @@ def sample_text(standings: Standings) -> str:
         over = f"one case; intervals and worst case are over its {held_out}"
     else:
         over = f"{count} cases, {held_out} each; intervals and worst case are over the cases"
+    if standings.track.has_all_charges:
+        over += (
+            "; these are all fixed charges of the site: intervals are their spread, not an "
+            "uncertainty about others, and training may have met them"
+        )
     return f"Reduction of the {standings.noun}: {over}"
 
 

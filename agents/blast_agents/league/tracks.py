@@ -9,8 +9,11 @@ from blast_env.bundled import REAL_SIZE
 from blast_env.envs.arguments import check_names
 from blast_env.envs.episode import HIDDEN_THREATS, VISIBLE_REALISATIONS
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, SeedRange, draw_threats
+from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import (
+    are_all,
+    fixed_charges,
+    in_turn,
     one_of_each_charge,
     practice_hidden,
     practice_visible,
@@ -71,12 +74,18 @@ class Track:
     cases: tuple[Case, ...]
     reference_budget: int
 
+    @property
+    def has_all_charges(self) -> bool:
+        """Whether the cases have all possible charges of a scenario, which are fixed."""
+        return are_all(self.cases[0].scenario, [case.charge for case in self.cases])
+
 
 def known_track(
     scenario: AnyScenario, cases: int, seeds: int, seed: int = 0, *, noisy: bool = True
 ) -> Track:
-    """Return the track of a known threat at unseen positions.
+    """Return the track of a known threat at other positions than those of any training.
 
+    If the scenario has fixed charges, the cases have these in turn, each once before any repeats.
     A search uses `VISIBLE_REALISATIONS` fans and airs of the case's charge; without noise it uses
     the same blast as the judgement.
 
@@ -86,7 +95,7 @@ def known_track(
         seeds: Held-out fans and airs per charge, at most 1,000.
         seed: Seed of all draws, at most 1,000.
         noisy: Whether the engine draws fans and airs; if not, there is one held-out blast per case,
-            regardless of `seeds`, and repeated charges are dropped.
+            regardless of `seeds`, and repeated charges are dropped: there may be fewer cases.
 
     Raises:
         BlastEnvError: If a number is out of bounds, or there is no build zone.
@@ -95,8 +104,10 @@ def known_track(
     scenario.zone  # noqa: B018  # refuses a scenario without one
     drawn: list[Case] = []
     realisations = VISIBLE_REALISATIONS if noisy else 1
-    for index, first in enumerate(_first_seeds(cases, seeds, seed)):
-        charge, search_seed = draw_threat(scenario, first), seed * MOST_CASES + index
+    firsts = _first_seeds(cases, seeds, seed)
+    threats = in_turn(scenario, [Threat(draw_threat(scenario, each), each) for each in firsts])
+    for index, (charge, first) in enumerate((each.charge, each.seed) for each in threats):
+        search_seed = seed * MOST_CASES + index
         if not noisy and any(charge == case.charge for case in drawn):
             continue
         judged = visible_case(scenario, charge, range(first, first + (seeds if noisy else 1)))
@@ -108,9 +119,12 @@ def known_track(
                 practice=practice_visible(scenario, charge, realisations, search_seed),
             )
         )
+    fixed = fixed_charges(scenario)
+    of_fixed = f"one of {len(fixed)} fixed places" if len(fixed) > 1 else "the only place"
+    where = of_fixed if fixed else "an unseen position"
     return Track(
         name=f"known_{scenario.name}",
-        title=f"Known threat at an unseen position: {scenario.name}",
+        title=f"Known threat at {where}: {scenario.name}",
         threat="visible",
         site=scenario.content_hash,
         cases=tuple(drawn),

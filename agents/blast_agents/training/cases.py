@@ -9,7 +9,8 @@ from blast_agents.search import LayoutAgent
 from blast_agents.training.run_folder import TrainingSettings
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, Evaluators, SeedRange, compare, draw_threats
+from blast_env.evaluation import Case, Evaluators, SeedRange, Threat, compare, draw_threats
+from blast_env.evaluation.cases import in_turn
 from blast_env.scenario import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
 from blast_env.sites.generate import AnyRanges
@@ -83,16 +84,21 @@ def training_cases(
     hidden = settings.threat == "hidden"
     known_site = isinstance(source, SingleScenario)
     threats = settings.hidden_threats if hidden else 1
-    cases: dict[object, Case] = {}
+    drawn: list[tuple[Scenario, tuple[Threat, ...]]] = []
     for index in range(1 if hidden and known_site else count):
         sequence = np.random.SeedSequence((settings.seed, index))
         scenario = source.sample(np.random.default_rng(sequence))
         seeds = SeedRange.TRAINING.draw_distinct(np.random.default_rng(sequence), threats)
-        drawn = draw_threats(scenario, seeds)
+        drawn.append((scenario, draw_threats(scenario, seeds)))
+    if known_site and not hidden:
+        shown = in_turn(drawn[0][0], [first for _, (first,) in drawn])
+        drawn = [(drawn[0][0], (each,)) for each in shown]
+    cases: dict[object, Case] = {}
+    for index, (scenario, of_case) in enumerate(drawn):
         case = Case(
             scenario,
-            drawn,
-            charge=None if hidden else drawn[0].charge,
+            of_case,
+            charge=None if hidden else of_case[0].charge,
             name=f"{scenario.name} {index + 1}",
             seed=index,
         )
@@ -104,6 +110,8 @@ def unseen_cases(
     settings: TrainingSettings, source: ScenarioSource, seeds: Sequence[int]
 ) -> tuple[Case, ...]:
     """Return one case per seed: threats of the run's scenario, or each of a held-out site.
+
+    Fixed charges of a scenario come in turn, each once before any repeats.
 
     Args:
         settings: Settings of the run.
@@ -136,9 +144,12 @@ def _cases(
     """Return one case with one threat per scenario and seed."""
     if len(set(seeds)) < len(seeds):
         raise BlastEnvError("seeds: one appears twice, must be unique")
+    pairs = zip(scenarios, seeds, strict=True)
+    threats = [draw_threats(scenario, [seed])[0] for scenario, seed in pairs]
+    if threats and all(each is scenarios[0] for each in scenarios):
+        threats = [*in_turn(scenarios[0], threats)]
     cases = []
-    for number, (scenario, seed) in enumerate(zip(scenarios, seeds, strict=True), start=1):
-        threats = draw_threats(scenario, [seed])
-        told = threats[0].charge if settings.threat == "visible" else None
-        cases.append(Case(scenario, threats, charge=told, name=f"{scenario.name} {number}"))
+    for number, (scenario, threat) in enumerate(zip(scenarios, threats, strict=True), start=1):
+        told = threat.charge if settings.threat == "visible" else None
+        cases.append(Case(scenario, (threat,), charge=told, name=f"{scenario.name} {number}"))
     return tuple(cases)
