@@ -80,13 +80,15 @@ class ActionChoice:
     """The choices so far for the next placement.
 
     Attributes:
-        possible: Mask of the placements that remain possible, by variant and lower left cell
+        possible: Mask of the legal placements that remain, by variant and lower left cell
             (variants, rows, columns), read-only.
         choices: Number of choices made.
+        options: The options of these choices, skipped ones included.
     """
 
     possible: BoolArray
     choices: int = 0
+    options: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +147,42 @@ class NumberedActions:
         made = chosen.choices + 1
         while made < len(self.choices) and np.ptp(self.choices[made][possible]) == 0:
             made += 1
+        first = int(possible.argmax())
         if made == len(self.choices):
-            return self.catalogue.element(int(possible.argmax()))
+            return self.catalogue.element(first)
         possible.flags.writeable = False
-        return ActionChoice(possible, made)
+        options = tuple(int(each.flat[first]) for each in self.choices[:made])
+        return ActionChoice(possible, made, options)
+
+    def nearest(self, chosen: ActionChoice, action: int) -> int | None:
+        """Return the legal action nearest to an illegal one.
+
+        The nearest one leads to the legal placement of the same item whose lower left cell has the
+        least distance from the wanted one, or from the middle of several: in the same rotation, if
+        it has a legal placement. Of several at one distance the first one counts.
+
+        Args:
+            chosen: The choices so far.
+            action: An illegal action other than the one that finishes.
+
+        Returns:
+            The action; `None` if the item has no legal placement, or the action belongs to another
+            choice than the present one.
+        """
+        options = self.choices[chosen.choices]
+        wanted = options == action - self.first[chosen.choices]
+        for each, option in zip(self.choices, chosen.options, strict=False):
+            wanted = wanted & (each == option)
+        numbers, rows, columns = wanted.nonzero()
+        if not len(numbers):
+            return None
+        up, right = np.indices(self.catalogue.shape)
+        distances = (up - rows.mean()) ** 2 + (right - columns.mean()) ** 2
+        items = np.array([each.item for each in self.catalogue.variants])
+        same_rotation = np.isin(np.arange(len(items)), numbers)
+        for suits in (same_rotation, np.isin(items, items[numbers])):
+            candidates = chosen.possible & suits[:, np.newaxis, np.newaxis]
+            if candidates.any():
+                place = np.where(candidates, distances, np.inf).argmin()
+                return int(self.first[chosen.choices] + options.flat[place])
+        return None

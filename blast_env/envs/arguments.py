@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from enum import Enum
 from functools import partial, wraps
 from inspect import signature
 from pathlib import Path
@@ -33,6 +34,11 @@ def checked_keywords(
     @wraps(function)
     def checked(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Returned:
         for name in kwargs:
+            if name == "autoreset_mode":
+                raise UnknownArgumentError(
+                    f"{function.__qualname__}() resets nothing by itself: with the vectorization "
+                    f"modes 'sync' and 'async', give vector_kwargs={{{name!r}: ...}}"
+                )
             if name not in known:
                 raise UnknownArgumentError.of(function.__qualname__, name, known)
         return function(*args, **kwargs)
@@ -171,8 +177,8 @@ class ResetOptions:
 class PlainSpec:
     """A mixin for environments: stores the arguments of `gymnasium.make` as plain data.
 
-    A scenario becomes its document, a path becomes text. Other objects stay unchanged, and
-    `EnvSpec.to_json` refuses those that are not plain data.
+    A scenario becomes its document, a path becomes text, an enumerated value its name. Other
+    objects stay unchanged, and `EnvSpec.to_json` refuses those that are not plain data.
     """
 
     _spec: EnvSpec | None = None
@@ -191,5 +197,7 @@ class PlainSpec:
                     kwargs[name] = value.model_dump(mode="json", exclude_none=True)
                 elif isinstance(value, Path):
                     kwargs[name] = str(value)
+                elif isinstance(value, Enum):
+                    kwargs[name] = value.value
             spec = replace(spec, kwargs=kwargs)
         self._spec = spec

@@ -21,6 +21,7 @@ from blast_env.envs.arguments import (
 )
 from blast_env.envs.display import Display
 from blast_env.envs.episode import (
+    INVALID_ACTIONS,
     Episode,
     IllegalActions,
     Task,
@@ -29,7 +30,7 @@ from blast_env.envs.episode import (
     find_threat_model,
     total,
 )
-from blast_env.envs.observations import OBSERVATIONS, Array, Observable, Observation
+from blast_env.envs.observations import MASK, OBSERVATIONS, Observable, Observation
 from blast_env.envs.strategies import (
     REWARDS,
     Reward,
@@ -46,33 +47,33 @@ from blast_env.statistics import CVAR_LEVEL, Risk
 from blast_env.values import real_number, whole_number
 
 
-class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
+class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     """Barriers are placed one by one to shield a structure; then a charge goes off.
 
     ## Description
-    Each action puts a barrier module, or a piece of a catalogue, on a cell of the build zone. When
-    the agent has finished, or the stock is used up, the charge goes off. The smaller the impulse
-    on the protected structures, the better the layout. The scenario sets the rules of placement.
+    Each action puts a barrier module, or a piece of a catalogue, on a cell of the build zone. Then
+    the charge goes off. The smaller the impulse on the protected structures, the better the layout.
 
     ## Action space
     `Discrete(variants * rows * columns + 1)`. A variant is an item of the catalogue in one
     orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
     action finishes. `action_masks()` has the legal ones, `explain(element)` why a placement is not
     legal. With `action="item_then_place"` or `"item_then_block"` the variant comes before the cell.
+    An illegal action places the same item on the nearest legal cell (`invalid_action="nearest"`).
 
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
     image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for
-    custom networks. `"grid_with_load"`: one plane more, the load without a barrier.
-    `"features"`: a flat vector. `blast_env.envs.observations` lists all planes and values.
+    custom networks. `"grid_with_load"`: one plane more, the load without a barrier. `"features"`: a
+    flat vector. `"dict"`: image, vector and mask. `blast_env.envs.observations` lists all values.
 
     ## Rewards
     The rewards of an episode add up to minus the weighted impulse on the protected structures
-    (psi s) and the cost of illegal actions. `info["reward_terms"]` has the terms: `impulse` (`peak`
-    in psi or `load` without a unit, if that is the objective), `deposit` and `illegal_actions`.
+    (psi s; psi for peaks) and the cost of illegal actions. `info["reward_terms"]` has the terms.
     `reward="terminal"` pays when the charge goes off. Its first step costs a deposit of twice the
     impulse without a barrier, returned at the end, so that truncation never pays. `"incremental"`
-    pays the reduction by each module at once.
+    pays the reduction by each module at once. `"relative"` pays `info["reduction"]` at the end, of
+    the order of 1 on every site: the one to train with.
 
     ## Starting state
     The build zone is empty. `threat="visible"` draws one charge and shows it; `"hidden"` draws
@@ -81,12 +82,12 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     `charge_position_m`, `tnt_kg`, `charge_height_m`, `layout`, `blast_seed`.
 
     ## Episode end
-    Terminated when the agent finishes, nothing more can be placed, or after `illegal_action_limit`
-    illegal actions. At the end `info` has the impulses with and without the barrier, `reduction`,
-    `layout`, and the charges and seeds of the blasts. Methods raise `ResetNeeded` before `reset`.
+    Terminated when the agent finishes, nothing more can be placed, an illegal action that changed
+    nothing is repeated at once, or after `illegal_action_limit` of them. At the end `info` has the
+    impulses with and without the barrier, `reduction`, `layout`, charges and seeds of the blasts.
 
     ## Arguments
-    See `__init__`, below.
+    See `__init__`.
     >>> import gymnasium as gym, blast_env
     >>> env = gym.make("BlastBarrier-v0", threat="visible", realisations=2)
     >>> observation, info = env.reset(seed=0, options={"charge_position_m": (5.0, 15.0)})
@@ -101,7 +102,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
     (True, True, True)
 
     ## Version history
-    - v0: first version.
+    - v0: first version. Since 2026-11: `invalid_action`; before, as `"penalty"`.
 
     ## Notes
     The validity of a result depends on the engine. The particle model has no heights, overrates
@@ -125,6 +126,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         realisations: int | None = None,
         risk: str | Risk | None = None,
         cvar_level: float = CVAR_LEVEL,
+        invalid_action: str = "nearest",
         illegal_action_cost: float = 0.001,
         illegal_action_limit: int = 100,
         engine: str | Engine = "event",
@@ -149,8 +151,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             risk: `"mean"`, `"cvar"`, `"worst"`, or a `Risk`, which gets loads in SI units; by
                 default that of the scenario's objective.
             cvar_level: The CVaR is the mean over the worst share 1 - `cvar_level` of the charges.
-            illegal_action_cost: In the unit of the reward; 0.001 psi s are 6.9 Pa s.
-            illegal_action_limit: Number of illegal actions that ends the episode.
+            invalid_action: `"nearest"` or `"penalty"`: whether the nearest legal place of the same
+                item takes the place of an illegal one.
+            illegal_action_cost: Cost of an illegal action without effect, in the unit of the
+                reward; 0.001 psi s are 6.9 Pa s.
+            illegal_action_limit: Number of illegal actions without effect that ends the episode.
             engine: Name of an engine, or an engine. `"event"` and `"pymunk"` run the particle
                 model: for studying it, for cheap tests of learning methods, for a first look.
                 `"gas"` is the basis for decisions: no calibration, one realisation per charge, a
@@ -172,7 +177,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.render_mode = render_mode
         self.reward_strategy = strategy("reward", reward, REWARDS)
+        check_names("invalid_action", [invalid_action], INVALID_ACTIONS)
         self.illegal = IllegalActions(
+            invalid_action == "nearest",
             real_number("illegal_action_cost", illegal_action_cost, 0.0, 1e6),
             whole_number("illegal_action_limit", illegal_action_limit, 1, 1_000_000),
         )
@@ -190,6 +197,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         numbered = NumberedActions.of(self.task.actions, representative.zone.catalogue)
         self.action_space = spaces.Discrete(numbered.finish + 1)
         self.observation_space = self.task.observation.space(representative)
+        if isinstance(self.observation_space, spaces.Dict):
+            mask = spaces.MultiBinary(numbered.finish + 1)
+            self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
         self.show_blast = show_blast
         if show_blast and render_mode not in ("human", "rgb_array"):
             raise BlastEnvError(
@@ -202,7 +212,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Array, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Draw scenario and charges and clear the build zone; see the class for the options.
 
         Raises:
@@ -220,7 +230,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
             self._display.show(episode)
         return episode.observe(), episode.information()
 
-    def step(self, action: np.int64 | int) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.int64 | int) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Make a choice, place a module or a piece, or finish; see the class.
 
         Raises:
@@ -246,7 +256,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Array, np.int64]):
         ended = episode.ended and self._film_info is None
         return episode.observe(), total(terms), ended, False, info
 
-    def _show_blast(self) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def _show_blast(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Go on to the next frame of the film, with a reward of 0."""
         if self._film_info is None:
             raise gym.error.ResetNeeded("the episode has ended: call reset")

@@ -12,7 +12,7 @@ from blast_env.engines import Engine
 from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observations import (
-    Array,
+    MASK,
     EpisodeObservation,
     Observable,
     Observation,
@@ -41,17 +41,43 @@ ILLEGAL_TERM: Final = "illegal_actions"
 """The name of the reward term for illegal actions."""
 
 
+INVALID_ACTIONS: Final = ("nearest", "penalty")
+"""The consequences of an illegal action, by name."""
+
+
 @dataclass(frozen=True)
 class IllegalActions:
     """The consequences of illegal actions.
 
     Attributes:
-        cost: Cost of each one, in the unit of the reward.
-        limit: Number of them after which the episode ends as if finished.
+        moves: Whether the nearest legal placement of the same item takes the place of an illegal
+            one; if so, the same action twice in succession without effect ends the episode.
+        cost: Cost of an illegal action without effect, in the unit of the reward.
+        limit: Number of these after which the episode ends as if finished.
     """
 
+    moves: bool
     cost: float
     limit: int
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """The state after an action.
+
+    Attributes:
+        placement: The modules placed.
+        chosen: The choices for the next module or piece.
+        is_illegal: Whether the action was illegal.
+        has_effect: Whether it changed the placement or the choices, or finished.
+        ended: Whether the episode ends.
+    """
+
+    placement: Placement
+    chosen: ActionChoice
+    is_illegal: bool
+    has_effect: bool
+    ended: bool
 
 
 @dataclass
@@ -67,6 +93,8 @@ class Episode:
         actions: The numbered actions.
         chosen: The choices so far for the next module or piece.
         illegal_actions: Number of illegal actions so far.
+        without_effect: Number of those that changed nothing.
+        repeated: The last action if it changed nothing; `None` otherwise.
         begun: Whether there has been an action.
         ended: Whether the charge has gone off.
     """
@@ -79,6 +107,8 @@ class Episode:
     actions: NumberedActions
     chosen: ActionChoice = field(init=False)
     illegal_actions: int = 0
+    without_effect: int = 0
+    repeated: int | None = None
     begun: bool = False
     ended: bool = False
 
@@ -96,12 +126,15 @@ class Episode:
         mask[-1] = True
         return mask
 
-    def observe(self) -> Array:
+    def observe(self) -> Any:
         """Return the observation; the choices so far limit the cells that it shows as free."""
         placement = self.placement
         if self.chosen.choices:
             placement = placement.limited_to(self.chosen.possible)
-        return self.observation.observe(placement)
+        observed = self.observation.observe(placement)
+        if isinstance(observed, Mapping):
+            return {**observed, MASK: self.action_mask().astype(np.int8)}
+        return observed
 
     def act(self, action: int, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
         """Make a choice, place a module or a piece, or finish; return the terms of the reward.
@@ -115,8 +148,11 @@ class Episode:
             BlastEnvError: If the reward has a term with the reserved name `ILLEGAL_TERM`.
         """
         before = self.placement
-        self.placement, self.chosen, is_illegal, self.ended = self._after(action, illegal)
-        self.illegal_actions += is_illegal
+        after = self._after(action, illegal)
+        self.placement, self.chosen, self.ended = after.placement, after.chosen, after.ended
+        self.illegal_actions += after.is_illegal
+        self.without_effect += not after.has_effect
+        self.repeated = None if after.has_effect else action
         transition = Transition(
             initial=self.initial,
             before=before.checked,
@@ -131,7 +167,7 @@ class Episode:
             raise BlastEnvError(
                 f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
             )
-        return {**terms, ILLEGAL_TERM: -illegal.cost if is_illegal else 0.0}
+        return {**terms, ILLEGAL_TERM: 0.0 if after.has_effect else -illegal.cost}
 
     def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:
         """Return the blasts that `final_information` requests if the action ends the episode.
@@ -140,31 +176,37 @@ class Episode:
             action: The action of the next call of `act`.
             illegal: The consequences of an illegal action.
         """
-        placement, _, _, ended = self._after(action, illegal)
+        after = self._after(action, illegal)
         case = self.objective.case
-        barrier = met_by_blasts(placement.layout)
-        layouts = (barrier, ()) if ended else ()
+        barrier = met_by_blasts(after.placement.layout)
+        layouts = (barrier, ()) if after.ended else ()
         return tuple(
             BlastAsked(case.scenario, layout, threat)
             for layout in layouts
             for threat in case.threats
         )
 
-    def _after(
-        self, action: int, illegal: IllegalActions
-    ) -> tuple[Placement, ActionChoice, bool, bool]:
-        """Return placement and choices after an action, and whether it is illegal and the last."""
+    def _after(self, action: int, illegal: IllegalActions) -> _Outcome:
+        """Return the state after an action."""
         placement, chosen = self.placement, self.chosen
-        finishes = action == self.actions.finish and chosen.choices == 0
-        found = None if finishes else self.actions.narrowed(chosen, action)
-        is_illegal = not finishes and found is None
+        if action == self.actions.finish and chosen.choices == 0:
+            return _Outcome(placement, chosen, is_illegal=False, has_effect=True, ended=True)
+        found = self.actions.narrowed(chosen, action)
+        is_illegal = found is None
+        if is_illegal and illegal.moves:
+            nearest = self.actions.nearest(chosen, action)
+            found = None if nearest is None else self.actions.narrowed(chosen, nearest)
+        if found is None:
+            exhausted = self.without_effect + 1 >= illegal.limit
+            repeats = illegal.moves and action == self.repeated
+            ended = exhausted or repeats or placement.is_full
+            return _Outcome(placement, chosen, is_illegal=True, has_effect=False, ended=ended)
         if isinstance(found, ActionChoice):
             chosen = found
-        elif found is not None:
+        else:
             placement = placement.place(found)
             chosen = ActionChoice(placement.legal)
-        exhausted = self.illegal_actions + is_illegal >= illegal.limit
-        return placement, chosen, is_illegal, finishes or exhausted or placement.is_full
+        return _Outcome(placement, chosen, is_illegal, has_effect=True, ended=placement.is_full)
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return the assessments of the layout and of the site without a barrier.

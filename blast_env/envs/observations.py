@@ -35,6 +35,9 @@ from blast_env.units import MODULE_SIDE_M
 Array = NDArray[Any]
 """An observation; its data type is that of the space."""
 
+MASK: Final = "action_mask"
+"""Key of the mask of legal actions, which environments add to a `Dict`."""
+
 Plane = NDArray[np.float32]
 """Values of the squares of a site (rows, columns), or several planes of them."""
 
@@ -152,18 +155,18 @@ class VehicleView:
 class EpisodeObservation(Protocol):
     """Observes one episode."""
 
-    def observe(self, placement: Placement) -> Array:
-        """Return a new array in the space, for the modules placed so far."""
+    def observe(self, placement: Placement) -> Any:
+        """Return a new element of the space, for the modules placed so far."""
 
 
 class Observation(Protocol):
     """A kind of observation."""
 
-    def space(self, scenario: Scenario) -> spaces.Space[Array]:
-        """Return the space, a `Box`.
+    def space(self, scenario: Scenario) -> spaces.Space[Any]:
+        """Return the space, a `Box`, or a `Dict` without the key `action_mask`.
 
-        It depends only on the sizes of site and build zone, the names and sizes of the items, and
-        whether there are vehicles.
+        The environment adds this mask to a `Dict`. The space depends only on the sizes of site and
+        build zone, the names and sizes of the items, and whether there are vehicles.
         """
 
     def episode(self, observable: Observable) -> EpisodeObservation:
@@ -674,7 +677,8 @@ class ImageEpisode:
 MOST_STRUCTURES: Final = 8
 """Most structures that fit the vector."""
 
-_FIXED: Final = 3 + 6 + 2 + MOST_STRUCTURES * 6
+_BESIDES_PLACES: Final = 3 + 6 + 2
+_FIXED: Final = _BESIDES_PLACES + MOST_STRUCTURES * 6
 
 
 @dataclass(frozen=True)
@@ -731,15 +735,9 @@ class FeaturesObservation:
             BlastEnvError: If the scenario has more than `MOST_STRUCTURES` structures.
         """
         scenario, zone = observable.scenario, observable.scenario.zone
-        size = np.array([scenario.site.width_m, scenario.site.height_m])
-        boxes = np.array([source_bounds_m(source) for source in observable.sources])
-        charges = [charge_share(source.tnt_kg) for source in observable.sources]
         structures = _structures(scenario)
-        site = (
-            *(boxes[:, :2].min(axis=0) / size, boxes[:, 2:].max(axis=0) / size),
-            *([min(charges), max(charges)], np.array(zone.corner_m) / size),
-            structures[:, :-1].ravel(),
-        )
+        charge = _charge_and_corner(scenario, observable.sources)
+        site = (charge, structures[:, :-1].ravel())
         items = (structures[:, -1], *item_values(zone)) if zone.items else ()
         return FeaturesEpisode(
             np.concatenate(site),
@@ -775,9 +773,7 @@ class FeaturesEpisode:
         if placement.catalogue.has_items:
             parts += items_placed(placement)
         if self.shows_vehicles:
-            site = self.vehicles.scenario.site
-            diagonal_m = hypot(site.width_m, site.height_m)
-            parts.append(np.array(self.vehicles.stand_off_m(placement.layout) / diagonal_m))
+            parts.append(_stand_off(self.vehicles, placement.layout))
         values = np.concatenate([part.ravel() for part in parts]).astype(np.float32)
         return np.clip(values, 0.0, 1.0)
 
@@ -803,8 +799,97 @@ def _structures(scenario: Scenario) -> FloatArray:
     return rows
 
 
+# ---- A dictionary.
+
+
+@dataclass(frozen=True)
+class DictObservation:
+    """Planes, a vector and the mask of legal actions, for policies with several inputs.
+
+    | key | space |
+    |---|---|
+    | `planes` | those of `ImageObservation` |
+    | `vector` | float32 from 0 to 1, see below |
+    | `action_mask` | `MultiBinary(actions)`, added by the environment: `info["action_mask"]` |
+
+    The vector has the values that belong to no place: x is divided by the site's width, y by its
+    height.
+
+    | from | length | values |
+    |---|---|---|
+    | 0 | 3 | modules left / modules at first; modules left / 100, at most 1; budget left / budget |
+    | 3 | 4 | left, bottom, right, top of the smallest box around places of the charge |
+    | 7 | 2 | least and largest possible mass of the charge, (mass / 1000 kg)^(1/3), at most 1 |
+    | 9 | 2 | x and y of the lower left corner of the build zone |
+    | 11 | items | with a catalogue: height of each item |
+    | | items | cost of each item / the budget (or the dearest item's cost), at most 1 |
+    | | items | pieces of each item that may still be placed / pieces at first |
+    | last | 1 | with vehicles: stand-off / the site's diagonal, as in `FeaturesObservation` |
+
+    Attributes:
+        planes: The observation that gives the planes.
+    """
+
+    planes: ImageObservation = field(default_factory=ImageObservation)
+
+    def space(self, scenario: Scenario) -> spaces.Space[Any]:
+        """Return the space, without the mask."""
+        items = scenario.zone.catalogue
+        length = _BESIDES_PLACES + 3 * len(items.names) * items.has_items + bool(scenario.vehicles)
+        vector = spaces.Box(0.0, 1.0, (length,), np.float32)
+        return spaces.Dict({"planes": self.planes.space(scenario), "vector": vector})
+
+    def episode(self, observable: Observable) -> "DictEpisode":
+        """Compute the constant values."""
+        return DictEpisode(self.planes.episode(observable), observable)
+
+
+@dataclass(frozen=True, eq=False)
+class DictEpisode:
+    """The dictionaries of one episode.
+
+    Attributes:
+        planes: The images of the episode.
+        observable: The observable part of the episode.
+    """
+
+    planes: ImageEpisode
+    observable: Observable
+
+    def observe(self, placement: Placement) -> dict[str, Array]:
+        """Return planes and vector for the modules placed so far."""
+        scenario, sources = self.observable.scenario, self.observable.sources
+        parts = [np.array(stock_shares(placement)), _charge_and_corner(scenario, sources)]
+        if placement.catalogue.has_items:
+            parts += [*item_values(scenario.zone), items_placed(placement)[0]]
+        if self.observable.shows_vehicles:
+            parts.append(_stand_off(VehicleView.of(scenario, sources), placement.layout))
+        vector = np.clip(np.concatenate(parts).astype(np.float32), 0.0, 1.0)
+        return {"planes": self.planes.observe(placement), "vector": vector}
+
+
+def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> FloatArray:
+    """Return the box around the charge, its masses and the corner of the build zone (8,)."""
+    size = np.array([scenario.site.width_m, scenario.site.height_m])
+    boxes = np.array([source_bounds_m(source) for source in sources])
+    charges = [charge_share(source.tnt_kg) for source in sources]
+    return np.concatenate(
+        (
+            *(boxes[:, :2].min(axis=0) / size, boxes[:, 2:].max(axis=0) / size),
+            *([min(charges), max(charges)], np.array(scenario.zone.corner_m) / size),
+        )
+    )
+
+
+def _stand_off(vehicles: VehicleView, layout: Layout) -> FloatArray:
+    """Return the stand-off as a share of the site's diagonal (1,)."""
+    site = vehicles.scenario.site
+    return np.array([vehicles.stand_off_m(layout) / hypot(site.width_m, site.height_m)])
+
+
 OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
     {
+        "dict": DictObservation(),
         "grid": GridObservation(),
         "grid_with_load": GridWithLoadObservation(),
         "image": ImageObservation(),
@@ -812,3 +897,6 @@ OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
     }
 )
 """The observations, by their names."""
+
+SINGLE_ARRAYS: Final = tuple(name for name in OBSERVATIONS if name != "dict")
+"""Names of the observations that are a single array."""

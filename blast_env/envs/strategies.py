@@ -261,7 +261,29 @@ class IncrementalReward:
         return {transition.term: load}
 
 
+@dataclass(frozen=True)
+class RelativeReward:
+    """The relative reduction of the load by the whole layout, paid when the charge goes off.
+
+    It is `info["reduction"]`: the share of the load without a barrier that the layout takes off, 0
+    without a barrier, and of the same order on every site. The load includes the power law of the
+    particle model. A truncated episode pays 0, as does a site without a load.
+    """
+
+    def __call__(self, transition: Transition) -> Mapping[str, float]:
+        """Return the term `reduction`, 0 before the end."""
+        reduction = 0.0
+        if transition.ended:
+            protected, unprotected = map(transition.objective.assess, (transition.after, ()))
+            reduction = float(np.nan_to_num(protected.reduction_from(unprotected)))
+        return {"reduction": reduction}
+
+
 REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
-    {"terminal": TerminalReward(), "incremental": IncrementalReward()}
+    {
+        "terminal": TerminalReward(),
+        "incremental": IncrementalReward(),
+        "relative": RelativeReward(),
+    }
 )
 """The rewards, by their names."""

@@ -7,11 +7,11 @@ from os import cpu_count
 from typing import Any, TypeVar
 
 import gymnasium as gym
-from gymnasium.vector import SyncVectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import iterate
 from gymnasium.wrappers import TimeLimit
 
-from blast_env.envs.arguments import PlainSpec
+from blast_env.envs.arguments import PlainSpec, check_names
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 
@@ -66,13 +66,26 @@ class ThreadedVectorEnv(PlainSpec, SyncVectorEnv):
         num_envs: Number of environments.
         threads: Number of steps that run at the same time; by default the number of cores, or 1
             with `render_mode="human"`.
+        autoreset_mode: When an environment whose episode has ended is reset: `"NextStep"`,
+            `"SameStep"`, `"Disabled"` (by the caller), or an `AutoresetMode`.
+
+    Raises:
+        UnknownNameError: If there is no such autoreset mode.
     """
 
     def __init__(
-        self, make_env: Callable[[], gym.Env[Any, Any]], num_envs: int, threads: int | None = None
+        self,
+        make_env: Callable[[], gym.Env[Any, Any]],
+        num_envs: int,
+        threads: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
         self._begun: list[_Begun[Any, Any]] = []
-        super().__init__([partial(self._begun_env, make_env)] * num_envs)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            check_names("autoreset mode", [autoreset_mode], [each.value for each in AutoresetMode])
+        super().__init__(
+            [partial(self._begun_env, make_env)] * num_envs, autoreset_mode=autoreset_mode
+        )
         if threads is None:
             threads = 1 if self.render_mode == "human" else cpu_count() or 1
         self._threads = min(threads, num_envs)
@@ -101,12 +114,12 @@ class ThreadedVectorEnv(PlainSpec, SyncVectorEnv):
 
 
 def barrier_vector(num_envs: int, **arguments: Any) -> ThreadedVectorEnv:
-    """Return several `BlastBarrierEnv`, from its arguments and `max_episode_steps`."""
+    """Return several `BlastBarrierEnv`, from its arguments and those of `_vector`."""
     return _vector(BlastBarrierEnv, num_envs, **arguments)
 
 
 def simulator_vector(num_envs: int, **arguments: Any) -> ThreadedVectorEnv:
-    """Return several `BlastSimulatorEnv`, from its arguments and `max_episode_steps`."""
+    """Return several `BlastSimulatorEnv`, from its arguments and those of `_vector`."""
     return _vector(BlastSimulatorEnv, num_envs, **arguments)
 
 
@@ -114,10 +127,11 @@ def _vector(
     env_class: Callable[..., gym.Env[Any, Any]],
     num_envs: int,
     max_episode_steps: int | None = None,
+    autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     **arguments: Any,
 ) -> ThreadedVectorEnv:
     def make_env() -> gym.Env[Any, Any]:
         env = env_class(**arguments)
         return env if max_episode_steps is None else TimeLimit(env, max_episode_steps)
 
-    return ThreadedVectorEnv(make_env, num_envs)
+    return ThreadedVectorEnv(make_env, num_envs, autoreset_mode=autoreset_mode)

@@ -29,6 +29,7 @@ def environment() -> gym.Env:
         scenario=small_scenario(),
         engine="event",
         realisations=1,
+        invalid_action="penalty",
         disable_env_checker=True,
     )
 

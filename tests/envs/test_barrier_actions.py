@@ -21,6 +21,14 @@ from tests.envs.small import make, play, same, small_scenario
 from tests.scenario.test_hardening import glazed_yard
 
 BY_CHOICE = ["item_then_place", "item_then_block"]
+KEEP_OUT = {"corner_m": (7.0, 6.0), "reason": "hydrant"}
+
+
+def blocks_scenario(**zone: Any) -> Scenario:
+    """Return the small scenario with a zone of 2 x 2 blocks of 8 x 8 cells."""
+    return small_scenario(
+        corner_m=(7.0, 6.0), rows=14, columns=10, **{"keep_outs": [], "clearance_m": 0.0, **zone}
+    )
 
 
 def yard_env(**arguments: Any) -> BlastBarrierEnv:
@@ -109,7 +117,7 @@ def test_a_layout_is_paid_alike_however_it_is_chosen(reward: str) -> None:
 
 
 def test_what_does_not_go_with_a_choice_is_illegal_and_changes_nothing() -> None:
-    env = yard_env(action="item_then_place")
+    env = yard_env(action="item_then_place", invalid_action="penalty")
     env.reset(seed=0)
     before, *_ = env.step(0)
     finish = 4 + 84
@@ -170,3 +178,93 @@ def test_a_strategy_of_ones_own_is_taken_and_a_wrong_one_is_told() -> None:
         ItemThenPlace(block_cells=0)
     with pytest.raises(BlastEnvError, match='must be "place" to play'):
         CursorControl(make(action="item_then_place", render_mode="rgb_array"))
+
+
+# --- Illegal actions.
+
+
+def test_an_illegal_action_means_the_nearest_legal_cell() -> None:
+    """Every action of an environment with obstacles, against a search over all cells."""
+    corner = {"corner_m": (9.5, 10.0), "size_m": (2.5, 2.0), "reason": "door"}
+    scenario = blocks_scenario(keep_outs=[{**KEEP_OUT, "size_m": (3.0, 2.5)}, corner])
+    _, columns = scenario.zone.shape
+    env = make(scenario)
+    _, info = env.reset(seed=0)
+    mask = info["action_mask"]
+    legal = [divmod(int(each), columns) for each in np.flatnonzero(mask[:-1])]
+    illegal = np.flatnonzero(mask == 0).tolist()
+    assert len(illegal) > 20
+    for action in illegal:
+        row, column = divmod(action, columns)
+        away = [(up - row) ** 2 + (right - column) ** 2 for up, right in legal]
+        env.reset(seed=0)
+        _, _, ended, _, info = env.step(action)
+        assert env.placement.cells == (legal[away.index(min(away))],)
+        assert (info["illegal_actions"], ended) == (1, False)
+        assert info["reward_terms"]["illegal_actions"] == 0.0
+
+
+def test_the_nearest_place_is_of_the_same_item_in_the_same_rotation() -> None:
+    env = yard_env()
+    _, info = env.reset(seed=0)
+    catalogue = env.placement.catalogue
+    illegal = np.flatnonzero(info["action_mask"] == 0).tolist()
+    tried = set()
+    for action in illegal:
+        env.reset(seed=0)
+        env.step(action)
+        (placed,) = env.placement.layout
+        wanted = catalogue.variants[action // (catalogue.shape[0] * catalogue.shape[1])]
+        tried.add(wanted)
+        assert catalogue.variants[catalogue.variant_number(placed)] == wanted
+    assert len(tried) == 3  # a post stands everywhere
+
+
+@pytest.mark.parametrize("name", list(ACTIONS))
+def test_no_policy_that_repeats_an_action_gets_stuck(name: str) -> None:
+    """With masks disregarded; every episode ends in a layout, not by the limit of 100 actions."""
+    env = yard_env(action=name, illegal_action_limit=100)
+    for action in range(0, int(env.action_space.n), 7):  # type: ignore[attr-defined]
+        env.reset(seed=0)
+        actions = 0
+        while True:
+            due = env.blasts_due(action)
+            actions += 1
+            if due:  # the end; the blast itself takes seconds
+                break
+            env.step(action)
+        assert actions <= 3 * env.task.source.representative.zone.stock
+
+
+def test_what_repeats_without_effect_ends_the_episode() -> None:
+    env = make(action="item_then_block", scenario=blocks_scenario())
+    env.reset(seed=1)
+    other_choice = 60  # a cell, where a block is asked for
+    _, _, ended, _, info = env.step(other_choice)
+    assert (ended, info["illegal_actions"], info["reward_terms"]["illegal_actions"]) == (
+        False,
+        1,
+        -0.001,
+    )
+    assert not env.step(0)[2]  # an action with an effect between two without
+    env.step(int(np.flatnonzero(env.action_masks())[0]))
+    assert not env.step(other_choice)[2]
+    assert env.blasts_due(other_choice)
+    _, _, ended, _, info = env.step(other_choice)
+    assert (ended, info["illegal_actions"], len(info["layout"])) == (True, 3, 1)
+
+
+def test_block_and_cell_mean_the_nearest_ones() -> None:
+    scenario = blocks_scenario(keep_outs=[{**KEEP_OUT, "size_m": (4.0, 4.0)}])  # block 0
+    env = make(action="item_then_block", scenario=scenario)
+    env.reset(seed=1)
+    env.step(0)
+    env.step(4 + 9)  # block 1 has two columns: the nearest to row 1, column 1 of a block
+    env.step(1)
+    env.step(4 + 9)  # taken: the cell below, before the equally near ones
+    assert env.placement.layout == ((1, 9), (0, 9))
+
+
+def test_invalid_actions_have_two_names() -> None:
+    with pytest.raises(BlastEnvError, match="no invalid_action 'nearst', did you mean 'nearest'"):
+        make(invalid_action="nearst")

@@ -57,7 +57,10 @@ def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
         ({"illegal_action_limit": 0}, "illegal_action_limit is 0, must be an integer from 1"),
         ({"engine": "pymunck"}, "did you mean 'pymunk'"),
         ({"scenario": 3}, "scenario is 3, must be a name, a path, a Scenario"),
-        ({"reward": 3}, "reward is 3, must be one of 'incremental', 'terminal', or have"),
+        (
+            {"reward": 3},
+            "reward is 3, must be one of 'incremental', 'relative', 'terminal', or have",
+        ),
         ({"threat": 3}, "threat is 3, must be one of 'hidden', 'visible', or have the method draw"),
         (
             {"risk": 3},

@@ -56,8 +56,8 @@ def test_ids_with_items_can_be_played(name: str) -> None:
     assert not info["action_mask"][action]
 
 
-@pytest.mark.parametrize("observation", ["image", "grid", "grid_with_load", "features"])
-@pytest.mark.parametrize("reward", ["terminal", "incremental"])
+@pytest.mark.parametrize("observation", ["image", "grid", "grid_with_load", "features", "dict"])
+@pytest.mark.parametrize("reward", ["terminal", "incremental", "relative"])
 @pytest.mark.parametrize("threat", ["visible", "hidden"])
 def test_both_checkers_pass_on_every_variant(observation: str, reward: str, threat: str) -> None:
     threats = None if threat == "visible" else 2
@@ -65,6 +65,14 @@ def test_both_checkers_pass_on_every_variant(observation: str, reward: str, thre
     check_env(env, skip_render_check=True)
     if not observation.startswith("grid"):  # planes of numbers that are no image, it would warn
         check_env_for_agents(env, skip_render_check=True)
+
+
+@pytest.mark.parametrize("invalid_action", ["nearest", "penalty"])
+@pytest.mark.parametrize("action", ["place", "item_then_place", "item_then_block"])
+def test_both_checkers_pass_on_every_action_space(action: str, invalid_action: str) -> None:
+    env = make(observation="dict", action=action, invalid_action=invalid_action)
+    check_env(env, skip_render_check=True)
+    check_env_for_agents(env, skip_render_check=True)
 
 
 def test_every_bundled_scenario_with_a_build_zone_has_an_id() -> None:

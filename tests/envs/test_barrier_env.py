@@ -78,7 +78,7 @@ def test_the_weights_of_structures_count() -> None:
 
 
 def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> None:
-    env = make(illegal_action_cost=0.25)
+    env = make(invalid_action="penalty", illegal_action_cost=0.25)
     env.reset(seed=1)
     observation, _, _, _, info = env.step(7)
     assert not info["action_mask"][HYDRANT]
@@ -95,7 +95,7 @@ def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> Non
 
 
 def test_the_limit_of_illegal_actions_ends_the_episode_as_finishing_does() -> None:
-    env = make(illegal_action_limit=3, illegal_action_cost=0.5)
+    env = make(invalid_action="penalty", illegal_action_limit=3, illegal_action_cost=0.5)
     env.reset(seed=1)
     env.step(7)
     rewards, ended = zip(*[env.step(HYDRANT)[1:3] for _ in range(3)], strict=True)
@@ -151,6 +151,16 @@ def test_terminal_rewards_add_up_to_the_impulse_and_the_deposit_comes_back() -> 
     assert not any(deposits[1:-1])
 
 
+@pytest.mark.parametrize("threat", ["visible", "hidden"])
+def test_relative_rewards_add_up_to_the_reduction(threat: str) -> None:
+    env = make(reward="relative", threat=threat, threats=None if threat == "visible" else 2)
+    steps = play(env, seed=5)[1:]
+    assert [step[1] for step in steps] == [0.0, 0.0, steps[-1][4]["reduction"]]
+    assert steps[-1][4]["reward_terms"].keys() == {"reduction", "illegal_actions"}
+    env.reset(seed=5)
+    assert env.step(FINISH)[1] == 0.0  # no barrier, no reduction
+
+
 def test_who_finishes_at_once_pays_the_impulse_exactly() -> None:
     for reward in ("terminal", "incremental"):
         env = make(reward=reward)
@@ -161,7 +171,7 @@ def test_who_finishes_at_once_pays_the_impulse_exactly() -> None:
 
 
 def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
-    env = make(reward="incremental")
+    env = make(reward="incremental", invalid_action="penalty")
     env.reset(seed=1, options={"charge_position_m": (3.0, 9.0), "layout": [(0, 4)]})
     env.step(HYDRANT)  # illegal: the first step pays for what stands from the start
     earned = env.step(3 * COLUMNS)[1]

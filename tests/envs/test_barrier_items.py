@@ -57,7 +57,7 @@ def test_masks_follow_stock_budget_and_ground() -> None:
 
 
 def test_an_illegal_piece_changes_nothing() -> None:
-    env = yard_env()
+    env = yard_env(invalid_action="penalty")
     env.reset(seed=0)
     before, *_ = env.step(yard().zone.catalogue.action(WALL[0]))
     after, reward, ended, _, info = env.step(yard().zone.catalogue.action(Piece(7, 1, "post")))

@@ -33,7 +33,7 @@ def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str)
     Whether a layout is accepted is for `check_layout` to say, which looks at it as a whole.
     """
     scenario = SCENARIOS[name]
-    env = make(scenario, illegal_action_limit=1000)
+    env = make(scenario, invalid_action="penalty", illegal_action_limit=1000)
     rng = np.random.default_rng(0)
     states = 0
     for episode in range(EPISODES):

@@ -38,6 +38,7 @@ def test_vectors_of_environments_stack_the_information(mode: str, vector_kwargs:
         num_envs=2,
         vectorization_mode=mode,
         vector_kwargs=vector_kwargs,
+        invalid_action="penalty",
         **barrier_arguments(),
     )
     _, info = envs.reset(seed=3)
@@ -75,7 +76,7 @@ def test_a_copy_in_mid_episode_goes_on_identically(again: Any, observation: str)
     env.render()  # so that there is something that does not pickle
     twin = again(env)
     assert same(env.render(), twin.render())
-    for action in (20, 12, 13):
+    for action in (12, 13):
         assert same(env.step(action), twin.step(action))
     assert same(env.reset(), twin.reset())
     assert same(env.step(FINISH), twin.step(FINISH))

@@ -100,7 +100,7 @@ def test_the_last_frame_stays_and_does_not_leak_into_the_next_episode() -> None:
 
 
 def test_a_map_of_characters_shows_what_stands_where() -> None:
-    env = make(render_mode="ansi")
+    env = make(render_mode="ansi", invalid_action="penalty")
     assert env.render() is None
     env.reset(seed=1, options={"charge_position_m": (3.0, 9.0)})
     env.step(5 + 3)

@@ -8,10 +8,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import AutoresetMode
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.envs.vector import ThreadedVectorEnv
+from blast_env.errors import BlastEnvError
 from blast_env.scenario import Scenario, load_scenario, save_scenario
 from blast_env.sites import SiteSource
 from tests.envs.small import ThinEngine, play, same, small_scenario
@@ -114,6 +116,51 @@ def test_vectors_of_every_id_in_every_mode(name: str, mode: str | None) -> None:
     observation, *_ = vector.step(vector.action_space.sample())
     assert observation in vector.observation_space
     vector.close()
+
+
+@pytest.mark.parametrize("how", [*AutoresetMode, "SameStep"])
+@pytest.mark.parametrize("mode", ["sync", "vector_entry_point"])
+def test_every_autoreset_mode_in_every_mode(mode: str, how: AutoresetMode | str) -> None:
+    """Three steps, of which the second ends both episodes."""
+    arguments: dict[str, Any] = {"autoreset_mode": how}
+    if mode == "sync":
+        arguments = {"vector_kwargs": arguments}
+    vector = gym.make_vec(
+        "BlastBarrier-v0",
+        num_envs=2,
+        vectorization_mode=mode,
+        scenario=small_scenario(),
+        engine=ThinEngine(),
+        realisations=1,
+        **arguments,
+    )
+    assert vector.metadata["autoreset_mode"] == AutoresetMode(how)
+    first, _ = vector.reset(seed=5)
+    vector.step(np.array([0, 1]))
+    last, _, ended, _, infos = vector.step(np.array([FINISH, FINISH]))
+    assert ended.all()
+    if vector.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP:
+        assert [len(each) for each in infos["final_info"]["layout"]] == [1, 1]
+        assert not same(last, np.stack(infos["final_obs"]))
+    if vector.metadata["autoreset_mode"] == AutoresetMode.DISABLED:
+        vector.reset(options={"reset_mask": np.array([True, True])})
+    vector.step(np.array([0, 1]))
+    assert same(vector.reset(seed=5)[0], first)
+    vector.close()
+
+
+def test_the_autoreset_mode_survives_json_and_a_wrong_one_is_told() -> None:
+    few: dict[str, Any] = {"num_envs": 2, "scenario": small_scenario()}
+    vector = gym.make_vec("BlastBarrier-v0", autoreset_mode=AutoresetMode.SAME_STEP, **few)
+    assert vector.spec is not None
+    again = gym.make_vec(EnvSpec.from_json(vector.spec.to_json()))
+    assert again.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    for each in (vector, again):
+        each.close()
+    with pytest.raises(BlastEnvError, match="no autoreset mode 'Samestep', did you mean 'SameSt"):
+        gym.make_vec("BlastBarrier-v0", autoreset_mode="Samestep", **few)
+    with pytest.raises(TypeError, match=r"give vector_kwargs=\{'autoreset_mode'"):
+        gym.make_vec("BlastBarrier-v0", vectorization_mode="sync", autoreset_mode="SameStep", **few)
 
 
 def test_threads_change_nothing_but_the_time() -> None:

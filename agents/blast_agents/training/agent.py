@@ -30,6 +30,7 @@ from blast_env.engines import Engine
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import (
     OBSERVATIONS,
+    SINGLE_ARRAYS,
     Array,
     EpisodeObservation,
     ModuleLoads,
@@ -227,7 +228,7 @@ class TrainedAgent:
     engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
-        check_names("observation", [self.observation], OBSERVATIONS)
+        check_names("observation", [self.observation], SINGLE_ARRAYS)
 
     @cached_property
     def digest(self) -> str:

@@ -30,7 +30,7 @@ from blast_env.documents import (
 )
 from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.envs.arguments import check_names
-from blast_env.envs.observations import OBSERVATIONS
+from blast_env.envs.observations import SINGLE_ARRAYS
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
 from blast_env.provenance import versions
@@ -210,7 +210,7 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
     """
     check_names("algorithm", [values.get("algorithm", ALGORITHMS[0])], ALGORITHMS)
     check_names("threat", [values.get("threat", THREATS[0])], THREATS)
-    check_names("observation", [values.get("observation", "grid")], OBSERVATIONS)
+    check_names("observation", [values.get("observation", "grid")], SINGLE_ARRAYS)
     try:
         return TrainingSettings.model_validate(values)
     except ValidationError as error:
