@@ -262,7 +262,7 @@ class IncrementalReward:
 
 
 @dataclass(frozen=True)
-class RelativeReward:
+class ReductionReward:
     """The relative reduction of the load by the whole layout, paid when the charge goes off.
 
     It is `info["reduction"]`: the share of the load without a barrier that the layout takes off, 0
@@ -283,7 +283,7 @@ REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
     {
         "terminal": TerminalReward(),
         "incremental": IncrementalReward(),
-        "relative": RelativeReward(),
+        "relative": ReductionReward(),
     }
 )
 """The rewards, by their names."""
