@@ -578,8 +578,7 @@ def _structure_feature(kind: FeatureKind, structure: AnyStructure) -> Feature:
         return replace(
             feature, places_m=outline, holes_m=tuple(courtyards), boxes_m=structure.boxes_m
         )
-    parts_end = [said.get(key) for key in ("building", "base_m", "height_m")]
-    return replace(feature, part_of=" ".join(map(str, parts_end)) if structure.building else "")
+    return feature
 
 
 def _said_of(structure: AnyStructure) -> dict[str, str | float]:

@@ -157,7 +157,7 @@ def test_on_another_machine_a_digest_is_skipped_with_the_reason(
 CONTENT_HASHES: Final = {
     "street_front": "b088a354e90ec7e2f011afe6c60a280ffa4d522f18023169c0879187817891b7",
     "government_forecourt": "81fda966f11e6a2df1bdba6098858def65dcdb0c1c5136090db4829f275d3981",
-    "car_park": "a79ee3baa8399f79372be5bc2d386432aa29ec15a202bfa0c16ec48002af0271",
+    "car_park": "a7e2bab6ddf9c5f92dced90091b7c7cb5773c4d46f1c1ddab2a7153ddf592fdd",
     "campus": "d5799deb8d55a7d9255402d7b8dc0dc9e4319cd4565b13e3d4a103a35d8a4729",
     "clinic_front": "d2fc02932afa74582250ccb52aea44d016093c32f7caea6bf4e0582c31c3a036",
     "control_room": "f0b4d497dccfd3fb5c7fa88a4d7442000a78207db5b421985695c92a320c52d6",

@@ -294,7 +294,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
             impulses = own[own.structure == obstacle.name][column]
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
-        draw_enlarged(axes, obstacles, scale, 0.4, features=site_features(evaluation.scenario))
+        draw_enlarged(axes, obstacles, scale, 0.4)
         pa_s = building[column.replace("_sim", "_pa_s")]
         axes.set_title(
             f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",

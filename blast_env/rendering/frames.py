@@ -122,7 +122,7 @@ class FramePainter:
         )
         self._balls: dict[tuple[int, int], Line2D] = {}
         self._loads: dict[str, tuple[PolyCollection, LineCollection]] = {}
-        self._features, self._outlines = features, list[Artist]()
+        self._outlines: list[Artist] = []
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -147,7 +147,7 @@ class FramePainter:
         lines = (f"{time_s * MS_PER_S:.2f} ms", note, self._so_far(obstacles))
         loads = [artist for each in obstacles for artist in self._loads_on(each)]
         if not self._outlines:
-            self._outlines = draw_outlines(self.sheet.axes, obstacles, self._features)
+            self._outlines = draw_outlines(self.sheet.axes, obstacles)
         return self.sheet.frame(lines, (*self._flying(balls), *loads, *self._outlines))
 
     def _so_far(self, obstacles: Sequence[ModularObstacle]) -> str:

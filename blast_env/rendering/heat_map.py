@@ -207,11 +207,10 @@ def _widths_in(
 
 def _draw_overview(axes: Axes, result: BlastResult, scale: LoadScale) -> None:
     # Modules are filled with the colours of their loads.
-    features = _features(result)
-    draw_plan(axes, without(features, *STANDING))
+    draw_plan(axes, without(_features(result), *STANDING))
     for obstacle in result.obstacles:
         draw_loads(axes, obstacle, scale.norm, 0.25, scale.unit.factor)
-    draw_outlines(axes, result.obstacles, features)
+    draw_outlines(axes, result.obstacles)
     axes.set_title("Site", fontsize=11)
 
 
@@ -237,8 +236,7 @@ def _draw_panel(
     scale: LoadScale,
     room_in: tuple[float, float],
 ) -> None:
-    features = _features(result)
-    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor, features)
+    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor)
     hits = sum(part.hits for part in building.modules)
     axes.set_title(
         f"{building.name}{' (protected)' if building.protected else ''}\n"

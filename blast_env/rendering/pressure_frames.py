@@ -35,7 +35,6 @@ from blast_env.plan import (
     Kinds,
     area_feature,
     blast_features,
-    structure_features,
     without,
 )
 from blast_env.rendering.canvas import BAR_LABELS_PX, Frame, Sheet
@@ -481,16 +480,14 @@ def _on_ground(shot: PressureShot) -> tuple[Feature, ...]:
 
 
 def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
-    """Return solids, the lowest first: the blocks of each, with the outline of the first part."""
-    site, features = shot.result.run.site, structure_features(shot.result.blast.scenario.structures)
-    whole = {each.name: each.part_of for each in features if each.part_of}
-    found: dict[object, tuple[StructureOutline, list[Block]]] = {}
-    for outline in site.structures:
-        for block in outline.blocks:
-            alone = (outline.name, block) if outline.is_barrier else outline.name
-            key = whole.get(outline.name, alone), outline.protected
-            found.setdefault(key, (outline, []))[1].append(block)
-    return sorted(found.values(), key=lambda each: each[1][0].base_m)
+    """Return solids with their blocks, the lowest first; blocks of a barrier are apart."""
+    found: list[tuple[StructureOutline, list[Block]]] = []
+    for outline in shot.result.run.site.structures:
+        if outline.is_barrier:
+            found += ((outline, [block]) for block in outline.blocks)
+        else:
+            found.append((outline, list(outline.blocks)))
+    return sorted(found, key=lambda each: each[1][0].base_m)
 
 
 def _solids(site: BlastSite) -> list[Feature]:

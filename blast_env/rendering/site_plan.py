@@ -256,28 +256,15 @@ def _path_of(rings: Iterable[Sequence[PointM]], view: View) -> Path:
     return Path.make_compound_path(*closed)
 
 
-def draw_outlines(
-    axes: Axes, obstacles: Iterable[Obstacle], features: Iterable[Feature] = ()
-) -> list[Artist]:
-    """Draw the outlines of structures in the colours of their roles; barriers get none.
-
-    Args:
-        axes: The axes, in metres.
-        obstacles: The structures and the barrier.
-        features: Features of the site, whose `part_of` joins the parts of a building.
-    """
-    whole = {each.name: each.part_of for each in features if each.part_of}
-    alike: dict[tuple[str, bool], list[Rectangle]] = {}
+def draw_outlines(axes: Axes, obstacles: Iterable[Obstacle]) -> list[Artist]:
+    """Draw the outlines of structures in the colours of their roles; barriers get none."""
+    drawn: list[Artist] = []
     for each in obstacles:
         if not each.is_barrier:
-            key = whole.get(each.name, each.name), each.protected
-            alike.setdefault(key, []).extend(each.boxes_m)
-    drawn: list[Artist] = []
-    for (_, protected), rectangles in alike.items():
-        patch = PathPatch(outline_path(rectangles), fill=False, zorder=3.0)
-        patch.set_edgecolor(unit_interval(PROTECTED if protected else STRUCTURE))
-        patch.set_linewidth(2.4 if protected else 1.6)
-        drawn.append(axes.add_patch(patch))
+            patch = PathPatch(outline_path(each.boxes_m), fill=False, zorder=3.0)
+            patch.set_edgecolor(unit_interval(PROTECTED if each.protected else STRUCTURE))
+            patch.set_linewidth(2.4 if each.protected else 1.6)
+            drawn.append(axes.add_patch(patch))
     return drawn
 
 
@@ -323,15 +310,11 @@ def draw_enlarged(
     scale: Normalize,
     linewidth: float,
     factor: float = 1.0,
-    features: Iterable[Feature] = (),
 ) -> None:
-    """Draw the loads on the modules of structures so that they fill the axes.
-
-    See `draw_loads`, and for the features `draw_outlines`.
-    """
+    """Draw the loads on the modules of structures so that they fill the axes; see `draw_loads`."""
     for each in obstacles:
         draw_loads(axes, each, scale, linewidth, factor)
-    draw_outlines(axes, obstacles, features)
+    draw_outlines(axes, obstacles)
     left, bottom, right, top = Rectangle.around([each.rectangle_m for each in obstacles])
     reach = 0.25
     axes.set(xlim=(left - reach, right + reach), ylim=(bottom - reach, top + reach))

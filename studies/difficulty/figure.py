@@ -151,7 +151,7 @@ def _draw_plan(
         parts = [rectangle_patch(part.rectangle_m) for part in obstacle.parts]
         axes.add_collection(PatchCollection(parts, color=colour, linewidth=0.3, zorder=4))
     protected = [each for each in scene.structures if each.protected]
-    draw_outlines(axes, protected, site_features(scenario))
+    draw_outlines(axes, protected)
     share = 1.0 / sum(source.weight for source in scenario.charge)
     for source in scenario.charge:
         _draw_source(axes, source, share * source.weight)

@@ -15,9 +15,10 @@ from blast_env.scenario.build_scene import build_site
 from tests.gas_sites import WALL, hut
 
 
-def counted(peak_pa: float, layout: Layout, face: str = "west") -> CountedPeak:
+def counted(peak_pa: float, layout: Layout, outward_x: float = -1.0) -> CountedPeak:
     """Return the peak that counts of a face of a cell 4 m from 5 kg."""
-    row = {"face": face, "x_m": 6.0, "y_m": 4.0, "z_m": 0.0, "peak_pa": peak_pa}
+    normal = {"outward_x": outward_x, "outward_y": 0.0}
+    row = {**normal, "x_m": 6.0, "y_m": 4.0, "z_m": 0.0, "peak_pa": peak_pa}
     return counted_peak(build_site(hut(), layout), 0.5, pd.DataFrame([row]))
 
 
@@ -29,14 +30,16 @@ def test_in_sight_the_larger_of_gas_and_the_curve_counts() -> None:
     assert counted(1.2 * curve_pa, ()) == CountedPeak(1.2 * curve_pa, PeakSource.GAS)
 
 
-@pytest.mark.parametrize(("layout", "face"), [(WALL, "west"), ((), "east")])
-def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(layout: Layout, face: str) -> None:
+@pytest.mark.parametrize(("layout", "outward_x"), [(WALL, -1.0), ((), 1.0)])
+def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(
+    layout: Layout, outward_x: float
+) -> None:
     curve_pa, factor = kingery_bulmash("reflected_overpressure", 4.0, 5.0), peak_factor(0.5, 5.0)
-    found = counted(1e4, layout, face)
+    found = counted(1e4, layout, outward_x)
     assert found == CountedPeak(factor * 1e4, PeakSource.EXTRAPOLATED)
-    assert counted(0.9 * curve_pa, layout, face).pa == pytest.approx(curve_pa)
+    assert counted(0.9 * curve_pa, layout, outward_x).pa == pytest.approx(curve_pa)
     # Between walls more may come than in the open: then the curve is no bound.
-    assert counted(1.1 * curve_pa, layout, face).pa == pytest.approx(factor * 1.1 * curve_pa)
+    assert counted(1.1 * curve_pa, layout, outward_x).pa == pytest.approx(factor * 1.1 * curve_pa)
 
 
 def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(study: Study) -> None:

@@ -8,12 +8,14 @@ import pytest
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.filemanagement import readfile
 
-from blast_env.app.edits import SiteThing, ThingKind, moved
+from blast_env.app.edits import SiteThing, ThingKind, moved, resized, section_of
+from blast_env.app.page.fields import fields_of, value_of
 from blast_env.app.solids import boxes
 from blast_env.calibration import load_calibration
 from blast_env.engines import Blast, find_engine
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.envs.display import placing_text
+from blast_env.evaluation.governing import Severity
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
@@ -174,6 +176,16 @@ def test_gas_loads_every_wall_and_the_courtyard() -> None:
     assert by_face["west"] > by_face["east"]
 
 
+def test_the_worst_charge_is_guessed_as_for_a_rectangle() -> None:
+    """By the open impulse on points of the walls, which the modules before them do not hide."""
+    ring = [(6.0, 3.0), (8.0, 3.0), (8.0, 5.0), (6.0, 5.0)]
+    plain, own = (
+        Severity.in_the_open(each, Charge((2.0, 4.0), 5.0)).load
+        for each in (Scenario.from_document(site_document(), "hut"), museum(outline_m=ring))
+    )
+    assert own == pytest.approx(plain, rel=0.2)
+
+
 def test_the_surrogate_knows_its_walls() -> None:
     """A slanted wall has the load of points along it; the area is that of the walls."""
     loads = find_engine("surrogate").loads(museum(), (), Charge((2.0, 4.0), 5.0), 0)
@@ -215,6 +227,15 @@ def test_a_facade_is_set_once_for_all_walls() -> None:
     assert not result.unjudged
     assert len(result.bays)
     damage_view(scenario, [("view", (), [])], "museum")
+
+
+def test_the_page_edits_what_a_polygon_has() -> None:
+    scenario, thing = museum(), SiteThing(ThingKind.STRUCTURE, 0)
+    section = section_of(scenario, thing)
+    values = {each.label: value_of(section, each) for each in fields_of(scenario, thing)}
+    assert values["height (m)"] == 2.0
+    assert "left (m)" not in values
+    assert resized(scenario, thing, (9.0, 7.0)) == scenario
 
 
 def test_turning_and_moving_keep_its_modules() -> None:

@@ -121,14 +121,15 @@ _OF_STRUCTURE: Final = (
         "switch",
         hint="barriers and buildings may stand on its top; it needs a height, and begins at 0",
     ),
-    *_CORNER,
 )
 _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
     "ModularObstacle": (
+        *_CORNER,
         FormField("columns", "columns", "integer"),
         FormField("rows", "rows", "integer"),
     ),
-    "ConcreteSquare": (FormField("modules a side", "side_modules", "integer"),),
+    "ConcreteSquare": (*_CORNER, FormField("modules a side", "side_modules", "integer")),
+    "polygon": (),
 }
 _LAST_OF_STRUCTURE: Final = (
     FormField("weight", "weight"),
