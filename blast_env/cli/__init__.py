@@ -32,9 +32,6 @@ class _Commands(LazyGroup):
         "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
         "propose": "Propose a layout for any site, with a catalogue in seconds without a blast.",
         "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",
-        "play": (
-            "Place barriers by hand, with mouse and keyboard, and watch their effect on the blast."
-        ),
         "paper": "Recompute the paper's Tables 1 to 4 and Figure 5 from its own columns.",
         "import": "Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.",
         "app": (

@@ -33,7 +33,6 @@ def register_environments() -> None:
     gym.register(
         id="BlastSimulator-v0",
         entry_point="blast_env.envs.simulator_env:BlastSimulatorEnv",
-        vector_entry_point="blast_env.envs.vector:simulator_vector",
     )
     _register_barrier("BlastBarrier-v0", scenario="courtyard")
     _register_barrier("BlastBarrierIncremental-v0", scenario="courtyard", reward="incremental")
@@ -51,6 +50,5 @@ def _register_barrier(environment_id: str, **arguments: str) -> None:
     gym.register(
         id=environment_id,
         entry_point=BARRIER_ENTRY_POINT,
-        vector_entry_point="blast_env.envs.vector:barrier_vector",
         kwargs=arguments,
     )

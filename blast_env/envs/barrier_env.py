@@ -41,7 +41,7 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
-from blast_env.geometry import Cell, Element
+from blast_env.geometry import Element
 from blast_env.scenario import AnyScenario, Placement
 from blast_env.statistics import CVAR_LEVEL, Risk
 from blast_env.values import real_number, whole_number
@@ -336,47 +336,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         if not self._episode.ended:
             raise gym.error.ResetNeeded("the charge has not gone off: finish the episode first")
         return self._display.blast_frames(self._episode)
-
-    def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Refuse `gymnasium.utils.play`, since one action per cell is too many for keys.
-
-        Raises:
-            BlastEnvError: Always; the message names the wrapper.
-        """
-        raise BlastEnvError(
-            "every cell is an action, which is too many for a keyboard: "
-            "from blast_env.envs.play import CursorControl; play(CursorControl(env))"
-        )
-
-    @property
-    def charge_has_gone_off(self) -> bool:
-        """Whether the charge has gone off, so that no more can be placed."""
-        return self._episode.ended
-
-    def mark(self, action: int | None) -> None:
-        """Outline the placement of an action in the frames of `render`, or none.
-
-        The text of the frame has the reason if the placement is illegal.
-
-        Args:
-            action: The action; `None`, or one that finishes, removes the outline.
-
-        Raises:
-            gymnasium.error.InvalidAction: If the action is not in the action space.
-        """
-        if action is not None and not self.action_space.contains(action):
-            raise gym.error.InvalidAction(
-                f"action is {value_text(action)}, must be in {self.action_space}"
-            )
-        self._display.marked = action
-
-    def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
-        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one.
-
-        Raises:
-            gymnasium.error.ResetNeeded: If `reset` has not been called.
-        """
-        return self._display.cell_at(self._episode, place_px)
 
     def close(self) -> None:
         """Close the window, if there is one."""

@@ -12,9 +12,8 @@ from blast_env.engines.contract import load_plugin
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat
-from blast_env.geometry import Cell, Rectangle
+from blast_env.geometry import Rectangle
 from blast_env.scenario import AnySource, Placement, PointSource, Scenario
-from blast_env.scenario.catalogue import element_text
 from blast_env.scenario.zone import distances_m
 from blast_env.units import MODULE_SIDE_M
 
@@ -103,13 +102,9 @@ class Display:
     Args:
         render_mode: `"human"`, `"rgb_array"`, `"ansi"`, or `None` for no display.
         frames_per_s: Frames per second of the window and of films.
-
-    Attributes:
-        marked: The action that is marked in the frames, before the charge goes off.
     """
 
     def __init__(self, render_mode: str | None, frames_per_s: float) -> None:
-        self.marked: int | None = None
         self._render_mode = render_mode
         self._frames_per_s = frames_per_s
         self._episode: Episode | None = None
@@ -157,10 +152,6 @@ class Display:
         """End the film, if there is one, for a new episode."""
         self._film = self._film_frame = None
 
-    def cell_at(self, episode: Episode, place_px: tuple[int, int]) -> Cell | None:
-        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
-        return self._placing_painter(episode).cell_at(place_px)
-
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._window is not None:
@@ -178,13 +169,7 @@ class Display:
         return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
 
     def _placing_frame(self, episode: Episode) -> Frame:
-        painter, placement = self._placing_painter(episode), episode.placement
-        lines = _state_lines(episode)
-        if self.marked is None or self.marked >= placement.catalogue.finish:
-            return painter.paint(placement, lines)
-        element = placement.catalogue.element(self.marked)
-        reason = placement.explain(element)
-        return painter.paint(placement, (lines[0], reason or element_text(element)), element)
+        return self._placing_painter(episode).paint(episode.placement, _state_lines(episode))
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)

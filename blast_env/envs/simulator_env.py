@@ -513,10 +513,6 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         self._window.show(frame)
         return None
 
-    def get_keys_to_action(self) -> dict[tuple[int, ...], int]:
-        """Return the key of the only action for `gymnasium.utils.play`: the space bar."""
-        return {(ord(" "),): 0}
-
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._window is not None:

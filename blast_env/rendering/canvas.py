@@ -263,9 +263,3 @@ class SiteSheet(Sheet):
         """Return the pixel of a place: x, and y from the top."""
         across, up = self.axes.transData.transform((x_m, y_m))
         return int(across), int(self.size_px[1] - up)
-
-    def place_m(self, across_px: float, down_px: float) -> tuple[float, float]:
-        """Return the place at the middle of a pixel, in metres."""
-        middle = (across_px + 0.5, self.size_px[1] - down_px - 0.5)
-        x_m, y_m = self.axes.transData.inverted().transform(middle).tolist()
-        return x_m, y_m

@@ -2,18 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import floor
 from typing import Final
 
 import numpy as np
 
 from blast_env.engines import Blast, BlastResult
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell, Element, Rectangle
 from blast_env.physics.scene import Charge
 from blast_env.plan import (
-    EXPLOSIVE,
-    PROTECTED,
     Feature,
     Kinds,
     barrier_features,
@@ -28,11 +24,10 @@ from blast_env.plan import (
 from blast_env.rendering.canvas import Frame, SiteSheet
 from blast_env.rendering.film import paint_at, plan_film
 from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.site_plan import add_outline, draw_features, legend_of, write_names
-from blast_env.rendering.style import charge_text, nice_ceiling, render_extra, unit_interval
-from blast_env.scenario import AnySource, BuildZone, Placement, PointSource, Scenario, VehicleSource
+from blast_env.rendering.site_plan import draw_features, legend_of, write_names
+from blast_env.rendering.style import charge_text, nice_ceiling, render_extra
+from blast_env.scenario import AnySource, Placement, PointSource, Scenario, VehicleSource
 from blast_env.scenario.build_scene import build_site
-from blast_env.units import MODULE_SIDE_M
 
 with render_extra():
     from matplotlib.artist import Artist
@@ -69,20 +64,15 @@ class PlacingPainter:
         """Width and height of the frames."""
         return self._sheet.size_px
 
-    def paint(
-        self, placement: Placement, lines: Sequence[str] = (), marked: Element | None = None
-    ) -> Frame:
+    def paint(self, placement: Placement, lines: Sequence[str] = ()) -> Frame:
         """Return a frame, uint8 (height, width, 3).
 
         Args:
             placement: The modules placed so far.
             lines: At most two lines of text for the upper right corner.
-            marked: An element to outline, in green if it may be placed, in red if not.
         """
         axes, features = self._sheet.axes, self._of(placement)
         moving = [*draw_features(axes, features), *write_names(axes, features)]
-        if marked is not None:
-            moving += self._mark(placement, marked)
         frame = self._sheet.frame(lines, moving)
         for artist in moving:
             artist.remove()
@@ -100,26 +90,6 @@ class PlacingPainter:
             found += barrier_features(scenario, layout)
         return in_order(found)
 
-    def cell_at(self, place_px: tuple[int, int]) -> Cell | None:
-        """Return the cell of the build zone at a pixel (x, y) of a frame, if there is one."""
-        zone = self._scenario.build_zone
-        if zone is None:
-            return None
-        x_m, y_m = np.subtract(self._sheet.place_m(*place_px), zone.corner_m)
-        cell = floor(y_m / MODULE_SIDE_M), floor(x_m / MODULE_SIDE_M)
-        return cell if _is_in(zone, cell) else None
-
-    def _mark(self, placement: Placement, element: Element) -> list[Artist]:
-        """Outline an element in the colour of its legality; no artist outside the zone."""
-        zone = placement.scenario.zone
-        colour = PROTECTED if placement.explain(element) is None else EXPLOSIVE
-        cells = [cell for cell in placement.catalogue.cells(element) if _is_in(zone, cell)]
-        if not cells:
-            return []
-        around = Rectangle.around([zone.cell_rectangle_m(cell) for cell in cells])
-        style = {"edgecolor": unit_interval(colour), "linewidth": 2.2}
-        return [add_outline(self._sheet.axes, around, **style)]
-
     def _handles(self) -> list[Artist]:
         """Return the entries of the legend, one per item, since items differ in colour."""
         placement = Placement.empty(self._scenario)
@@ -130,10 +100,6 @@ class PlacingPainter:
         full = cell_features(zone, np.zeros(zone.shape, dtype=bool))
         barrier = barrier_features(self._scenario, one_each)
         return legend_of(without_counts((*self._of(placement), *full, *barrier)))
-
-
-def _is_in(zone: BuildZone, cell: Cell) -> bool:
-    return 0 <= cell[0] < zone.rows and 0 <= cell[1] < zone.columns
 
 
 def sources_text(sources: Sequence[AnySource]) -> str:

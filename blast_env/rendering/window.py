@@ -1,10 +1,6 @@
 """A window that shows frames, for `render_mode="human"`."""
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.rendering.canvas import Frame
@@ -14,30 +10,6 @@ with render_extra():
     import pygame
 
 _SHARE_OF_SCREEN = 0.9
-_KEYS_HELD_MS = (300, 60)  # delay before a held key repeats, and interval of repeats
-_LETTERS: Final = ("w", "a", "s", "d")
-_NAMED: Final = ("up", "down", "left", "right", "space", "tab", "return", "backspace", "escape")
-KEY_NUMBERS: Final[Mapping[str, int]] = MappingProxyType(
-    {name: getattr(pygame, f"K_{name}") for name in _LETTERS}
-    | {name: getattr(pygame, f"K_{name.upper()}") for name in _NAMED}
-)
-"""The keys in use, with their numbers in pygame."""
-
-_KEY_NAMES: Final = {number: name for name, number in KEY_NUMBERS.items()}
-_BUTTON_NAMES: Final = {1: "left click", 3: "right click"}
-
-
-@dataclass(frozen=True)
-class Input:
-    """One input of the user.
-
-    Attributes:
-        name: A key of `KEY_NUMBERS`, `"move"`, `"left click"` or `"right click"`.
-        place_px: Position of the mouse, as a pixel (x, y) of the frame; `None` for a key.
-    """
-
-    name: str
-    place_px: tuple[int, int] | None = None
 
 
 class Window:
@@ -57,8 +29,6 @@ class Window:
         self._screen: pygame.Surface | None = None
         self._clock = pygame.time.Clock()
         self._closed = False
-        self._factor = 1.0
-        self._events: list[pygame.event.Event] = []
 
     @property
     def closed(self) -> bool:
@@ -83,29 +53,10 @@ class Window:
             image = pygame.transform.smoothscale(image.convert(24), screen.get_size())
         screen.blit(image, (0, 0))
         pygame.display.flip()
-        self._factor = width / screen.get_width()
         self._clock.tick(self._frames_per_s)
-        self._events = pygame.event.get()
-        if any(event.type == pygame.QUIT for event in self._events):
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
         return not self._closed
-
-    def inputs(self) -> list[Input]:
-        """Return the inputs collected by the last call of `show`, in their order."""
-        return [done for event in self._events if (done := self._input(event)) is not None]
-
-    def _input(self, event: pygame.event.Event) -> Input | None:
-        if event.type == pygame.KEYDOWN and event.key in _KEY_NAMES:
-            return Input(_KEY_NAMES[event.key])
-        if event.type == pygame.MOUSEMOTION:
-            return Input("move", self._frame_pixel(event.pos))
-        if event.type == pygame.MOUSEBUTTONDOWN and event.button in _BUTTON_NAMES:
-            return Input(_BUTTON_NAMES[event.button], self._frame_pixel(event.pos))
-        return None
-
-    def _frame_pixel(self, place_px: tuple[int, int]) -> tuple[int, int]:
-        """Return the pixel (x, y) of the frame that a pixel of the window shows."""
-        return int(self._factor * place_px[0]), int(self._factor * place_px[1])
 
     def close(self) -> None:
         """Close the window, if it is open."""
@@ -125,7 +76,6 @@ class Window:
             if self._screen is None or self._screen.get_size() != fitting:
                 pygame.display.set_caption(self._title)
                 self._screen = pygame.display.set_mode(fitting)
-                pygame.key.set_repeat(*_KEYS_HELD_MS)
         except pygame.error as error:
             raise BlastEnvError(
                 f'no window can be opened ({error}): use render_mode="rgb_array" or write a film'

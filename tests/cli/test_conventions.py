@@ -66,14 +66,14 @@ def test_the_list_of_commands_says_what_each_says_first_of_itself(name: str) -> 
     assert (command.loaded.help or "").partition("\n\n")[0].replace("\n", " ") == command.help
 
 
-@pytest.mark.parametrize("name", ["simulate", "evaluate", "play", "train"])
+@pytest.mark.parametrize("name", ["simulate", "evaluate", "train"])
 def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
     """Both come from the engines: a new one, or a new setting of one, is seen."""
     options = commands()[name].loaded.params
     helps = {each.name: str(getattr(each, "help", "")) for each in options}
     for engine in ENGINE_NAMES:
         assert engine in helps["engine"]
-        for setting in find_engine(engine).options if name != "play" else ():
+        for setting in find_engine(engine).options:
             if name == "train" and setting.name in ("until", "cells"):
                 continue  # a reward has no walls but those that count; sites are small
             assert helps[setting.name].startswith(setting.help.rstrip("."))

@@ -12,7 +12,6 @@ from gymnasium.utils.env_checker import check_env
 from blast_env.envs.actions import ACTIONS, ActionChoice, ItemThenPlace, NumberedActions
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
-from blast_env.envs.play import CursorControl
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout
 from blast_env.scenario import Placement, Scenario
@@ -176,8 +175,6 @@ def test_a_strategy_of_ones_own_is_taken_and_a_wrong_one_is_told() -> None:
         make(action=3)
     with pytest.raises(BlastEnvError, match="block_cells is 0, must be"):
         ItemThenPlace(block_cells=0)
-    with pytest.raises(BlastEnvError, match='must be "place" to play'):
-        CursorControl(make(action="item_then_place", render_mode="rgb_array"))
 
 
 # --- Illegal actions.

@@ -12,14 +12,12 @@ from gymnasium.vector import AutoresetMode
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.simulator_env import BlastSimulatorEnv
-from blast_env.envs.vector import ThreadedVectorEnv
-from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario, load_scenario, save_scenario
+from blast_env.scenario import Scenario, save_scenario
 from blast_env.sites import SiteSource
 from tests.envs.small import ThinEngine, play, same, small_scenario
 from tests.libraries.ids import IDS, arguments
 
-MODES = ("sync", "async", "vector_entry_point")
+MODES = ("sync", "async")
 IN_PROCESSES = ("BlastBarrier-v0", "BlastBarrierItemSites-v0", "BlastSimulator-v0")
 """Ids that `async` is tried with; processes take seconds to start."""
 FINISH = 40
@@ -94,7 +92,7 @@ def rollout(mode: str | None, **arguments: Any) -> list[Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["async", "vector_entry_point", None])
+@pytest.mark.parametrize("mode", ["async", None])
 @pytest.mark.parametrize("limit", [{}, {"max_episode_steps": 2}])
 def test_every_mode_gives_the_same(mode: str | None, limit: dict[str, int]) -> None:
     steps, expected = rollout(mode, **limit), rollout("sync", **limit)
@@ -119,20 +117,16 @@ def test_vectors_of_every_id_in_every_mode(name: str, mode: str | None) -> None:
 
 
 @pytest.mark.parametrize("how", [*AutoresetMode, "SameStep"])
-@pytest.mark.parametrize("mode", ["sync", "vector_entry_point"])
-def test_every_autoreset_mode_in_every_mode(mode: str, how: AutoresetMode | str) -> None:
+def test_every_autoreset_mode(how: AutoresetMode | str) -> None:
     """Three steps, of which the second ends both episodes."""
-    arguments: dict[str, Any] = {"autoreset_mode": how}
-    if mode == "sync":
-        arguments = {"vector_kwargs": arguments}
     vector = gym.make_vec(
         "BlastBarrier-v0",
         num_envs=2,
-        vectorization_mode=mode,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": how},
         scenario=small_scenario(),
         engine=ThinEngine(),
         realisations=1,
-        **arguments,
     )
     assert vector.metadata["autoreset_mode"] == AutoresetMode(how)
     first, _ = vector.reset(seed=5)
@@ -149,34 +143,10 @@ def test_every_autoreset_mode_in_every_mode(mode: str, how: AutoresetMode | str)
     vector.close()
 
 
-def test_the_autoreset_mode_survives_json_and_a_wrong_one_is_told() -> None:
+def test_an_autoreset_mode_belongs_to_the_vector() -> None:
     few: dict[str, Any] = {"num_envs": 2, "scenario": small_scenario()}
-    vector = gym.make_vec("BlastBarrier-v0", autoreset_mode=AutoresetMode.SAME_STEP, **few)
-    assert vector.spec is not None
-    again = gym.make_vec(EnvSpec.from_json(vector.spec.to_json()))
-    assert again.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
-    for each in (vector, again):
-        each.close()
-    with pytest.raises(BlastEnvError, match="no autoreset mode 'Samestep', did you mean 'SameSt"):
-        gym.make_vec("BlastBarrier-v0", autoreset_mode="Samestep", **few)
     with pytest.raises(TypeError, match=r"give vector_kwargs=\{'autoreset_mode'"):
         gym.make_vec("BlastBarrier-v0", vectorization_mode="sync", autoreset_mode="SameStep", **few)
-
-
-def test_threads_change_nothing_but_the_time() -> None:
-    def make() -> gym.Env:
-        return gym.make(
-            "BlastBarrier-v0", scenario=small_scenario(), engine=ThinEngine(), realisations=1
-        )
-
-    vectors = [ThreadedVectorEnv(make, 3, threads) for threads in (1, 3)]
-    results = []
-    for vector in vectors:
-        steps: list[Any] = [vector.reset(seed=1)]
-        steps += [vector.step(np.array([action, FINISH, action])) for action in range(8)]
-        results.append(steps)
-        vector.close()
-    assert same(*results)
 
 
 def test_an_error_in_one_environment_leaves_the_others_usable() -> None:
@@ -186,16 +156,6 @@ def test_an_error_in_one_environment_leaves_the_others_usable() -> None:
         vector.step(np.array([99, 0, 1]))
     assert same(vector.reset(seed=1)[0], first)
     vector.close()
-
-
-def test_the_specification_of_a_vector_of_threads_survives_json() -> None:
-    scenario = load_scenario("courtyard")
-    vector = gym.make_vec("BlastBarrier-v0", num_envs=2, scenario=scenario)
-    assert vector.spec is not None
-    again = gym.make_vec(EnvSpec.from_json(vector.spec.to_json()))
-    assert same(again.reset(seed=3), vector.reset(seed=3))
-    for each in (vector, again):
-        each.close()
 
 
 @pytest.mark.parametrize("kind", [BlastBarrierEnv, BlastSimulatorEnv])

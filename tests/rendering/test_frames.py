@@ -83,7 +83,6 @@ def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
     assert high < low
     assert right - left == pytest.approx(low - high, abs=1)
     assert right - left == pytest.approx(20.0 * sheet.pixels_per_m, abs=1)
-    assert sheet.place_m(*sheet.pixel(3.0, 4.0)) == pytest.approx((3.0, 4.0), abs=0.1)
 
 
 def nearest(frame: Frame, colour: tuple[int, int, int], across: int, down: int) -> float:
