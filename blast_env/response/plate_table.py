@@ -1,9 +1,9 @@
-"""Precomputed table of glass plates, made with `plate`.
+"""Table of simply supported glass plates under large deflection, by von Karman's equations.
 
-    python -m blast_env.response.plate_table    # recomputes the table, in some 10 s
-
-Each row is a plate of one aspect ratio at one deflection, dimensionless as in `plate`. The risk
-integral is Beason & Morgan's, over both faces:
+`python -m studies.plates` solves them, and makes the table. Each row is a plate of one aspect ratio
+at one deflection, dimensionless: load q b^4 / (E h^4), deflection w / h, stress sigma b^2 / (E h^2)
+with the short side b, the thickness h, Young's modulus E and the pressure q. The risk integral is
+Beason & Morgan's, over both faces:
 
     R = mean((c sigma ab / (E h^2))^m) over the plate, sigma the larger principal stress, tension
     c = [2 / pi * integral of (cos^2 t + n sin^2 t)^m dt]^(1/m), n the ratio of principal stresses
@@ -18,18 +18,20 @@ from importlib.resources import files
 from typing import Final
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from blast_env.arrays import FloatArray
-from blast_env.response.plate import Plate, PlateState
 
 WEIBULL_M: Final = 7.0
 """Surface flaw parameter m of weathered window glass (ASTM E1300)."""
 
-_ASPECT_RATIOS: Final = (1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0)
-_DEFLECTIONS: Final = np.geomspace(0.02, 30.0, 48)
-_LOADS: Final = np.geomspace(0.1, 80_000.0, 90)
-_NAME: Final = "glass_plates.csv"
+ASPECT_RATIOS: Final = (1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0)
+"""Long over short side of the plates of the table."""
+
+DEFLECTIONS: Final = np.geomspace(0.02, 30.0, 48)
+"""Deflections w / h of the table, for each plate."""
+
+TABLE: Final = "glass_plates.csv"
+"""File of the table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ def plate_curve(aspect_ratio: float) -> PlateCurve:
         ]
     )
     return PlateCurve(
-        deflection=_DEFLECTIONS,
+        deflection=DEFLECTIONS,
         load=np.exp(columns[:, 0]),
         risk=np.exp(columns[:, 1]),
         load_mass_factor=columns[:, 2],
@@ -77,65 +79,9 @@ def plate_curve(aspect_ratio: float) -> PlateCurve:
 @cache
 def _table() -> tuple[FloatArray, FloatArray]:
     """Return aspect ratios, and per ratio and deflection: ln load, ln risk, K_LM, mean(phi)."""
-    text = files("blast_env.response").joinpath("data", _NAME).read_text(encoding="utf-8")
+    text = files("blast_env.response").joinpath("data", TABLE).read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     rows = np.array([[float(each) for each in line.split(",")] for line in lines[1:]])
-    values = rows[:, 2:].reshape(len(_ASPECT_RATIOS), len(_DEFLECTIONS), 4)
+    values = rows[:, 2:].reshape(len(ASPECT_RATIOS), len(DEFLECTIONS), 4)
     values = np.concatenate([np.log(values[..., :2]), values[..., 2:]], axis=-1)
-    return np.array(_ASPECT_RATIOS), values
-
-
-def curve_values(aspect_ratio: float) -> FloatArray:
-    """Return load, risk, K_LM and mean(phi) over the table's deflections (deflections, 4).
-
-    Solves von Karman's equations, in half a second.
-    """
-    states = Plate(aspect_ratio).states(_LOADS)
-    found = np.array([_values(state, aspect_ratio) for state in states])
-    at = np.log(_DEFLECTIONS)
-    known = np.log([state.deflection for state in states])
-    logs = [np.interp(at, known, np.log(found[:, column])) for column in (0, 1)]
-    shapes = [np.interp(at, known, found[:, column]) for column in (2, 3)]
-    return np.column_stack([*np.exp(logs), *shapes])
-
-
-def _values(state: PlateState, aspect_ratio: float) -> tuple[float, ...]:
-    shape = state.volume / state.deflection
-    return state.load, _risk(state, aspect_ratio), state.shape_square / shape, shape
-
-
-def _risk(state: PlateState, aspect_ratio: float) -> float:
-    larger, smaller = state.principal[..., 0], state.principal[..., 1]
-    tension = np.maximum(larger, 0.0) * aspect_ratio  # from b^2 to ab
-    ratio = np.divide(smaller, larger, out=np.zeros_like(larger), where=larger > 0.0)
-    total = (_biaxial_power(ratio) * tension**WEIBULL_M * state.weights).sum()
-    return float(total)
-
-
-def _biaxial_power(ratio: FloatArray) -> FloatArray:
-    """Return c^m for ratios of smaller over larger principal stress, at most 1."""
-    points, weights = leggauss(24)
-    negative = np.where(ratio < 0.0, -ratio, 1.0)
-    limit = np.where(ratio >= 0.0, np.pi / 2.0, np.arctan(np.sqrt(1.0 / negative)))
-    angle = 0.5 * (points + 1.0) * limit[..., None]
-    normal = np.cos(angle) ** 2 + ratio[..., None] * np.sin(angle) ** 2
-    result: FloatArray = 2.0 / np.pi * limit * ((normal**WEIBULL_M) @ (0.5 * weights))
-    return result
-
-
-def table_text() -> str:
-    """Return the table as text, with a comment on its origin."""
-    lines = [
-        "# von Karman plates, edges held and free to slip: blast_env.response.plate_table",
-        "aspect_ratio,deflection,load,risk,load_mass_factor,load_factor",
-    ]
-    for ratio in _ASPECT_RATIOS:
-        for deflection, row in zip(_DEFLECTIONS, curve_values(ratio), strict=True):
-            lines.append(",".join(f"{each:.6g}" for each in (ratio, deflection, *row)))
-    return "\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    from pathlib import Path
-
-    Path(__file__).with_name("data").joinpath(_NAME).write_text(table_text(), encoding="utf-8")
+    return np.array(ASPECT_RATIOS), values

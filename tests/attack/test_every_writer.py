@@ -57,8 +57,6 @@ _ELSEWHERE: Final = {
     "blast_env/reading.py: subprocess.Popen": "a worker, which is this package",
     "blast_env/reading.py: os.fdopen": "the worker's standard output",
     "blast_env/recording/excel.py: table.to_excel": "to the temporary file of `write_atomically`",
-    "blast_env/response/plate_table.py: "
-    "Path(__file__).with_name('data').joinpath(_NAME).write_text": "makes the package's own table",
     "blast_env/cluster.py: connect": "to a cluster",
     "blast_env/data/gas_blasts.py: bare.rename": "the columns of a table",
     "studies/other_codes/pyclaw_worker.py": "runs without this package, in a scratch folder",

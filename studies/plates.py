@@ -1,5 +1,7 @@
 """Large deflection of a simply supported glass plate by von Karman's equations.
 
+    python -m studies.plates    # recomputes the table of the package, in some 10 s
+
 All quantities are dimensionless, so that one table serves all panes. With the short side b, the
 thickness h, Young's modulus E and the pressure q
 
@@ -21,6 +23,7 @@ steps of load.
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -29,10 +32,14 @@ from numpy.polynomial.legendre import leggauss
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.response import plate_table
+from blast_env.response.plate_table import ASPECT_RATIOS, DEFLECTIONS, TABLE, WEIBULL_M
 
 POISSON_RATIO: Final = 0.22
 """Poisson's ratio of soda-lime glass, as in ASTM E1300."""
 
+_LOADS: Final = np.geomspace(0.1, 80_000.0, 90)
 _COSINES: Final = 9
 _POLYNOMIALS: Final = 9
 _POINTS: Final = 32
@@ -247,3 +254,63 @@ def _principal(stress: FloatArray) -> FloatArray:
     mean = 0.5 * (stress[:, 0] + stress[:, 1])
     radius = np.hypot(0.5 * (stress[:, 0] - stress[:, 1]), stress[:, 2])
     return np.stack([mean + radius, mean - radius], axis=-1)
+
+
+def curve_values(aspect_ratio: float) -> FloatArray:
+    """Return load, risk, K_LM and mean(phi) over the table's deflections (deflections, 4).
+
+    Solves von Karman's equations, in half a second.
+    """
+    states = Plate(aspect_ratio).states(_LOADS)
+    found = np.array([_values(state, aspect_ratio) for state in states])
+    at = np.log(DEFLECTIONS)
+    known = np.log([state.deflection for state in states])
+    logs = [np.interp(at, known, np.log(found[:, column])) for column in (0, 1)]
+    shapes = [np.interp(at, known, found[:, column]) for column in (2, 3)]
+    return np.column_stack([*np.exp(logs), *shapes])
+
+
+def _values(state: PlateState, aspect_ratio: float) -> tuple[float, ...]:
+    shape = state.volume / state.deflection
+    return state.load, _risk(state, aspect_ratio), state.shape_square / shape, shape
+
+
+def _risk(state: PlateState, aspect_ratio: float) -> float:
+    larger, smaller = state.principal[..., 0], state.principal[..., 1]
+    tension = np.maximum(larger, 0.0) * aspect_ratio  # from b^2 to ab
+    ratio = np.divide(smaller, larger, out=np.zeros_like(larger), where=larger > 0.0)
+    total = (_biaxial_power(ratio) * tension**WEIBULL_M * state.weights).sum()
+    return float(total)
+
+
+def _biaxial_power(ratio: FloatArray) -> FloatArray:
+    """Return c^m for ratios of smaller over larger principal stress, at most 1."""
+    points, weights = leggauss(24)
+    negative = np.where(ratio < 0.0, -ratio, 1.0)
+    limit = np.where(ratio >= 0.0, np.pi / 2.0, np.arctan(np.sqrt(1.0 / negative)))
+    angle = 0.5 * (points + 1.0) * limit[..., None]
+    normal = np.cos(angle) ** 2 + ratio[..., None] * np.sin(angle) ** 2
+    result: FloatArray = 2.0 / np.pi * limit * ((normal**WEIBULL_M) @ (0.5 * weights))
+    return result
+
+
+def table_text() -> str:
+    """Return the table as text, with a comment on its origin."""
+    lines = [
+        "# von Karman plates, edges held and free to slip: studies.plates",
+        "aspect_ratio,deflection,load,risk,load_mass_factor,load_factor",
+    ]
+    for ratio in ASPECT_RATIOS:
+        for deflection, row in zip(DEFLECTIONS, curve_values(ratio), strict=True):
+            lines.append(",".join(f"{each:.6g}" for each in (ratio, deflection, *row)))
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Write the table of the package."""
+    with write_atomically(Path(plate_table.__file__).parent / "data" / TABLE) as temporary:
+        temporary.write_text(table_text(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
