@@ -13,13 +13,10 @@ import pandas as pd
 from pandas.api import types
 from xlsxwriter.exceptions import XlsxFileError
 
-from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder, write_atomically
-from blast_env.physics.structure import BARRIER_NAME
 from blast_env.recording.tables import (
     COLLISION_COLUMNS,
-    MODULE_COLUMNS,
     RecordedBlast,
     RunRecord,
     modules_in_pa_s,
@@ -39,8 +36,6 @@ LONGEST_VALUE: Final = 400
 MOST_PRINTED_ROWS: Final = 400
 """The most rows in the print area of a sheet, some ten pages; it can be removed."""
 
-CHARTED_MODULES: Final = 30
-"""The most bars of a chart; labels of more are not readable."""
 
 _OPTIONS: Final[Mapping[str, bool]] = MappingProxyType(
     {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
@@ -77,17 +72,6 @@ _UNITS: Final = (
     ("sim units/s", "simulation units of length per second; 4 units are 1 m"),
 )
 
-_CHART_SHEET: Final = "Most loaded"
-_CHART_COLUMN: Final = 2  # of the sheet `Run`
-_LABEL_COLUMNS: Final = tuple(
-    column for column in MODULE_COLUMNS if column.name in ("module_id", "structure", "hits")
-)
-_WIDTH: Final = 640  # pixels
-_HEIGHT_WITHOUT_BARS: Final = 150
-_BAR_HEIGHT: Final = 19
-_FEWEST_BARS: Final = 10  # least bars for the height of a chart; the title of the axis needs it
-_COLOURS: Final = ("#7A042E", "#F08030", "#2F6690", "#5B8E7D", "#8E7DBE", "#8A8A8A")
-
 
 class SheetTable(NamedTuple):
     """A table for one sheet, with the meanings of its columns."""
@@ -100,12 +84,11 @@ class SheetTable(NamedTuple):
 def write_workbook(
     blast: RecordedBlast, path: str | Path, max_rows_per_sheet: int = EXCEL_ROWS
 ) -> Path:
-    """Write a workbook with the run record, the tables and charts of the impulse per module.
+    """Write a workbook with the run record and the tables.
 
-    Its sheets are `Run` (with the charts), `Structures`, `Modules`, `Collisions`, `Most loaded`
-    (the data of the charts) and `Columns`, which explains every column. A table too long for one
-    sheet continues in `Collisions 2` and so on. The file is written whole or not at all, and two
-    workbooks of the same blast are identical to the last byte.
+    Its sheets are `Run`, `Structures`, `Modules`, `Collisions` and `Columns`, which explains every
+    column. A table too long for one sheet continues in `Collisions 2` and so on. The file is
+    written whole or not at all, and two workbooks of the same blast are identical to the last byte.
 
     Args:
         blast: The blast.
@@ -134,9 +117,6 @@ def write_workbook(
         sheets.add_record(record)
         for each in tables:
             sheets.add(each)
-        charts = chart_data(blast)
-        sheets.add_whole(_CHART_SHEET, charts.table, charts.columns)
-        add_charts(writer.book, writer.sheets["Run"], charts)
         sheets.add(_explanations(tables, _UNITS))
     return path_of(path)
 
@@ -257,7 +237,6 @@ class _Sheets:
         for index, heading in enumerate(("quantity", "value")):
             sheet.write_string(0, index, heading, self._text_heading)
         for row, (_, line) in enumerate(pairs, start=1):
-            # Set here, not by the viewing program: it determines the place of the charts beside.
             lines = textwrap.wrap(str(line), _RECORD_WIDTH - 2)
             sheet.set_row(row, _ROW_HEIGHT * max(1, len(lines)))
 
@@ -349,159 +328,3 @@ def _explanations(tables: Sequence[SheetTable], units: Sequence[tuple[str, str]]
     rows += [("", "", unit, meaning) for unit, meaning in units]
     names = [column.name for column in _EXPLANATION_COLUMNS]
     return SheetTable("Columns", pd.DataFrame(rows, columns=names), _EXPLANATION_COLUMNS)
-
-
-class Ranking(NamedTuple):
-    """The most loaded modules of some structures, for one chart.
-
-    Attributes:
-        title: Title of the chart.
-        modules: Rows of the module table, the highest impulse first.
-    """
-
-    title: str
-    modules: pd.DataFrame
-
-
-class ChartData(NamedTuple):
-    """The data of the charts of a workbook.
-
-    Attributes:
-        label: The quantity of the bars, with its unit.
-        rankings: One per chart.
-        structures: The structures of the ranked modules, as the legend names them.
-        columns: The columns of the table; the last ones belong to the structures.
-        table: One row per module, chart after chart; its impulse is in its structure's column.
-    """
-
-    label: str
-    rankings: tuple[Ranking, ...]
-    structures: tuple[str, ...]
-    columns: tuple[Column, ...]
-    table: pd.DataFrame
-
-
-def chart_data(blast: RecordedBlast) -> ChartData:
-    """Return the data of the charts of a blast."""
-    rankings = tuple(_rankings(blast))
-    # The empty head provides the columns if nothing was hit.
-    ranked = pd.concat([blast.modules.head(0), *(ranking.modules for ranking in rankings)])
-    # In the order of the scenario, so that the colours do not depend on the loads.
-    present = blast.structures["structure"].isin(ranked["structure"])
-    structures = tuple(blast.structures.loc[present, "structure"])
-    unit = blast.load_unit
-    impulses = tuple(
-        Column(f"impulse_on_{structure}_pa_s", "Pa s", unit.label)
-        if unit.is_calibrated
-        else Column(f"impulse_on_{structure}_sim", "sim", "sum of m |v| over the collisions")
-        for structure in structures
-    )
-    table = ranked[[column.name for column in _LABEL_COLUMNS]].copy()
-    impulse = unit.factor * ranked["impulse_sim"]
-    for structure, column in zip(structures, impulses, strict=True):
-        table[column.name] = impulse.where(ranked["structure"] == structure)
-    label = unit.label if unit.is_calibrated else "impulse, m|v| (sim)"
-    return ChartData(label, rankings, _names(structures, unit), _LABEL_COLUMNS + impulses, table)
-
-
-def _names(structures: Sequence[str], unit: LoadUnit) -> tuple[str, ...]:
-    """Return the names of structures in the legend, with their loads if known."""
-    loads = (unit.of_structures.get(structure) for structure in structures)
-    return tuple(
-        structure if load is None else f"{structure}: {load.scaled.pa_s:,.1f} Pa s"
-        for structure, load in zip(structures, loads, strict=True)
-    )
-
-
-def add_charts(workbook: Any, sheet: Any, data: ChartData) -> None:
-    """Put the charts onto the sheet of the run record, or a note that there is nothing to chart.
-
-    Args:
-        workbook: The workbook, which has the table of `data` on another sheet.
-        sheet: The sheet for the charts, side by side.
-        data: The data of the charts.
-    """
-    if not data.rankings:
-        options = {"x_offset": 20, "height": 40}
-        sheet.insert_textbox(1, _CHART_COLUMN, "No module was hit.", options)
-    first = 0
-    for number, ranking in enumerate(data.rankings):
-        chart = workbook.add_chart({"type": "bar", "subtype": "stacked"})
-        _add_series(chart, data, slice(first, first + len(ranking.modules)))
-        _add_labels(chart, ranking, data.label)
-        place = {"object_position": 3, "x_offset": 20 + number * (_WIDTH + 20), "y_offset": 5}
-        sheet.insert_chart(1, _CHART_COLUMN, chart, place)
-        first += len(ranking.modules)
-
-
-def _rankings(blast: RecordedBlast) -> Iterator[Ranking]:
-    """Yield a ranking of the protected structures and one of the barrier, if they were hit."""
-    structures = blast.structures
-    is_barrier = structures["structure"] == BARRIER_NAME
-    protected = structures["protected"] & ~is_barrier
-    groups = {"protected structures": protected, "barrier": is_barrier}
-    if not protected.any():  # a study of the model, not of protection
-        groups = {"structures": ~is_barrier, "barrier": is_barrier}
-    for name, rows in groups.items():
-        in_group = blast.modules["structure"].isin(structures.loc[rows, "structure"])
-        hit = blast.modules[in_group & (blast.modules["hits"] > 0)]
-        if len(hit):
-            yield _ranking(name, hit, blast.load_unit)
-
-
-def _ranking(name: str, hit: pd.DataFrame, unit: LoadUnit) -> Ranking:
-    # Stable, so that equal loads keep the order of the module table.
-    ranked = hit.sort_values("impulse_sim", ascending=False, kind="stable")
-    top = ranked.head(CHARTED_MODULES)
-    which = "" if len(top) == len(hit) else f"the {len(top)} most loaded of "
-    # Loads in Pa s have no sum over structures; the legend gives the load on each.
-    total = "" if unit.is_calibrated else f": {hit['impulse_sim'].sum():,.0f} (sim)"
-    modules = "module" if len(hit) == 1 else "modules"
-    return Ranking(f"Impulse on the {name}{total}, {which}{len(hit)} {modules} hit", top)
-
-
-def _add_series(chart: Any, data: ChartData, rows: slice) -> None:
-    """Add one series per structure, for some rows of the table."""
-    part = data.table.iloc[rows]
-    first, last = rows.start + 1, rows.stop  # on the sheet, below the headings
-    label = data.columns.index(_LABEL_COLUMNS[0])
-    for index, structure in enumerate(data.structures):
-        column = len(_LABEL_COLUMNS) + index
-        if part[data.columns[column].name].isna().all():
-            continue
-        chart.add_series(
-            {
-                "name": structure,
-                "categories": [_CHART_SHEET, first, label, last, label],
-                "values": [_CHART_SHEET, first, column, last, column],
-                "fill": {"color": _COLOURS[index % len(_COLOURS)]},
-                "gap": 40,
-            }
-        )
-
-
-def _add_labels(chart: Any, ranking: Ranking, label: str) -> None:
-    chart.set_title({"name": ranking.title, "name_font": {"size": 12}})
-    chart.set_x_axis(
-        {
-            "name": label,
-            "num_format": "#,##0",
-            "major_gridlines": {"visible": True, "line": {"color": "#D9D9D9"}},
-        }
-    )
-    chart.set_y_axis(
-        {
-            "name": "module, by its centre (m)",
-            "reverse": True,  # the first row on top, and the impulse's axis still at the bottom
-            "crossing": "max",
-            "num_font": {"size": 8},
-            "interval_unit": 1,
-        }
-    )
-    chart.set_legend({"position": "bottom"})
-    chart.set_size(
-        {
-            "width": _WIDTH,
-            "height": _HEIGHT_WITHOUT_BARS + _BAR_HEIGHT * max(len(ranking.modules), _FEWEST_BARS),
-        }
-    )

@@ -46,7 +46,7 @@ def run_record(sheet: Any) -> dict[str, Any]:
 
 
 def test_sheets(workbook: Any) -> None:
-    names = ["Run", "Structures", "Modules", "Collisions", "Most loaded", "Columns"]
+    names = ["Run", "Structures", "Modules", "Collisions", "Columns"]
     assert workbook.sheetnames == names
 
 
@@ -147,56 +147,10 @@ def _decimals(cell: Any) -> int:
     return len(cell.number_format.partition(".")[2])
 
 
-def test_charts_show_the_most_loaded_modules_in_order(workbook: Any, blast: BlastResult) -> None:
-    modules = blast.modules[blast.modules["hits"] > 0].set_index("module_id")
-    protected, barrier = workbook["Run"]._charts
-    for chart, names in ((protected, ["building", "facade"]), (barrier, ["barrier"])):
-        loads = modules[modules["structure"].isin(names)]["impulse_sim"]
-        loads = loads.sort_values(ascending=False, kind="stable").head(30)
-        shown: dict[str, float] = {}
-        for series in chart.series:
-            module_ids = workbooks.cells(workbook, workbooks.reference(series, "cat"))
-            impulses = workbooks.cells(workbook, workbooks.reference(series, "val"))
-            assert module_ids == loads.index.tolist()
-            shown |= {m: i for m, i in zip(module_ids, impulses, strict=True) if i is not None}
-        assert shown == pytest.approx(loads.to_dict(), rel=1e-15)
-        assert [series.tx.v for series in chart.series] == names
-
-
-def test_charts_say_what_they_show(workbook: Any, blast: BlastResult) -> None:
-    protected, barrier = workbook["Run"]._charts
-    total = blast.impulse_sim("building") + blast.impulse_sim("facade")
-    hit = blast.modules[blast.modules["structure"].isin(["building", "facade"])]["hits"].gt(0)
-    assert hit.sum() > 30
-    assert workbooks.title(protected) == (
-        f"Impulse on the protected structures: {total:,.0f} (sim), "
-        f"the 30 most loaded of {hit.sum()} modules hit"
-    )
-    assert workbooks.title(barrier).endswith("(sim), 3 modules hit")
-    for chart in (protected, barrier):
-        assert workbooks.title(chart.y_axis) == "impulse, m|v| (sim)"
-        assert workbooks.title(chart.x_axis) == "module, by its centre (m)"
-
-
-def test_charts_carry_their_values_for_programs_that_do_not_calculate(workbook: Any) -> None:
-    for chart in workbook["Run"]._charts:
-        for series in chart.series:
-            cached = {point.idx: float(point.v) for point in series.val.numRef.numCache.pt}
-            in_cells = workbooks.cells(workbook, workbooks.reference(series, "val"))
-            assert cached == {
-                index: pytest.approx(value)
-                for index, value in enumerate(in_cells)
-                if value is not None
-            }
-
-
-def test_a_blast_without_a_hit_has_empty_tables_and_no_chart(
-    quiet_blast: BlastResult, tmp_path: Path
-) -> None:
+def test_a_blast_without_a_hit_has_empty_tables(quiet_blast: BlastResult, tmp_path: Path) -> None:
     workbook = workbooks.load(quiet_blast.to_excel(tmp_path / "quiet.xlsx"))
     assert workbook["Collisions"].max_row == 1
     assert workbook["Modules"].max_row == 1 + len(quiet_blast.modules)
-    assert not workbook["Run"]._charts
 
 
 @pytest.mark.parametrize("sheets", [1, 2, 3])
@@ -213,13 +167,6 @@ def test_a_long_table_goes_on_in_further_sheets(
     assert max(len(part) for part in parts) == per_sheet + 1
     times = [row[0] for part in parts for row in part[1:]]
     assert times == pytest.approx(blast.collisions["time_s"].tolist(), rel=1e-15)
-
-
-def test_the_charts_do_not_depend_on_the_limit(blast: BlastResult, tmp_path: Path) -> None:
-    path = write_workbook(blast, tmp_path / "short.xlsx", max_rows_per_sheet=10)
-    workbook = workbooks.load(path)
-    series = workbook["Run"]._charts[0].series[0]
-    assert None not in workbooks.cells(workbook, workbooks.reference(series, "cat"))
 
 
 def test_a_long_layout_is_not_cut(blast: BlastResult) -> None:
@@ -261,7 +208,7 @@ def test_a_limit_that_excel_cannot_have_is_refused(
     ],
 )
 @pytest.mark.parametrize(
-    "step", ["blast_env.recording.excel.add_charts", "xlsxwriter.workbook.Packager"]
+    "step", ["blast_env.recording.excel._explanations", "xlsxwriter.workbook.Packager"]
 )
 def test_a_failure_in_the_middle_leaves_nothing_behind(
     blast: BlastResult,
@@ -342,10 +289,3 @@ def test_a_calibrated_blast_has_pa_s_beside_simulation_units(
     unit = calibrated.load_unit
     for row in workbooks.table(workbook["Modules"]):
         assert row["impulse (Pa s)"] == pytest.approx(unit.factor * row["impulse, m|v| (sim)"])
-    chart = workbook["Run"]._charts[0]
-    assert "Pa s" in workbooks.title(chart.y_axis)
-    assert "sim" not in workbooks.title(chart)
-    assert chart.series[0].tx.v == f"building: {scaled.pa_s:,.1f} Pa s"
-    shown = workbooks.cells(workbook, workbooks.reference(chart.series[0], "val"))
-    largest = calibrated.modules["impulse_sim"].max()
-    assert max(filter(None, shown)) == pytest.approx(unit.factor * largest)

@@ -28,23 +28,6 @@ def expected(table: pd.DataFrame) -> list[list[Any]]:
     return [[_expected_cell(value) for value in row] for row in table.itertuples(index=False)]
 
 
-def reference(series: Any, kind: str) -> str:
-    """Return the cells that a chart's series takes its `cat` or `val` from."""
-    source = getattr(series, kind)
-    return str((source.numRef or source.strRef).f)
-
-
-def cells(workbook: Any, reference: str) -> list[Any]:
-    """Return the values of the cells of a reference such as `'Most loaded'!$A$2:$A$9`."""
-    sheet, _, area = reference.rpartition("!")
-    return [row[0].value for row in workbook[sheet.strip("'")][area.replace("$", "")]]
-
-
-def title(part: Any) -> str:
-    """Return the text of the title of a chart or of an axis."""
-    return "".join(run.t for paragraph in part.title.tx.rich.p for run in paragraph.r)
-
-
 def _expected_cell(value: Any) -> Any:
     """Return what a value of a table must look like in a workbook."""
     if isinstance(value, bool):
