@@ -86,7 +86,7 @@ class SpeedField:
                 larger otherwise.
         """
         # Imported here because Numba takes half a second to import.
-        from blast_env.scenario.driving_kernels import all_open, any_slow, spread
+        from blast_env.scenario.driving_kernels import spread
 
         def label(speed_km_h: float) -> float:
             return _run_up_m(motion, speed_km_h) / STEP_M
@@ -111,13 +111,10 @@ class SpeedField:
                     )
         per_radius = _per_radius(motion)
         arcs = arcs_up_to(top / per_radius, arc_step)
-        passable = all_open(ground, arcs.first, arcs.points)
-        slowed = np.zeros((0, 0, 0), dtype=np.uint64)
-        if motion.slow:
-            slowed = any_slow(most < top, arcs.first, arcs.points, passable)
         spread(
             ground,
             wide_places(ground),
+            most < top,
             most,
             labels,
             DIRECTIONS,
@@ -125,9 +122,9 @@ class SpeedField:
             arcs.of,
             arcs.ends,
             arcs.lengths,
+            arcs.first,
+            arcs.points,
             np.minimum(arcs.radii * per_radius, top).astype(np.float32),
-            passable,
-            slowed,
             max((label(area.speed_km_h) for area in motion.slow), default=top),
             min(SPOT * per_radius, top),
         )

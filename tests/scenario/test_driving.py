@@ -272,9 +272,9 @@ def test_no_step_raises_a_speed_any_further_and_none_is_raised_too_far(
     spread = driving_kernels.spread
 
     def noted(*args: Any) -> None:
-        asked.append((*args[:3], args[3].copy(), *args[4:]))
+        asked.append((*args[:4], args[4].copy(), *args[5:]))
         spread(*args)
-        asked.append((args[3].copy(),))
+        asked.append((args[4].copy(),))
 
     monkeypatch.setattr(driving_kernels, "spread", noted)
     rng = np.random.default_rng(seed)
@@ -285,7 +285,7 @@ def test_no_step_raises_a_speed_any_further_and_none_is_raised_too_far(
     slow = [table] * (seed % 2)
     yard = ground(36.0, 22.0, (6.0, 14.0), [], entry_speed_km_h=30.0, slow=slow)
     speeds_of(yard, Obstacles(stops))
-    (is_open, is_wide, most, labels, *_, arc_most, _, _, slow_most, spot_most), (found,) = asked
+    (is_open, is_wide, _, most, labels, *_, arc_most, slow_most, spot_most), (found,) = asked
     per_radius = arc_most[0] / all_arcs().radii[0]
     arcs = arcs_up_to(float(most.max()) / per_radius)
     assert len(arcs.of) == len(arc_most)
