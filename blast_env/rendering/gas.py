@@ -27,7 +27,7 @@ from blast_env.rendering.site_plan import (
 from blast_env.rendering.style import barrier_text, nice_ceiling, render_extra, unit_interval
 from blast_env.response.sdof import impulses
 from blast_env.scenario.sections import buildings_of
-from blast_env.units import MS_PER_S
+from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with render_extra():
     from matplotlib.axes import Axes
@@ -38,7 +38,6 @@ with render_extra():
 Quantity = Literal["impulse", "peak"]
 """The quantity of a picture: the peak specific impulse, or the largest overpressure."""
 
-PA_PER_KPA: Final = 1000.0
 MINUS: Final = "\N{MINUS SIGN}"
 _PERCENT: Final = 100.0
 

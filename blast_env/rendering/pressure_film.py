@@ -29,7 +29,6 @@ from blast_env.rendering.film import (
     told_of,
 )
 from blast_env.rendering.gas import (
-    PA_PER_KPA,
     check_comparable,
     gas_subtitle,
 )
@@ -42,6 +41,7 @@ from blast_env.rendering.pressure_frames import (
 )
 from blast_env.rendering.style import barrier_text, nice_ceiling
 from blast_env.runner import Tell, share_of
+from blast_env.units import PA_PER_KPA
 
 _EVERY_S: Final = 0.0002  # for 100 kg
 _LONGEST_S: Final = 4.0  # for 100 kg

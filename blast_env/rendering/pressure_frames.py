@@ -40,7 +40,6 @@ from blast_env.plan import (
 from blast_env.rendering.canvas import BAR_LABELS_PX, Frame, Sheet
 from blast_env.rendering.gas import (
     MINUS,
-    PA_PER_KPA,
     gas_subtitle,
 )
 from blast_env.rendering.site_plan import (
@@ -49,7 +48,7 @@ from blast_env.rendering.site_plan import (
     outline_path,
 )
 from blast_env.rendering.style import barrier_text, render_extra, unit_interval
-from blast_env.units import MS_PER_S
+from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with render_extra():
     from matplotlib import colormaps

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.physics.scene import Charge
@@ -68,6 +69,8 @@ def test_hardening_takes_the_best_choice_of_measures_with_one_blast() -> None:
     together = advise(problem, MeasureKind.TOGETHER, 12, begin_with=(found.layout,))
     assert together.worth <= found.worth
     assert together.blasts <= 12
+    with pytest.raises(BlastEnvError, match="budget is 0 blasts, must be at least 1"):
+        advise(problem, MeasureKind.HARDEN, 0)
 
 
 def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) -> None:

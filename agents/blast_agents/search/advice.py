@@ -16,6 +16,7 @@ import numpy as np
 from blast_agents.search.moves import Moves, legal_part
 from blast_agents.search.problem import LayoutProblem
 from blast_agents.search.registry import layouts_by_rule
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastMeter, BudgetError
 from blast_env.geometry import Layout, Measure
 from blast_env.response.damage import worst
@@ -180,7 +181,14 @@ def advise(
         begin_with: Initial layouts, for example of other kinds.
         progress: Called with the share of the blasts that is spent.
         damage_below: Exclusive bound on the worst damage, for a margin to the target.
+
+    Raises:
+        BlastEnvError: If the budget does not pay for one layout under all threats.
     """
+    if budget < len(problem.threats):
+        raise BlastEnvError(
+            f"budget is {budget} blasts, must be at least {len(problem.threats)}: one per threat"
+        )
     scenario, rng = only(problem.scenario, kind), generator(seed)
     meter = BlastMeter(budget)
     metered = replace(problem, meter=meter)

@@ -206,18 +206,6 @@ class PatchHistories:
         return np.array(self._history, dtype=np.float32).reshape(-1, len(self.faces)).T
 
 
-def peak_specific_impulse_pa_s(
-    overpressure_pa: NDArray[np.floating], step_s: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the peak specific impulses of histories, Pa s (n,).
-
-    Args:
-        overpressure_pa: Mean overpressures of the steps (n, steps).
-        step_s: Lengths of the steps (steps,).
-    """
-    return np.asarray(np.cumsum(overpressure_pa * step_s, axis=-1).max(axis=-1, initial=0.0))
-
-
 class Phases(NamedTuple):
     """Impulses of the phases of a history, Pa s.
 
