@@ -67,7 +67,7 @@ LEAST_OVER_RULES: Final = 0.03
 """Lead in reduction of a searched layout over every rule that makes a search worthwhile."""
 
 
-_SEARCH: Final = "annealing_from_rules"
+_SEARCH: Final = "population_annealing"
 
 QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 

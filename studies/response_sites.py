@@ -53,7 +53,7 @@ PICTURES: Final = Path("docs/pictures")
 FOUND: Final = Path(__file__).parent.parent / "docs" / "data" / "best_found"
 
 _DRAWS: Final = 16
-_SEARCH: Final = "annealing_from_rules"
+_SEARCH: Final = "population_annealing"
 _FACADE: Final = {"glazing": "window_laminated_12", "wall": "concrete_150"}
 """Facade of the older sites: strong enough for a small charge behind the right barrier."""
 

@@ -53,7 +53,8 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
     seeds: int = option(16, "Held-out threats of a case; 4 times as many where there is one.")
     budgets: str = option("50,200,1000", "Blasts a search may spend on a case.")
     methods: str = option(
-        "random,greedy,annealing,genetic", f"Search methods: {', '.join(proposers())}."
+        "best_rule,random,population_annealing,genetic",
+        f"Search methods: {', '.join(proposers())}.",
     )
     method: tuple[str, ...] = option(
         (),

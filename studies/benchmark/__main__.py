@@ -1,6 +1,5 @@
 """`python -m studies.benchmark`: references of the problems, and runs of strong methods."""
 
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import Annotated
@@ -10,8 +9,7 @@ import typer
 from blast_agents.benchmark import find_method, reference_of
 from pydantic import TypeAdapter
 
-from blast_env.arrays import FloatArray
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.output import print_line, user_errors
 from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
@@ -29,7 +27,6 @@ from blast_env.problems import (
 from blast_env.problems.references import cell_key, engine_key, stored_references
 from blast_env.statistics import mean_estimate
 from blast_env.tables import markdown_table
-from studies.benchmark.annealing import Setting, on_sites, settings, sites_for
 from studies.benchmark.methods import OUTSIDE
 from studies.benchmark.references import known_layouts, published_before, submitted_layouts
 
@@ -98,52 +95,6 @@ def headroom() -> None:
         rows.append((family, f"{rules.mean():.1f}", f"{best.mean():.1f}", ahead, more))
     headers = ("family", "best rule takes off (%)", "best known (%)", "points more", "problems")
     print_line(markdown_table(headers, rows))
-
-
-@app.command()
-def annealing(
-    sites: Annotated[
-        int, typer.Option(min=2, help="Generated sites to tune on, and to check.")
-    ] = 24,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs on each.")] = 6,
-    processes: Annotated[int, typer.Option(min=1)] = 2,
-) -> None:
-    """Tune annealing from the rules, of one walker and several; check the best on other sites."""
-    with user_errors():
-        tried = settings()
-        tuned = _played(tried, "to tune", sites, seeds, processes)
-        best = [
-            max((each for each in tried if each.kind == kind), key=lambda each: tuned[each].mean())
-            for kind in dict.fromkeys(each.kind for each in tried)
-        ]
-        again = dict.fromkeys([*(each for each in tried if each.is_packaged), *best])
-        checked = _played([*again], "to check", sites, seeds, processes)
-        rows = [*_annealing_rows("tuned on", tuned), *_annealing_rows("checked on", checked)]
-        headers = ("sites", "search", "begins with (%)", "temperatures", "taken off (%)")
-        print_line(markdown_table((*headers, "points more than packaged"), rows))
-
-
-def _played(
-    tried: Sequence[Setting], purpose: str, sites: int, seeds: int, processes: int
-) -> dict[Setting, FloatArray]:
-    found, played = sites_for(purpose, sites), {}
-    with progress_bar(f"sites {purpose}") as progress:
-        for number, each in enumerate(tried, 1):
-            played[each] = on_sites(each, found, seeds, processes)
-            progress(number / len(tried))
-    return played
-
-
-def _annealing_rows(
-    purpose: str, played: Mapping[Setting, FloatArray]
-) -> Iterator[tuple[str, ...]]:
-    packaged = {each.kind: own for each, own in played.items() if each.is_packaged}
-    for each, own in played.items():
-        ahead = mean_estimate(own - packaged[each.kind])
-        text = f"{ahead.value:+.1f} ({ahead.low:.1f} to {ahead.high:.1f})"
-        share, hot, cold = each.search.starting_share, each.search.hot, each.search.cold
-        settings_of = (f"{100.0 * share:g}", f"{hot:g} to {cold:g}")
-        yield purpose, each.kind, *settings_of, f"{own.mean():.1f}", text
 
 
 @app.command("play")

@@ -167,19 +167,6 @@ def mcbo_casmopolitan(problem: BenchmarkProblem, seed: int, value: Value) -> Non
         bo.observe(asked, np.array([[value(task.keys(asked.iloc[0]))]]))
 
 
-def annealing_on_keys(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """Simulated annealing on the keys in plain Python; each move redraws a few keys."""
-    rng = np.random.default_rng(seed)
-    keys = rng.random(problem.space.keys)
-    share = value(keys)
-    while True:
-        tried = np.where(rng.random(len(keys)) < 3.0 / len(keys), rng.random(len(keys)), keys)
-        found = value(tried)
-        heat = 0.05 * max(problem.blasts_left / max(problem.budget, 1), 1e-3)
-        if found < share or rng.random() < np.exp((share - found) / heat):
-            keys, share = tried, found
-
-
 _SEARCHES: Final[Mapping[str, Any]] = MappingProxyType(
     {
         "optuna_tpe": optuna_tpe,
@@ -187,11 +174,10 @@ _SEARCHES: Final[Mapping[str, Any]] = MappingProxyType(
         "smac_forest": smac_forest,
         "botorch_turbo": botorch_turbo,
         "mcbo_casmopolitan": mcbo_casmopolitan,
-        "annealing_on_keys": annealing_on_keys,
     }
 )
 
 OUTSIDE: Final[Mapping[str, Method]] = MappingProxyType(
     {name: by_keys(search) for name, search in _SEARCHES.items()}
 )
-"""Methods of other libraries, and a plain one, by name."""
+"""Methods of other libraries, by name."""

@@ -38,7 +38,7 @@ from blast_env.scenario import (
 )
 from studies.difficulty.study import TaskResult, WayOutcome
 
-METHOD: Final = "annealing"
+METHOD: Final = "population_annealing"
 """Search method; it begins with the best of rules, random layouts and random walls."""
 
 _BARE: Final = "no barrier"

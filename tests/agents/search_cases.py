@@ -1,15 +1,18 @@
 """A problem small enough that every layout can be tried, and evaluators that watch or break off."""
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from itertools import combinations
 
 import numpy as np
 from blast_agents.search import Layout, LayoutProblem
 
 from blast_env import load_scenario
+from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Element
-from blast_env.scenario import Scenario
+from blast_env.scenario import Placement, Scenario
 from tests.agents.sites import site
 
 CALIBRATION = "ballistic_kb_100kg"
@@ -39,6 +42,19 @@ def small_problem(
     seeds = np.random.default_rng(5).choice(2**31, realisations, replace=False)
     case = visible_case(evaluator.scenario, charge, seeds.tolist())
     return LayoutProblem(evaluator, case, processes)
+
+
+def every_layout(problem: LayoutProblem) -> list[Layout]:
+    """Return every legal layout, in ascending number of modules or pieces."""
+    empty = Placement.empty(problem.scenario)
+    actions = np.flatnonzero(empty.places(empty.usable)).tolist()
+    places = [empty.catalogue.element(action) for action in actions]
+    found: list[Layout] = []
+    for count in range(min(problem.stock, len(places)) + 1):
+        for layout in combinations(places, count):
+            with suppress(LayoutError):
+                found.append(Placement.of(problem.scenario, layout).layout)
+    return found
 
 
 class WatchedEvaluator(BlastEvaluator):

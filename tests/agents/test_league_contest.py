@@ -5,7 +5,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from importlib.util import module_from_spec, spec_from_file_location
-from itertools import islice
 from pathlib import Path
 from shutil import copytree
 
@@ -32,7 +31,6 @@ from blast_agents.search import (
     SearchResult,
     find_proposer,
 )
-from blast_agents.search.methods import every_layout
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
@@ -43,6 +41,7 @@ from blast_env.physics.scene import Charge
 from blast_env.scenario import PointSource
 from blast_env.sites import Visibility
 from tests.agents.league_cases import TRAINING, WallAgent, road_scenario
+from tests.agents.search_cases import every_layout
 
 SCENARIO = road_scenario()
 TRACK = known_track(SCENARIO, 3, 2)
@@ -85,7 +84,7 @@ class Cheat:
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
-        layouts = tuple(islice(every_layout(problem), self.layouts))
+        layouts = tuple(every_layout(problem)[: self.layouts])
         pairs = [(layout, threat) for layout in layouts for threat in problem.threats]
         if self.past_the_meter:
             problem.evaluator.loads_of_many(pairs)

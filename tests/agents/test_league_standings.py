@@ -276,7 +276,7 @@ def test_many_agents_are_told_apart_and_no_name_is_cut_off() -> None:
 
 
 def test_methods_at_one_budget_stand_side_by_side() -> None:
-    methods = ("random", "greedy", "annealing", "genetic")
+    methods = ("random", "best_rule", "population_annealing", "genetic")
     it = standings(BARE, *(result(f"{name}, 50 blasts", SEARCH, blasts=50) for name in methods))
     (axes,) = drawn(it).axes
     places = [float(each[0].get_xdata()[0]) for each in axes.containers]

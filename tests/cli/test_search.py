@@ -141,8 +141,10 @@ def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Pat
         (("--method", "genetik"), "did you mean 'genetic'"),
         (("--engine", "evnt"), "did you mean 'event'"),
         (("--risk", "men"), "did you mean 'mean'"),
-        (("--method", "exhaustive"), "exhaustive search is for small instances"),
-        (("--method", "greedy", "--start-from", "layout.json"), "greedy begins with no layouts"),
+        (
+            ("--method", "best_rule", "--start-from", "layout.json"),
+            "begins with no layouts",
+        ),
         (("--start-from", "nowhere.json"), "nowhere.json"),
         (("--threats", "4"), "threats is 4, must be 1 unless threat is 'hidden'"),
         (("--threat", "hidden", "--charge", "5", "9"), "a hidden one is drawn"),

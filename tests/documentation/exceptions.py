@@ -29,12 +29,10 @@ class Server:
     """How it is known that a program does what it should that ends only when it is told to.
 
     Attributes:
-        port: Where it must answer; none: it must still run after the time.
-        within_s: How long it may take.
+        port: Where it must answer.
     """
 
-    port: int | None
-    within_s: float = 60.0
+    port: int
 
 
 _WALL: Final = "blast-env search --scenario courtyard --method wall_near_charge --out wall"
@@ -113,7 +111,6 @@ GIVEN: Final = (
 SERVERS: Final = {
     "blast-env app": Server(8080),
     "blast-env app --port 8090 --folder designs --run runs/courtyard": Server(8090),
-    "blast-env play courtyard": Server(None, within_s=5.0),
     "tensorboard --logdir runs/courtyard/tensorboard": Server(6006),
 }
 
@@ -137,10 +134,9 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.gas judge": "--random-layouts 1 --charges 1 --seeds 1",
     # docs/start.md
-    "blast-env search --engine gas --scenario depot.toml --threat hidden --method annealing"
-    " --budget 300 --start-from building/layout.json --processes 2 --cache blasts --out found": (
-        "--budget 8 --held-out 1"
-    ),
+    "blast-env search --engine gas --scenario depot.toml --threat hidden"
+    " --method population_annealing --budget 300 --start-from building/layout.json --processes 2"
+    " --cache blasts --out found": ("--budget 8 --held-out 1"),
     "blast-env report depot.toml --layout building/layout.json --limit control_room=600,170"
     " --threats 1 --places 1 --stills 2 --no-items --out report.html --pdf report.pdf": (
         "--stills 0"
@@ -224,7 +220,7 @@ SMALLER: Final[dict[str, str]] = {
         "--charges 1 --changes 1"
     ),
     # docs/researchers/benchmark.md
-    "blast-env judge --method genetic_from_rules --budget 50 --seeds 10 --out entry": (
+    "blast-env judge --method genetic --budget 50 --seeds 10 --out entry": (
         "--problem visitor_entrance-told_2-v1 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge entry/submission.json --out entry": "--cell 0.5",
@@ -292,7 +288,6 @@ SMALLER: Final[dict[str, str]] = {
     " --sizes coarse,0.5,fine,0.25 --until 0.15": (
         "--random-layouts 0 --sizes coarse,0.5 --until 0.02"
     ),
-    "python -m studies.benchmark annealing": "--sites 2 --seeds 1",
     "python -m studies.gas refinement": "--scenario visitor_entrance --every 0.05",
     "blast-env train --scenario courtyard --run out/runs/maskable_courtyard": _TRAIN,
     "blast-env train --scenario perimeter_gate --run out/runs/maskable_perimeter_gate": _TRAIN,

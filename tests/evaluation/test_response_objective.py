@@ -108,7 +108,7 @@ def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None
     assert info["layout"] == (TAKEN,)
 
 
-@pytest.mark.parametrize("method", ["greedy", "annealing", "winners", "genetic", "nsga2", "random"])
+@pytest.mark.parametrize("method", ["population_annealing", "genetic", "nsga2", "random"])
 def test_searches_harden_without_spending_blasts_on_it(method: str) -> None:
     pytest.importorskip("pymoo")
     scenario = glazed_yard(charges="mean")

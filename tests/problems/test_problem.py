@@ -66,7 +66,7 @@ def test_a_hidden_charge_takes_a_blast_a_place_or_fewer() -> None:
         own.evaluate([Piece(4, 0, "low_wall", True)])
 
 
-@pytest.mark.parametrize("name", ["random", "genetic_from_rules"])
+@pytest.mark.parametrize("name", ["random", "genetic"])
 def test_searches_of_the_package_stay_within_the_budget(name: str) -> None:
     own = problem(12)
     layout = find_method(name)(own, 1)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blast_agents.search import GreedySearch, LayoutProblem
+from blast_agents.search import LayoutProblem, RandomSearch
 
 import blast_env
 from blast_env.engines.gas import GasEngine
@@ -112,7 +112,7 @@ def test_environment_and_search_take_it_where_it_pays() -> None:
     assert reward < 0.0
     evaluator = BlastEvaluator(scenario, SHORT)
     case = visible_case(scenario, scenario.sample_charge(np.random.default_rng(0)), [0])
-    found = GreedySearch().propose(LayoutProblem(evaluator, case), 30, 0)
+    found = RandomSearch().propose(LayoutProblem(evaluator, case), 30, 0)
     assert found.layout
     assert AWAY not in found.layout
 

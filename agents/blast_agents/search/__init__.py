@@ -2,13 +2,9 @@
 
 from blast_agents.search.evolution import GeneticSearch, Nsga2Search
 from blast_agents.search.methods import (
-    AnnealingSearch,
     BestRuleSearch,
-    ExhaustiveSearch,
-    FromRulesSearch,
-    GreedySearch,
+    PopulationAnnealingSearch,
     RandomSearch,
-    WinnersSearch,
 )
 from blast_agents.search.problem import (
     Candidate,
@@ -34,19 +30,16 @@ from blast_agents.search.session import Plan, Search, SearchSession
 from blast_env.geometry import Layout
 
 __all__ = [
-    "AnnealingSearch",
     "BestRuleSearch",
     "Candidate",
-    "ExhaustiveSearch",
-    "FromRulesSearch",
     "GeneticSearch",
-    "GreedySearch",
     "Layout",
     "LayoutAgent",
     "LayoutProblem",
     "Need",
     "Nsga2Search",
     "Plan",
+    "PopulationAnnealingSearch",
     "Progress",
     "Proposal",
     "Proposer",
@@ -58,7 +51,6 @@ __all__ = [
     "Search",
     "SearchResult",
     "SearchSession",
-    "WinnersSearch",
     "find_proposer",
     "layouts_by_rule",
     "proposers",

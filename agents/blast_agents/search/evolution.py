@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_agents.search.moves import Draw, Moves, random_part, random_walls
+from blast_agents.search.registry import rule_layouts
 from blast_agents.search.session import Search, SearchSession
 from blast_env.geometry import Layout
 
@@ -31,8 +32,8 @@ class GeneticSearch(Search):
     and a generation has half as many children.
 
     Attributes:
-        initial: Initial layouts, in addition to random ones. None by default, so that results do
-            not derive from a rule.
+        initial: Initial layouts, in addition to those of the rules and random ones.
+        from_rules: Whether the layouts of the rules are among the initial ones.
         draw: Draws the random initial layouts.
         starting_share: Share of the exploration spent on random initial layouts.
         crossed_share: Share of the pairs of parents that are crossed; all children are mutated.
@@ -40,6 +41,7 @@ class GeneticSearch(Search):
     """
 
     initial: tuple[Layout, ...] = ()
+    from_rules: bool = True
     draw: Draw = random_walls
     starting_share: float = 0.25
     crossed_share: float = 0.5
@@ -63,7 +65,8 @@ class GeneticSearch(Search):
 
         count = max(size, round(self.starting_share * plan.exploring_layouts))
         drawn = (self.draw(scenario, session.rng) for _ in range(count))
-        session.assess([*self.initial, *drawn])
+        of_rules = rule_layouts(session.problem) if self.from_rules else ()
+        session.assess([*self.initial, *of_rules, *drawn])
         first = session.ranked(plan.threats)[:size]
         made = operators(Moves(scenario), first, self.crossed_share, self.more_moves)
         algorithm = GA(pop_size=size, n_offsprings=max(2, size // 2), **made)

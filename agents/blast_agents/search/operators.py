@@ -96,7 +96,7 @@ def mixed(first: Layout, second: Layout, rng: np.random.Generator) -> Layout:
 
 
 class MoveMutation(Mutation):
-    """Mutation by one or more moves of the neighbourhood that annealing uses too.
+    """Mutation by one or more moves of the neighbourhood that population annealing uses too.
 
     Args:
         moves: The neighbourhood.

@@ -92,21 +92,11 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
         ),
         "genetic": ProposerRow(f"{_EVOLUTION}:GeneticSearch", "genetic search"),
         "nsga2": ProposerRow(f"{_EVOLUTION}:Nsga2Search", "genetic search for load and cost"),
-        "annealing": ProposerRow(f"{_METHODS}:AnnealingSearch", "annealing"),
-        "winners": ProposerRow(f"{_METHODS}:WinnersSearch", "annealing by several walkers"),
-        "greedy": ProposerRow(f"{_METHODS}:GreedySearch", "greedy search"),
+        "population_annealing": ProposerRow(
+            f"{_METHODS}:PopulationAnnealingSearch", "population annealing"
+        ),
         "random": ProposerRow(f"{_METHODS}:RandomSearch", "random search"),
-        "exhaustive": ProposerRow(f"{_METHODS}:ExhaustiveSearch", "exhaustive search"),
         "best_rule": ProposerRow(f"{_METHODS}:BestRuleSearch", "the best rule"),
-        "annealing_from_rules": ProposerRow(
-            f"{_METHODS}:ANNEALING_FROM_RULES", "annealing from the rules"
-        ),
-        "winners_from_rules": ProposerRow(
-            f"{_METHODS}:WINNERS_FROM_RULES", "annealing by several walkers from the rules"
-        ),
-        "genetic_from_rules": ProposerRow(
-            f"{_METHODS}:GENETIC_FROM_RULES", "genetic search from the rules"
-        ),
         "surrogate": ProposerRow(
             "blast_agents.surrogate.search:packaged_search",
             "search by the surrogate",
@@ -243,3 +233,8 @@ def layouts_by_rule(scenario: AnyScenario, charge: AnyCharge | None = None) -> d
         except BlastEnvError:  # the rule has no layout, for example a wall without a line of sight
             continue
     return layouts
+
+
+def rule_layouts(problem: LayoutProblem) -> tuple[Layout, ...]:
+    """Return the distinct layouts of the rules for a problem."""
+    return tuple(dict.fromkeys(layouts_by_rule(problem.scenario, problem.told).values()))

@@ -131,11 +131,6 @@ class SearchSession:
         return self._history[-1] if self._history else None
 
     @property
-    def exploring_left(self) -> int:
-        """Number of exploring blasts that are left."""
-        return max(0, self._limit - self.blasts)
-
-    @property
     def exploring_share(self) -> float:
         """Share of the exploring blasts that is spent."""
         return self.blasts / self._limit
