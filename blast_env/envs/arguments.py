@@ -36,8 +36,8 @@ def checked_keywords(
         for name in kwargs:
             if name == "autoreset_mode":
                 raise UnknownArgumentError(
-                    f"{function.__qualname__}() resets nothing by itself: with the vectorization "
-                    f"modes 'sync' and 'async', give vector_kwargs={{{name!r}: ...}}"
+                    f"{function.__qualname__}() resets nothing by itself: give make_vec "
+                    f"vector_kwargs={{{name!r}: ...}}"
                 )
             if name not in known:
                 raise UnknownArgumentError.of(function.__qualname__, name, known)

@@ -145,7 +145,7 @@ def test_every_autoreset_mode(how: AutoresetMode | str) -> None:
 
 def test_an_autoreset_mode_belongs_to_the_vector() -> None:
     few: dict[str, Any] = {"num_envs": 2, "scenario": small_scenario()}
-    with pytest.raises(TypeError, match=r"give vector_kwargs=\{'autoreset_mode'"):
+    with pytest.raises(TypeError, match=r"give make_vec vector_kwargs=\{'autoreset_mode'"):
         gym.make_vec("BlastBarrier-v0", vectorization_mode="sync", autoreset_mode="SameStep", **few)
 
 
