@@ -7,6 +7,7 @@ heights are above the ground.
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from hashlib import sha256
 from typing import Annotated, Any, Final, Self
 
@@ -252,7 +253,13 @@ class Scenario(Section):
         if problems:
             raise ScenarioError(self.name, problems)
 
-    @property
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values, without the hash of the original."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("content_hash", None)
+        return copied
+
+    @cached_property
     def content_hash(self) -> str:
         """SHA-256 of all that affects results, without texts for readers.
 

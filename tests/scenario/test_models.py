@@ -260,3 +260,15 @@ def test_a_charge_that_does_not_fit_has_the_problems_of_the_whole_document(charg
         with pytest.raises(ScenarioError) as found:
             change()
         assert str(found.value) == str(expected.value)
+
+
+def test_a_copy_has_a_hash_of_its_own() -> None:
+    """The hash is computed once for each scenario, and copies take over what a scenario holds."""
+    scenario = load_scenario("courtyard")
+    before = scenario.content_hash
+    lighter = tuple(each.model_copy(update={"tnt_kg": 50.0}) for each in scenario.charge)
+    copied = scenario.model_copy(update={"charge": lighter})
+    assert copied.content_hash != before
+    assert copied.model_copy(update={"charge": scenario.charge}).content_hash == before
+    assert scenario == load_scenario("courtyard")
+    assert copied != scenario
