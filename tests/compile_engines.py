@@ -41,7 +41,6 @@ def gas_engine(precision: Literal["single", "double"]) -> None:
     set_charge(solver, charge)
     for _ in range(4):  # hot gas is cooled at every fourth
         solver.step()
-    solver.largest_overpressure_pa()
 
 
 def surrogate() -> None:

@@ -67,11 +67,6 @@ class LayoutSpace:
         counts: IntArray = np.array([1 + len(options) for options in self.options])
         return counts
 
-    @property
-    def is_binary(self) -> bool:
-        """Whether every place has two choices, a module or none."""
-        return bool((self.choices == 2).all())
-
     def layout(self, choices: Sequence[int] | IntArray) -> Layout:
         """Return the layout of a vector of choices, legal or not (`BenchmarkProblem.check`).
 

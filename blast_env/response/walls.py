@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from functools import cached_property
-from typing import Annotated, Final, Literal, Protocol
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
@@ -117,26 +117,6 @@ _ASSUMED: Final = (
 REINFORCED_MASONRY_LIMITS: Final = Limits((1.0, None, None, None), (None, 2.0, 8.0, 15.0), _ASSUMED)
 STEEL_LIMITS: Final = Limits((1.0, 3.0, 6.0, 10.0), (None, None, None, None), _ASSUMED)
 TIMBER_LIMITS: Final = Limits((1.0, 2.0, 3.0, 4.0), (None, None, None, None), _ASSUMED)
-
-
-class PanelSection(Protocol):
-    """Section of a panel, per metre of width."""
-
-    @property
-    def mass_kg_m2(self) -> float:
-        """Mass per area."""
-
-    @property
-    def moment_n(self) -> float:
-        """Moment at which it yields or cracks, N m per m."""
-
-    @property
-    def bending_stiffness_n_m(self) -> float:
-        """E I, N m2 per m."""
-
-    @property
-    def limits(self) -> Limits:
-        """Limits between its levels of damage."""
 
 
 class _Section(BaseModel):

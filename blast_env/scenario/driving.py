@@ -149,14 +149,6 @@ class SpeedField:
         state = self._hit(rectangle, among)
         return None if state is None else self._hit_km_h(state)
 
-    def way_to_impact(self, rectangle: Rectangle) -> tuple["WayPoint", ...]:
-        """Return the way to a rectangle with the largest impact speed; empty if there is none."""
-        state = self._hit(rectangle)
-        if state is None:
-            return ()
-        way = self._way(state)
-        return (*way, way[-1]._replace(speed_km_h=self._hit_km_h(state)))
-
     def way_to(self, place_m: PointM) -> tuple["WayPoint", ...]:
         """Return a way to a place with the largest speed there; empty if there is none."""
         x, y = (round(each / STEP_M) for each in place_m)

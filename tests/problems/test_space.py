@@ -42,10 +42,9 @@ def test_keys_reach_what_the_budget_pays_for() -> None:
     assert np.mean(pieces) > 0.4 * space.most_pieces
 
 
-def test_choices_are_binary_without_a_catalogue() -> None:
-    yard, street = (LayoutSpace(load_scenario(name)) for name in ("courtyard", "control_room"))
-    assert yard.is_binary
-    assert not street.is_binary
+def test_without_a_catalogue_each_free_cell_has_two_choices() -> None:
+    yard = LayoutSpace(load_scenario("courtyard"))
+    assert (yard.choices == 2).all()
     assert len(yard.places) == int(Placement.empty("courtyard").free.sum())
 
 

@@ -34,18 +34,6 @@ _CELLS_PER_CALL: Final = 1_000_000
 _DTYPES: Final = {"single": np.float32, "double": np.float64}
 
 
-def state_bytes(
-    grid: GasGrid,
-    precision: Literal["single", "double"] = "single",
-    *,
-    with_fuel: bool = False,
-) -> int:
-    """Return the memory of the state and the codes of a grid, the only full arrays, in bytes."""
-    nx, ny, nz = grid.array_shape
-    per_cell = np.dtype(_DTYPES[precision]).itemsize * (6 if with_fuel else 5) + 1
-    return nx * ny * nz * per_cell
-
-
 class Totals(NamedTuple):
     """Sums over the air cells.
 
@@ -398,10 +386,6 @@ class GasSolver:
         """Return the overpressures in a layer of cells, along the two other axes."""
         inner = self.state[(slice(None), *self.grid.inner)]
         return self.pressure_pa * self._excess(np.take(inner, layer, axis=3 - axis)).T
-
-    def largest_overpressure_pa(self) -> float:
-        """Return the largest absolute overpressure in the gas."""
-        return self.pressure_pa * float(state.largest_excess(self.state, self.box))
 
     def totals(self) -> Totals:
         """Return mass, momentum and energy of the gas in the grid, without the skirt."""

@@ -81,21 +81,6 @@ def fastest_signal(state: Reals) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
-def largest_excess(state: Reals, box: NDArray[np.int64]) -> float:
-    """Return the largest absolute overpressure in a box, in units of still air's pressure."""
-    largest = 0.0
-    for z in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            for x in range(box[4], box[5]):
-                motion = 0.0
-                for k in range(X_MOMENTUM, ENERGY):
-                    motion += state[k, z, y, x] ** 2
-                inner = state[ENERGY, z, y, x] - 0.5 * motion / state[DENSITY, z, y, x]
-                largest = max(largest, abs((GAMMA - 1.0) * inner - 1.0))
-    return largest
-
-
-@njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
     """Remove layers of still air from the six sides of a box, at most `most` from each."""
     for side in range(6):

@@ -9,7 +9,7 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.physics.gas.grid import GasGrid
 from blast_env.physics.gas.probes import LoadTable, Snapshots
-from blast_env.physics.gas.solver import Burning, GasSolver, Settling, state_bytes
+from blast_env.physics.gas.solver import Burning, GasSolver, Settling
 
 WRONG: Any = "wall"
 AIR = np.zeros((4, 3, 2), dtype=bool)
@@ -52,9 +52,3 @@ def test_places_in_the_grid() -> None:
     assert GRID.centres_m(0).tolist() == [1.25, 1.75, 2.25, 2.75]
     assert GRID.cell_at((1.0, 2.6, 0.9)) == (0, 1, 1)
     assert GRID.cell_at((3.0, 3.5, 1.0)) == (3, 2, 1)
-
-
-def test_memory_is_known_beforehand() -> None:
-    solver = GasSolver(GRID, precision="double", with_fuel=True)
-    expected = solver.state.nbytes + solver.state[0].size
-    assert state_bytes(GRID, "double", with_fuel=True) == expected
