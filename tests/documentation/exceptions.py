@@ -45,9 +45,6 @@ _TRAIN: Final = (
     "--steps 64 --envs 1 --set n_steps=64 --set batch_size=64 --set evaluation_cases=2"
     " --set evaluation_interval=1"
 )
-_TRAIN_SITES: Final = (
-    "--steps 120 --set n_steps=120 --set evaluation_cases=2 --set evaluation_interval=1"
-)
 _LABEL: Final = (
     "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
     " --set first_updates=2 --set updates=1 --set evaluation_cases=2"

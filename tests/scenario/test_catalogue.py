@@ -232,13 +232,6 @@ def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None
     assert again.cost == placement.cost
 
 
-WITH_CONDITIONS = {
-    "keep_outs": [{**AREA, "corner_m": (3.5, 9.0), "reason": "a tree"}],
-    "clearance_m": 1.0,
-    "access_way": {"width_m": 1.0, "between": "left_right"},
-}
-
-
 @pytest.mark.parametrize(
     ("piece", "words"),
     [
