@@ -1,5 +1,7 @@
 """`blast-env import`: a site from a map or drawing."""
 
+import json
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +16,7 @@ from blast_env.cli.output import (
     save_pictures,
 )
 from blast_env.cli.targets import PICTURES
+from blast_env.files import write_atomically
 from blast_env.importing.options import ImportOptions
 from blast_env.scenario import save_scenario
 
@@ -39,6 +42,11 @@ class ImportCommand(ImportOptions, Command):
     picture: Path | None = option(
         None, "Write a plan, outlines over modules: .png, .svg, .pdf.", writes=PICTURES
     )
+    ledger: Path | None = option(
+        None,
+        "Write the ledger, all that was read, merged, closed, guessed and left out: .txt, .json.",
+        writes=(".txt", ".json"),
+    )
     as_json: bool = option(False, "Print the report as JSON.", flag="--json")
 
     def __call__(self) -> None:
@@ -49,6 +57,9 @@ class ImportCommand(ImportOptions, Command):
         imported = import_site(self.file, self)
         save_scenario(imported.scenario, self.out)
         written = [self.out, *save_pictures(lambda: _pictures(imported, self.picture))]
+        if self.ledger is not None:
+            _write_ledger(imported, self.ledger)
+            written.append(self.ledger)
         if self.as_json:
             print_json(_record(imported, written))
         else:
@@ -62,6 +73,13 @@ def _pictures(imported: "ImportedSite", path: Path | None) -> list[Path]:
     from blast_env.rendering.imported_site import imported_plan
 
     return [save_figure(imported_plan(imported), path)]
+
+
+def _write_ledger(imported: "ImportedSite", path: Path) -> None:
+    is_json = path.suffix.lower() == ".json"
+    text = json.dumps(imported.ledger.record, indent=1) if is_json else imported.ledger.text
+    with write_atomically(path) as target:
+        target.write_text(text, encoding="utf-8")
 
 
 def _print(imported: "ImportedSite", written: list[Path]) -> None:
@@ -87,6 +105,8 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
         f"places of charges: {len(imported.scenario.charge)}; particle engines use the preset "
         f"{imported.scenario.simulation.preset}"
     )
+    sums = Counter(each.deed for each in imported.ledger.entries)
+    print_line(f"ledger: {', '.join(f'{deed} {count}' for deed, count in sums.items())}")
     for note in imported.notes:
         print_line(f"note: {note}")
     print_written(written)
@@ -101,6 +121,7 @@ def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:
         "buildings": [_building(each) for each in imported.buildings],
         "charges": len(imported.scenario.charge),
         "notes": list(imported.notes),
+        "ledger": imported.ledger.record,
         "files": [str(path) for path in written],
     }
 

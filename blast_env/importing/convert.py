@@ -2,26 +2,25 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.buildings import prepared
 from blast_env.importing.dxf import read_dxf
-from blast_env.importing.fitting import (
-    FittedBuilding,
-    fit_buildings,
-    plain_name,
-    protected_as_asked,
-)
+from blast_env.importing.fitting import FittedBuilding, fit_buildings, plain_name
 from blast_env.importing.geojson import read_geojson
+from blast_env.importing.ledger import Deed, Ledger
 from blast_env.importing.options import CALIBRATIONS, ImportOptions
 from blast_env.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.importing.osm import read_osm
-from blast_env.importing.placing import PlacedSite, place_site
-from blast_env.importing.roles import Role, Selector, Selectors, things_of
+from blast_env.importing.placing import OUTSIDE, PlacedSite, place_site
+from blast_env.importing.protection import protected_as_asked
+from blast_env.importing.roles import Selector, Selectors, things_of
 from blast_env.importing.site_map import DrawingCoordinates, MapCoordinates, SiteMap
+from blast_env.importing.things import Role
 from blast_env.importing.threats import charge_sources
 from blast_env.importing.zone import build_zone
 from blast_env.provenance import package_version
@@ -30,6 +29,9 @@ from blast_env.scenario import Scenario, SimulationSection
 from blast_env.scenario.checks import charge_radius_m
 from blast_env.scenario.models import SCHEMA_VERSION
 from blast_env.values import path_of
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
 
 _MOST_DESCRIPTION: Final = 2000
 _HASH_DIGITS: Final = 12
@@ -46,13 +48,21 @@ class ImportedSite:
         scenario: The scenario.
         buildings: Its buildings, with the deviations of their modules from their outlines.
         site: The objects of the map in site metres.
-        notes: Omissions and missing data, one sentence each.
+        ledger: What became of every object of the file.
     """
 
     scenario: Scenario
     buildings: tuple[FittedBuilding, ...]
     site: PlacedSite
-    notes: tuple[str, ...]
+    ledger: Ledger
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Changes, guesses, omissions and missing data, one line each."""
+        if self.scenario.build_zone is not None:
+            return self.ledger.notes
+        zone = "there is no build zone: say one with --zone, --zone-around or --zone-from"
+        return (*self.ledger.notes, zone)
 
 
 def import_site(path: str | Path, options: ImportOptions | None = None) -> ImportedSite:
@@ -79,26 +89,32 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
 
 
 def _imported(path: Path, options: ImportOptions) -> ImportedSite:
-    site_map = _read(path, options)
-    things, unclear = things_of(
-        site_map, _selectors(site_map, options), options.level_height_m, options.height_from
-    )
-    site = place_site(site_map, things, options)
-    fitted, left_out = fit_buildings(site, options)
-    buildings = protected_as_asked(fitted, site, options)
+    ledger = Ledger()
+    site_map = read_map(path, options)
+    things = things_of(site_map, selectors_of(site_map, options), options, ledger)
+    site = prepared(place_site(site_map, things, options, ledger), options, ledger)
+    fitted, left_out = fit_buildings(site, options, ledger)
+    left_out = (*left_out, *site.faulty)
+    buildings = protected_as_asked(fitted, left_out, site, options, ledger)
     simulation = SimulationSection(preset=options.preset)
-    sources = charge_sources(site, buildings, charge_radius_m(simulation.parameters), options)
+    radius_m = charge_radius_m(simulation.parameters)
+    sources, streets = charge_sources(site, buildings, radius_m, options, ledger)
     zone = build_zone(site, buildings, options)
-    notes = (*site_map.notes, *unclear, *left_out)
-    if zone is None:
-        notes += ("there is no build zone: say one with --zone, --zone-around or --zone-from",)
+    used = {
+        **dict.fromkeys(streets, str(Role.CHARGE)),
+        **{each.place: str(Role.BUILDING) for each in buildings},
+        **_others(site, buildings, options, ledger),
+    }
+    ledger.settle((*site_map.features, *site_map.lost), used)
+    if options.strict:
+        ledger.check_strict(path)
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": options.name or plain_name(path.name.split(".")[0]) or "site",
-        "description": _description(path, site, buildings, options),
+        "description": _description(path, site, buildings, options, ledger),
         "site": {"width_m": site.size_m[0], "height_m": site.size_m[1]},
         "charge": sources,
-        "structures": [part for building in buildings for part in _structures(building)],
+        "structures": [part for building in buildings for part in _structures(building, buildings)],
         "simulation": {"preset": options.preset},
         "georeference": site.georeference.model_dump(),
     }
@@ -106,7 +122,33 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
         document["build_zone"] = zone
     if options.preset in CALIBRATIONS:
         document["calibration"] = CALIBRATIONS[options.preset]
-    return ImportedSite(Scenario.from_document(document, str(path)), buildings, site, notes)
+    scenario = Scenario.from_document(document, str(path))
+    return ImportedSite(scenario, buildings, site, ledger)
+
+
+def _others(
+    site: PlacedSite,
+    buildings: tuple[FittedBuilding, ...],
+    options: ImportOptions,
+    ledger: Ledger,
+) -> dict[str, str]:
+    """Return the roles of the outlines and texts that are used, by their places in the file."""
+    built = shapely.union_all([each.outline for each in buildings])
+    used = {}
+    for each in site.things:
+        if each.role in (Role.BUILDING, Role.CHARGE):
+            continue
+        if each.role is Role.NAME:
+            is_used, why = bool(shapely.intersects(each.geometry, built)), "texts beside buildings"
+        elif each.role is Role.ZONE and (options.zone_m or options.zone_around_m):
+            is_used, why = False, "zones of the map, for another is asked for"
+        else:
+            is_used, why = bool(shapely.intersects(each.geometry, site.box)), OUTSIDE
+        if is_used:
+            used[each.place] = str(each.role)
+        else:
+            ledger.add(Deed.PASSED, why, each.place, each.name)
+    return used
 
 
 def _read_as_geojson(path: Path, options: ImportOptions) -> SiteMap:
@@ -127,7 +169,7 @@ def _read_as_dxf(path: Path, options: ImportOptions) -> SiteMap:
     coordinates = site_map.coordinates
     if isinstance(coordinates, DrawingCoordinates) and coordinates.metres_per_unit != 1.0:
         raise BlastEnvError(f"{path}: --crs needs a drawing in metres: say --units m if it is")
-    return SiteMap(path, MapCoordinates(options.crs), site_map.features, site_map.notes)
+    return replace(site_map, coordinates=MapCoordinates(options.crs))
 
 
 _READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = MappingProxyType(
@@ -140,7 +182,7 @@ _READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = Mappin
 )
 
 
-def _read(path: Path, options: ImportOptions) -> SiteMap:
+def read_map(path: Path, options: ImportOptions) -> SiteMap:
     """Return the map of a file, read by its suffix."""
     name = path.name.lower()
     for suffix, reader in _READERS.items():
@@ -154,7 +196,7 @@ def _refuse(value: object, option: str, what: str) -> None:
         raise BlastEnvError(f"{option} is not for {what}")
 
 
-def _selectors(site_map: SiteMap, options: ImportOptions) -> Selectors:
+def selectors_of(site_map: SiteMap, options: ImportOptions) -> Selectors:
     """Return the selectors of the user; roles without any follow the usual tags."""
     is_drawing = any("layer" in each.tags for each in site_map.features)
     chosen = {
@@ -170,9 +212,13 @@ def _selectors(site_map: SiteMap, options: ImportOptions) -> Selectors:
     }
 
 
-def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
-    """Return the structures of a building, with a total weight of 1."""
-    length_m = sum(each.polygon.length for each in building.polygons)
+def _structures(
+    building: FittedBuilding, buildings: tuple[FittedBuilding, ...]
+) -> list[dict[str, Any]]:
+    """Return the structures of a building; with its parts they have a total weight of 1."""
+    group = [each for each in buildings if each.group == building.group]
+    walls = [(each, part.polygon.length) for each in group for part in each.polygons]
+    whole = sum(length_m * each.wall_height_m for each, length_m in walls)
     parts = []
     for name, each in zip(building.part_names, building.polygons, strict=True):
         outline, *courtyards = ([list(place) for place in ring] for ring in each.rings)
@@ -184,9 +230,9 @@ def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
         }
         if courtyards:
             part["courtyards_m"] = courtyards
-        if len(building.polygons) > 1:
-            part["building"] = building.name
-            part["weight"] = round(each.polygon.length / length_m, 6)
+        if len(walls) > 1:
+            part["building"] = group[0].name
+            part["weight"] = round(each.polygon.length * building.wall_height_m / whole, 6)
         if building.height_m is not None:
             part["height_m"] = building.height_m
         if building.base_m:
@@ -198,7 +244,11 @@ def _structures(building: FittedBuilding) -> list[dict[str, Any]]:
 
 
 def _description(
-    path: Path, site: PlacedSite, buildings: tuple[FittedBuilding, ...], options: ImportOptions
+    path: Path,
+    site: PlacedSite,
+    buildings: tuple[FittedBuilding, ...],
+    options: ImportOptions,
+    ledger: Ledger,
 ) -> str:
     """Return the description of the site: source, buildings, rotation and deviations."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
@@ -213,4 +263,6 @@ def _description(
         f"{farthest.deviation.outline_m:.2f} m of its outline ({farthest.name}). Charges of "
         f"{options.tnt_kg:g} kg TNT unless the file says another mass."
     )
+    if ledger.summary:
+        text += f" Changes to the map: {ledger.summary}."
     return text[:_MOST_DESCRIPTION]

@@ -9,12 +9,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.errors import BlastEnvError, import_extra
 from blast_env.geometry import Rectangle
-from blast_env.importing.cells import Deviation, check_outlines, mended
+from blast_env.importing.cells import Deviation, check_outlines
+from blast_env.importing.ledger import Deed, Ledger
 from blast_env.importing.options import ImportOptions
-from blast_env.importing.placing import PlacedSite
-from blast_env.importing.roles import Role, Thing
+from blast_env.importing.placing import OUTSIDE, PlacedSite
+from blast_env.importing.things import Role, Thing
 from blast_env.physics.footprint import Footprint, footprint_of
 from blast_env.units import MODULE_SIDE_M
 
@@ -32,8 +33,7 @@ _JOINED_M: Final = 0.05  # gap between buildings that is closed
 _MUCH_AREA: Final = 0.2
 _FAR_M: Final = 1.0
 _LEAST_PART_M2: Final = 0.5 * MODULE_SIDE_M**2
-_QUARTER_SIDES: Final = 4
-"""A circle is a polygon of 16 sides."""
+_THIN: Final = "buildings below others, or that cover the centre of no module"
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class FittedBuilding:
         base_m: Height of its underside above the ground, m.
         protected: Whether its load counts.
         carries: Whether it is a terrace.
+        part_of: Place in the file of the building of which it is a part, or an empty string.
         deviation: Deviation of the modules from the outline.
         is_cut: Whether the site's border cuts it.
     """
@@ -63,6 +64,7 @@ class FittedBuilding:
     base_m: float
     protected: bool
     carries: bool
+    part_of: str
     deviation: Deviation
     is_cut: bool
 
@@ -77,6 +79,16 @@ class FittedBuilding:
         )
 
     @property
+    def group(self) -> str:
+        """Place in the file of the whole building."""
+        return self.part_of or self.place
+
+    @property
+    def wall_height_m(self) -> float:
+        """Height of its walls, m; 1 if it is as high as the air."""
+        return 1.0 if self.height_m is None else self.height_m - self.base_m
+
+    @property
     def boxes_m(self) -> tuple[Rectangle, ...]:
         """The modules in rectangles, site metres."""
         return tuple(box for each in self.polygons for box in each.boxes_m)
@@ -88,38 +100,28 @@ class FittedBuilding:
 
 
 def fit_buildings(
-    site: PlacedSite, options: ImportOptions
-) -> tuple[tuple[FittedBuilding, ...], tuple[str, ...]]:
-    """Return the buildings of a site as polygons, and notes on omissions.
+    site: PlacedSite, options: ImportOptions, ledger: Ledger
+) -> tuple[tuple[FittedBuilding, ...], tuple[Thing, ...]]:
+    """Return the buildings of a site as polygons, and those that are left out.
 
     Raises:
         BlastEnvError: If there is no building, or there are too many.
     """
-    kept, notes = _kept(site, options)
+    kept, left_out = _kept(site, options, ledger)
     if not kept:
         raise BlastEnvError(f"{site.path}: there is no building on the site{_hint(site)}")
-    said = sum(each.carries for each in kept)
-    kept = [
-        replace(each, carries=each.carries and _height_m(each, options) is not None)
-        for each in kept
-    ]
-    topless = said - sum(each.carries for each in kept)
-    if topless:
-        notes.append(f"terraces without a height, on which nothing stands: {topless}")
     kept.sort(key=lambda each: (each.carries, -each.geometry.area))
     polygons = _polygons(kept)
-    lost = [each for each, own in zip(kept, polygons, strict=True) if not own]
-    if lost:
-        notes.append(
-            "buildings below others, or that cover the centre of no module, which were left out: "
-            + ", ".join(f"{each.place} ({shortened(each.name)})" for each in lost)
-        )
+    for each, own in zip(kept, polygons, strict=True):
+        if not own:
+            ledger.add(Deed.LEFT_OUT, _THIN, each.place, each.name)
+            left_out.append(replace(each, fault=_THIN))
     kept = [each for each, own in zip(kept, polygons, strict=True) if own]
     polygons = [own for own in polygons if own]
     count = sum(map(len, polygons))
     if count > MOST_STRUCTURES:
         raise _too_many(site, f"the buildings take {count} structures, must take")
-    heights = [_height_m(each, options) for each in kept]
+    heights = [_height_m(each) for each in kept]
     titles = [each.name for each in kept]
     buildings = [
         FittedBuilding(
@@ -132,55 +134,27 @@ def fit_buildings(
             base_m=_base_m(thing, height_m),
             protected=thing.protected,
             carries=thing.carries,
+            part_of=thing.part_of,
             deviation=Deviation.between(thing.geometry, _modules(own)),
             is_cut=_touches_border(thing.geometry, site),
         )
         for name, thing, own, height_m in zip(_names(titles), kept, polygons, heights, strict=True)
     ]
-    notes += _far_off(buildings)
-    without = sum(height_m is None for height_m in heights)
-    if without:
-        notes.append(
-            "buildings without a height in the file, which are as high as the air "
-            f"(--default-height): {without} of {len(heights)}"
-        )
-    return tuple(buildings), tuple(notes)
+    _enter_far_off(buildings, ledger)
+    return tuple(buildings), tuple(left_out)
 
 
-def protected_as_asked(
-    buildings: Sequence[FittedBuilding], site: PlacedSite, options: ImportOptions
-) -> tuple[FittedBuilding, ...]:
-    """Return the buildings, with those protected that the user named, or else the file marks.
+def _kept(
+    site: PlacedSite, options: ImportOptions, ledger: Ledger
+) -> tuple[list[Thing], list[Thing]]:
+    """Return the large enough buildings on the site, cut at its border, and those left out.
 
     Raises:
-        BlastEnvError: If there is no building of a name, or no building is protected.
-    """
-    chosen = {_found(buildings, name) for name in options.protect}
-    if options.protect_near is not None:
-        place = shapely.Point(site.to_site(np.array([options.protect_near]))[0])
-        chosen.add(int(np.argmin([each.outline.distance(place) for each in buildings])))
-    if not chosen:
-        chosen = {index for index, each in enumerate(buildings) if each.protected}
-    if not chosen:
-        raise BlastEnvError(
-            "no building is protected: say --protect NAME or --protect-near X Y; there are "
-            f"{_listed(buildings)}"
-        )
-    return tuple(replace(each, protected=index in chosen) for index, each in enumerate(buildings))
-
-
-def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[str]]:
-    """Return the large enough buildings on the site, cut at its border, and notes.
-
-    Raises:
-        BlastEnvError: If an outline is invalid, there are too many buildings, or their outlines
-            are too long.
+        BlastEnvError: If there are too many buildings, or their outlines are too long.
     """
     things = site.of_role(Role.BUILDING)
-    outlines = np.array(list(map(_outline, things)), dtype=object)
-    unsound = np.flatnonzero(~shapely.is_valid(outlines))
-    for index in unsound:
-        outlines[index] = _put_right(site, things[index], options)
+    outlines = np.array([each.geometry for each in things], dtype=object)
+    outlines[~shapely.intersects(shapely.envelope(outlines), site.box)] = shapely.Point()
     inside = shapely.intersection(outlines, site.box)
     parts, owner = shapely.get_parts(inside, return_index=True)
     is_area = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
@@ -198,23 +172,16 @@ def _kept(site: PlacedSite, options: ImportOptions) -> tuple[list[Thing], list[s
         )
         for index, geometry in zip(chosen, geometries, strict=True)
     ]
-    small = int((~shapely.is_empty(inside)).sum()) - len(chosen)
-    notes = []
-    if small:
-        notes.append(
-            f"buildings of less than {options.least_area_m2:g} m2 on the site, which were left "
-            f"out (--least-area): {small}"
-        )
-    if len(unsound):
-        notes.append(f"outlines that cross themselves, corrected: {len(unsound)}")
-    return kept, notes
-
-
-def _outline(thing: Thing) -> BaseGeometry:
-    """Return the outline of a building in site metres; a point with a diameter is a circle."""
-    if thing.diameter_m is None:
-        return thing.geometry
-    return shapely.buffer(thing.geometry, 0.5 * thing.diameter_m, quad_segs=_QUARTER_SIDES)
+    left_out = []
+    for thing, shape, area_m2 in zip(things, inside, areas_m2, strict=True):
+        if shape.is_empty:
+            ledger.add(Deed.PASSED, OUTSIDE, thing.place, thing.name)
+        elif area_m2 < options.least_area_m2:
+            kind = f"buildings of less than {options.least_area_m2:g} m2 (--least-area)"
+            detail = f"{area_m2:.1f} m2 on the site"
+            ledger.add(Deed.LEFT_OUT, kind, thing.place, thing.name, detail)
+            left_out.append(replace(thing, fault=kind))
+    return kept, left_out
 
 
 def _together(parts: NDArray[np.object_]) -> BaseGeometry:
@@ -227,20 +194,6 @@ def _too_many(site: PlacedSite, what: str) -> BlastEnvError:
         f"{site.path}: {what} at most {MOST_STRUCTURES}, as many structures as a scenario has: "
         "make the site smaller (--size), or leave out small buildings (--least-area)"
     )
-
-
-def _put_right(site: PlacedSite, thing: Thing, options: ImportOptions) -> BaseGeometry:
-    """Return an outline without its self-intersections.
-
-    Raises:
-        BlastEnvError: If `repair` is off, or it crosses itself too often.
-    """
-    words = f" ({shortened(thing.name)})" if thing.name else ""
-    what = f"{site.path}: {thing.place}{words}: the outline"
-    if not options.repair:
-        reason = str(shapely.is_valid_reason(thing.geometry)).split("[")[0].strip().lower()
-        raise BlastEnvError(f"{what} is not sound: {reason}; --repair corrects such outlines")
-    return mended(thing.geometry, what)
 
 
 def _written_in(site: PlacedSite, outline: BaseGeometry) -> str:
@@ -312,22 +265,21 @@ def _modules(polygons: Sequence[Footprint]) -> BaseGeometry:
     return shapely.union_all([shapely.box(*box) for each in polygons for box in each.boxes_m])
 
 
-def _far_off(buildings: Iterable[FittedBuilding]) -> Iterator[str]:
-    """Yield a note on each building that modules cannot show well, such as a thin wall."""
+def _enter_far_off(buildings: Iterable[FittedBuilding], ledger: Ledger) -> None:
+    """Enter in the ledger the buildings that modules cannot show well, such as thin walls."""
     for each in buildings:
         own = each.deviation
         if own.area_share > _MUCH_AREA or own.outline_m > _FAR_M:
-            yield (
-                f"{each.place}: {shortened(each.title) or each.name}: modules miss"
-                f" {own.area_share:.1%} of its area and are up to {own.outline_m:.2f} m off its"
-                " outline"
-            )
+            detail = f"{own.area_share:.1%} of its area, {own.outline_m:.2f} m of its outline"
+            kind = "shapes of buildings that modules miss by much"
+            ledger.add(Deed.GUESSED, kind, each.place, each.title or each.name, detail)
 
 
-def _height_m(thing: Thing, options: ImportOptions) -> float | None:
+def _height_m(thing: Thing) -> float | None:
     """Return the height of a building, m, in whole modules; `None` if it is unknown."""
-    height_m = thing.height_m or options.default_height_m
-    return None if height_m is None else max(round(height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
+    if thing.height_m is None:
+        return None
+    return max(round(thing.height_m / MODULE_SIDE_M), 1) * MODULE_SIDE_M
 
 
 def _base_m(thing: Thing, height_m: float | None) -> float:
@@ -371,21 +323,6 @@ def _letters(number: int) -> str:
         number, letter = divmod(number - 1, 26)
         text = chr(ord("a") + letter) + text
     return text
-
-
-def _found(buildings: Sequence[FittedBuilding], name: str) -> int:
-    """Return the index of the building of a name, the scenario's or the map's."""
-    for index, each in enumerate(buildings):
-        if name.casefold() in (each.name.casefold(), each.title.casefold()):
-            return index
-    raise BlastEnvError(f"--protect is {name!r}, but there are {_listed(buildings)}")
-
-
-def _listed(buildings: Sequence[FittedBuilding]) -> str:
-    """Return the names of up to 20 buildings, and the number of further ones."""
-    shown = [each.name for each in buildings[:20]]
-    more = len(buildings) - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
 def _hint(site: PlacedSite) -> str:

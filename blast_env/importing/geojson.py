@@ -11,6 +11,7 @@ from blast_env.importing.site_map import (
     MOST_COORDINATE,
     MOST_FEATURES,
     DrawingCoordinates,
+    LostFeature,
     MapCoordinates,
     MapFeature,
     SiteMap,
@@ -55,16 +56,16 @@ def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
     listed = _listed_features(path, document)
     if len(listed) > MOST_FEATURES:
         raise too_many(path)
-    features, empty = [], 0
+    features, lost = [], []
     for index in range(len(listed)):
         item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
         feature = _feature(path, f"features[{index}]", item)
-        if feature is None:
-            empty += 1
+        if isinstance(feature, LostFeature):
+            lost.append(feature)
         else:
             features.append(feature)
-    notes = (f"features without a geometry, which were left out: {empty}",) if empty else ()
-    return SiteMap(path, _coordinates(path, document, crs), tuple(features), notes)
+    coordinates = _coordinates(path, document, crs)
+    return SiteMap(path, coordinates, tuple(features), tuple(lost))
 
 
 def _parsed(path: Path) -> Mapping[str, Any]:
@@ -107,14 +108,15 @@ def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:
     )
 
 
-def _feature(path: Path, place: str, item: Any) -> MapFeature | None:
-    """Return a feature, or `None` for one without a geometry, which GeoJSON allows."""
+def _feature(path: Path, place: str, item: Any) -> MapFeature:
+    """Return a feature; one without a geometry, which GeoJSON allows, is lost."""
     if not isinstance(item, dict) or item.get("type") != "Feature":
         raise BlastEnvError(f"{path}: {place}: is not a Feature")
-    if item.get("geometry") is None:
-        return None
-    geometry = _geometry(path, place, item["geometry"])
-    return None if geometry.is_empty else MapFeature(geometry, _tags(item), place)
+    given = item.get("geometry")
+    geometry = shapely.Point() if given is None else _geometry(path, place, given)
+    if geometry.is_empty:
+        return LostFeature(geometry, _tags(item), place, "features without a geometry")
+    return MapFeature(geometry, _tags(item), place)
 
 
 def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:

@@ -93,11 +93,15 @@ class ImportOptions:
     preset: str = option("collisional", "Parameters of the particle model.")
     height_from: str | None = option(None, "Property with the height.")
     default_height_m: float | None = option(
-        None, "Height of buildings without one, m.", show_default="as high as the air"
+        None,
+        "Height of buildings without one, m.",
+        show_default="guessed from neighbours and kind",
     )
+    low_heights: bool = option(False, "Take the low guess of heights that the file does not have.")
     level_height_m: float = option(3.0, "Height of a storey, m.")
     least_area_m2: float = option(4.0, "Leave out smaller buildings, m2.")
     repair: bool = option(False, "Put outlines right that cross themselves.")
+    strict: bool = option(False, "Refuse a file where anything was guessed or left out.")
 
     def __post_init__(self) -> None:
         """Check the options; see the class for the errors."""

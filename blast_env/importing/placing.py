@@ -3,6 +3,7 @@
 The site has the direction of most walls; the grid is aligned with as many walls as possible.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,10 +14,12 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.joining import closed, with_courtyards
+from blast_env.importing.ledger import Deed, Ledger
 from blast_env.importing.options import MOST_SITE_M, ImportOptions
 from blast_env.importing.plane import Plane, plane_around, rotated
-from blast_env.importing.roles import Role, Thing
-from blast_env.importing.site_map import SiteMap
+from blast_env.importing.site_map import DrawingCoordinates, SiteMap
+from blast_env.importing.things import Role, Thing
 from blast_env.scenario.sections import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M
 
@@ -91,10 +94,7 @@ def _densest(values: FloatArray, weights: FloatArray, period: float, near: float
     return float((best + median) % period)
 
 
-with import_extra("maps", "maps and drawings"):
-    import shapely
-    from shapely.geometry.base import BaseGeometry
-
+OUTSIDE: Final = "outside the site"
 _HAIR_M: Final = 0.01
 _ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
 
@@ -110,6 +110,7 @@ class PlacedSite:
         corner_m: The site's lower left corner in the turned plane.
         shape: Rows and columns of modules.
         things: Objects on the site or near it.
+        faulty: Objects on the site or of an unknown place that cannot be used.
         layers: Layers of a drawing.
     """
 
@@ -119,6 +120,7 @@ class PlacedSite:
     corner_m: tuple[float, float]
     shape: tuple[int, int]
     things: tuple[Thing, ...]
+    faulty: tuple[Thing, ...] = ()
     layers: tuple[str, ...] = ()
 
     @property
@@ -147,23 +149,33 @@ class PlacedSite:
         return np.asarray(turned - np.array(self.corner_m))
 
 
-def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOptions) -> PlacedSite:
+def place_site(
+    site_map: SiteMap, things: Sequence[Thing], options: ImportOptions, ledger: Ledger
+) -> PlacedSite:
     """Return the site that the options specify, or one around all objects of the map.
+
+    Lines that close become outlines. The ledger gets the objects that are elsewhere or cannot be
+    used.
 
     Raises:
         BlastEnvError: If the map has no objects, the place is not on the Earth, or the site would
             be too large.
     """
+    faulty = [each for each in things if each.fault]
+    things = [each for each in things if not each.fault]
     if not things:
-        raise BlastEnvError(
-            f"{site_map.path}: has no building and no place of a charge that is marked as such; "
-            "define them with --buildings-from and --charges-from"
-        )
+        raise _nothing(site_map, faulty, options)
     plane = plane_around(site_map.coordinates, _reference(things, options))
-    near = _near(site_map, things, plane, options)
+    near = closed(_near(site_map, things, plane, options, ledger), ledger)
+    if isinstance(site_map.coordinates, DrawingCoordinates):
+        near = with_courtyards(near, ledger)
+    open_lines = [each for each in near if each.fault]
+    near = [each for each in near if not each.fault]
+    if not near or (options.size_m is None and Role.BUILDING not in {each.role for each in near}):
+        raise _nothing(site_map, [*faulty, *open_lines], options)
     rotation_deg = _rotation_deg(near, options)
     turned = _moved(near, lambda places: rotated(places, -rotation_deg))
-    left, bottom, right, top = _bounds_m(site_map, turned, plane, rotation_deg, options)
+    left, bottom, right, top = _bounds_m(turned, plane, rotation_deg, options)
     size_m = np.array([right - left, top - bottom])
     if size_m.max() > MOST_SITE_M:
         raise BlastEnvError(
@@ -182,17 +194,48 @@ def place_site(site_map: SiteMap, things: Sequence[Thing], options: ImportOption
         int(np.ceil((high - low) / MODULE_SIDE_M - _ROUNDING))
         for low, high in zip(corner, far, strict=True)
     ]
-    moved = _moved(turned, lambda places: places - np.array(corner))
     layers = sorted({str(each.tags["layer"]) for each in site_map.features if "layer" in each.tags})
-    return PlacedSite(
+    site = PlacedSite(
         path=site_map.path,
         plane=plane,
         rotation_deg=rotation_deg,
         corner_m=(corner[0], corner[1]),
         shape=(counts[1], counts[0]),
-        things=tuple(moved),
+        things=tuple(_moved(turned, lambda places: places - np.array(corner))),
         layers=tuple(layers),
     )
+    lines = _moved(open_lines, lambda places: rotated(places, -rotation_deg) - np.array(corner))
+    found = [*lines, *_moved(faulty, site.to_site)]
+    box = None if options.size_m is None else site.box
+    return replace(site, faulty=tuple(_faults(found, box, ledger)))
+
+
+def _faults(faulty: Iterable[Thing], box: BaseGeometry | None, ledger: Ledger) -> Iterator[Thing]:
+    """Yield the faulty objects on a site or of an unknown place, and enter all in the ledger.
+
+    Args:
+        faulty: The objects, in site metres.
+        box: The site; `None` if it is the whole file.
+        ledger: The ledger of the import.
+    """
+    for each in faulty:
+        if box is None or each.geometry.is_empty or shapely.intersects(each.geometry, box):
+            ledger.add(Deed.LEFT_OUT, each.fault, each.place, each.name)
+            yield each
+        else:
+            ledger.add(Deed.PASSED, OUTSIDE, each.place, each.name)
+
+
+def _nothing(site_map: SiteMap, faulty: Sequence[Thing], options: ImportOptions) -> BlastEnvError:
+    """Return the error of a map without a building."""
+    faults = Counter(each.fault for each in faulty if each.role is Role.BUILDING)
+    reasons = "; ".join(f"{count} {fault}" for fault, count in faults.items())
+    if reasons:
+        return BlastEnvError(f"{site_map.path}: has no building that can be used, but {reasons}")
+    advice = "define them with --buildings-from and --charges-from"
+    if options.buildings_from:
+        advice = f"--buildings-from {' '.join(options.buildings_from)} chooses nothing"
+    return BlastEnvError(f"{site_map.path}: has no building that is marked as such; {advice}")
 
 
 def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, float]:
@@ -213,17 +256,17 @@ def _chief(things: Sequence[Thing]) -> Sequence[Thing]:
     fixed = [
         each
         for each in things
-        if each.role is not Role.NAME and not (each.role is Role.CHARGE and _is_line(each.geometry))
+        if each.role is not Role.NAME and not (each.role is Role.CHARGE and each.is_line)
     ]
     return fixed or things
 
 
-def _is_line(geometry: BaseGeometry) -> bool:
-    return geometry.geom_type in ("LineString", "MultiLineString")
-
-
 def _near(
-    site_map: SiteMap, things: Sequence[Thing], plane: Plane, options: ImportOptions
+    site_map: SiteMap,
+    things: Sequence[Thing],
+    plane: Plane,
+    options: ImportOptions,
+    ledger: Ledger,
 ) -> list[Thing]:
     """Return the objects that may lie on the site, in metres of the plane."""
     measured = _moved(things, plane.to_metres)
@@ -235,16 +278,18 @@ def _near(
                 f"{site_map.path}: reaches too far for one site: say --centre or --origin, and "
                 "--size"
             )
-        return list(_joined(measured))
+        return list(_joined(measured, ledger))
     # The corner or the middle is the plane's reference; the site turns around it.
     reference = options.origin or options.centre
     middle = plane.to_metres(np.array([reference]))[0]
     around = shapely.Point(middle).buffer(2.0 * float(np.hypot(*options.size_m)))
-    near = np.flatnonzero(shapely.intersects(geometries, around))
-    return list(_joined(measured[index] for index in near))
+    near = shapely.intersects(geometries, around)
+    for index in np.flatnonzero(~near):
+        ledger.add(Deed.PASSED, OUTSIDE, measured[int(index)].place, measured[int(index)].name)
+    return list(_joined((measured[index] for index in np.flatnonzero(near)), ledger))
 
 
-def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
+def _joined(things: Iterable[Thing], ledger: Ledger) -> Iterator[Thing]:
     """Yield things, with the rectangles of an exported building joined again."""
     buildings: dict[str, list[Thing]] = {}
     for thing in things:
@@ -256,6 +301,9 @@ def _joined(things: Iterable[Thing]) -> Iterator[Thing]:
         # Coordinates of a file are rounded: adjoining rectangles may have a tiny gap.
         outline = shapely.union_all([each.geometry for each in parts], grid_size=_HAIR_M)
         protected = any(each.protected for each in parts)
+        for each in parts[1:]:
+            kind, detail = "rectangles of a building", f"with {parts[0].place}"
+            ledger.add(Deed.MERGED, kind, each.place, each.name, detail)
         yield replace(parts[0], geometry=outline, name=name, protected=protected)
 
 
@@ -275,7 +323,6 @@ def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
 
 
 def _bounds_m(
-    site_map: SiteMap,
     things: Sequence[Thing],
     plane: Plane,
     rotation_deg: float,
@@ -290,11 +337,6 @@ def _bounds_m(
         far = low + size
         return float(low[0]), float(low[1]), float(far[0]), float(far[1])
     chief = _chief(things)
-    if not any(each.role is Role.BUILDING for each in things):
-        raise BlastEnvError(
-            f"{site_map.path}: has no building that is marked as such; define them with "
-            "--buildings-from"
-        )
     left, bottom, right, top = (
         float(each) for each in shapely.total_bounds([each.geometry for each in chief])
     )

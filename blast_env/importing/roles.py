@@ -1,65 +1,27 @@
 """Roles of the objects of a map: buildings, places of charges, build zone, keep-outs."""
 
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from math import isfinite
 from types import MappingProxyType
 from typing import Final
 
-import numpy as np
-
-from blast_env.errors import MAX_TEXT, BlastEnvError, import_extra, value_text
-from blast_env.importing.site_map import DrawingCoordinates, MapFeature, SiteMap, Tags
-from blast_env.values import typed_number
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.importing.heights import length_m, tagged_heights
+from blast_env.importing.ledger import Deed, Ledger
+from blast_env.importing.options import ImportOptions
+from blast_env.importing.site_map import (
+    DrawingCoordinates,
+    LostFeature,
+    MapFeature,
+    SiteMap,
+    Tags,
+)
+from blast_env.importing.things import Role, Thing
 
 with import_extra("maps", "maps and drawings"):
-    import shapely
     from shapely.geometry.base import BaseGeometry
-
-
-class Role(StrEnum):
-    """Role of an object of a map in a site."""
-
-    SITE = "site"
-    BUILDING = "building"
-    CHARGE = "place of a charge"
-    ZONE = "build zone"
-    KEEP_OUT = "keep-out"
-    NAME = "name"
-
-
-@dataclass(frozen=True)
-class Thing:
-    """An object of a map with a role in the site.
-
-    Attributes:
-        role: Its role.
-        geometry: Its outline, line or point, in the coordinates of the source.
-        name: Its name in the source, or an empty string.
-        place: Its place in the file.
-        height_m: Its height, m, if the source has one.
-        protected: Whether the source marks it as protected.
-        tnt_kg: Mass of a charge there, if the source has one.
-        part_of: Name of the building of which it is a rectangle, in files of blast-env.
-        base_m: Height of its underside above the ground, m.
-        diameter_m: Diameter of a point that is a round building, m: a silo, a tank, a column.
-        carries: Whether the source marks it as a terrace.
-    """
-
-    role: Role
-    geometry: BaseGeometry
-    name: str
-    place: str
-    height_m: float | None = None
-    protected: bool = False
-    tnt_kg: float | None = None
-    part_of: str = ""
-    base_m: float = 0.0
-    diameter_m: float | None = None
-    carries: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,55 +87,77 @@ _ROADS: Final = frozenset(
 ) | {"unclassified", "residential", "living_street", "service", "road", "track"}
 """Values of OpenStreetMap's `highway` for motor vehicles."""
 
-_HEIGHT_KEYS: Final = ("height", "height_m", "building:height", "building_height")
-_BASE_KEYS: Final = ("min_height", "building:min_height", "base_m")
-_BASE_LEVEL_KEYS: Final = ("building:min_level", "min_level")
-_LEVEL_KEYS: Final = ("building:levels", "levels", "storeys", "num_floors")
 _DIAMETER_KEYS: Final = ("diameter", "diameter_m")
 _ROUND: Final = frozenset({"chimney", "gasometer", "silo", "storage_tank", "water_tower"})
 """Values of OpenStreetMap's `man_made` of buildings, most of them round."""
 
+_WALLS: Final = frozenset(
+    {"wall", "city_wall", "retaining_wall", "gabion", "block", "jersey_barrier"}
+)
+"""Values of OpenStreetMap's `barrier` of solid obstacles, which an import does not make."""
+
 _NAME_KEYS: Final = ("name", "addr:housename", "text")
 _YES: Final = (True, "yes", "true")
-_LENGTH: Final = re.compile(r"([0-9]+(?:[.,][0-9]*)?)\s*(m|ft|')?")
-_FOOT_M: Final = 0.3048
+_NO: Final = ("no", "false")
+_BELOW: Final = ("underground", "subsurface")
+_NOT_ON_GROUND: Final = (*_BELOW, "rooftop", "multi-storey", "sheds", "garage_boxes")
+_CHIEF_KEYS: Final = (
+    *("amenity", "shop", "office", "natural", "landuse", "leisure", "highway", "barrier"),
+    *("power", "railway", "waterway", "boundary", "place", "historic", "tourism", "route"),
+)
+"""Tags that say the kind of an object, by which those without a role are counted."""
+
+_LANE_M: Final = 3.0
+_NARROW: Final = frozenset({"service", "track", "living_street"})
+_WIDTHS: Final = "widths of streets not in the file"
 
 
 def things_of(
-    site_map: SiteMap, selectors: Selectors, level_height_m: float, height_key: str | None = None
-) -> tuple[tuple[Thing, ...], tuple[str, ...]]:
-    """Return the objects of a map with a role in a site, and notes on unclear ones.
+    site_map: SiteMap, selectors: Selectors, options: ImportOptions, ledger: Ledger
+) -> tuple[Thing, ...]:
+    """Return the objects of a map with a role in a site, also those with a fault.
+
+    The ledger gets the others, and unclear heights and widths.
 
     Args:
         site_map: The map.
         selectors: Selectors of the user.
-        level_height_m: Height of a storey, m, for buildings with a number of storeys only.
-        height_key: Key of the tag with the height; the usual keys unless given.
+        options: Options of the import.
+        ledger: The ledger of the import.
     """
+    for kind, place, detail in site_map.remarks:
+        ledger.add(Deed.GUESSED, kind, place, detail=detail)
+    features = (*site_map.features, *site_map.lost)
     is_drawing = isinstance(site_map.coordinates, DrawingCoordinates)
-    found: list[Thing] = []
-    notes: list[str] = []
-    for feature in site_map.features:
-        role = _role(feature, selectors)
-        if role is None:
-            continue
-        if is_drawing and role is not Role.NAME and feature.tags.get("text"):
-            role = Role.NAME  # a text on the layer of the object that it names
-        height_m, note = _height_m(feature, level_height_m, height_key)
-        notes += [note] if note else []
-        base_m = _base_m(feature, level_height_m)
-        diameter_m = _diameter_m(feature) if role is Role.BUILDING else None
-        thing = _thing(feature, role, height_m)
-        found.append(replace(thing, base_m=base_m, diameter_m=diameter_m))
-    if not any(each.role is Role.BUILDING for each in found) and Role.BUILDING not in selectors:
-        found += _untagged_outlines(site_map)
-    return tuple(_closed(found)), tuple(dict.fromkeys(notes))
+    roles = [_role(each, selectors, is_drawing) for each in features]
+    known = ("kind", "building", "highway", "layer")
+    if not any(key in each.tags for each in features for key in known) and not selectors:
+        roles = [Role.BUILDING if _is_outline(each.geometry) else None for each in features]
+    found = []
+    for feature, role in zip(features, roles, strict=True):
+        if role is not None:
+            found.append(_thing(feature, role, options, ledger))
+        elif str(feature.tags.get("barrier", "")).lower() in _WALLS:
+            fault = "walls of the map, which shield"
+            found.append(Thing(Role.OTHER, feature.geometry, "", feature.place, fault=fault))
+        else:
+            ledger.add(Deed.PASSED, f"without a role: {_kind(feature.tags)}", feature.place)
+    return tuple(found)
 
 
-def _role(feature: MapFeature, selectors: Selectors) -> Role | None:
+def _kind(tags: Tags) -> str:
+    """Return the kind of an object without a role: the layer, or the key of its chief tag."""
+    if "layer" in tags and "building" not in tags and len(tags) <= 4:
+        return f"layer {tags['layer']}"
+    return next((key for key in (*_CHIEF_KEYS, *tags) if key in tags), "no tag")
+
+
+def _role(feature: MapFeature, selectors: Selectors, is_drawing: bool) -> Role | None:
     """Return the role of a feature, by the selectors or else by its tags."""
     for role, chosen in selectors.items():
         if any(selector.chooses(feature.tags) for selector in chosen):
+            if is_drawing and feature.tags.get("text"):
+                return Role.NAME  # a text on the layer of the object that it names
             return role
     usual = _usual_role(feature)
     return None if usual in selectors else usual
@@ -183,62 +167,72 @@ def _usual_role(feature: MapFeature) -> Role | None:
     tags = feature.tags
     own = str(tags.get("kind", tags.get("layer", ""))).lower()
     if own in _KINDS:
-        return _KINDS[own]
-    if str(tags.get("building", "no")).lower() not in ("no", "false"):
+        return Role.NAME if tags.get("text") else _KINDS[own]
+    if _says(tags, "building") or _says(tags, "building:part"):
         return Role.BUILDING
     if str(tags.get("man_made", "")).lower() in _ROUND:
         return Role.BUILDING
-    is_tunnel = str(tags.get("tunnel", "no")).lower() not in ("no", "false")
-    if str(tags.get("highway", "")).lower() in _ROADS and not is_tunnel:
+    if str(tags.get("highway", "")).lower() in _ROADS and not _says(tags, "tunnel"):
         return Role.CHARGE
     if str(tags.get("amenity", "")).lower() == "parking" and feature.geometry.area > 0.0:
         return Role.CHARGE
     return Role.NAME if tags.get("text") else None
 
 
-def _thing(feature: MapFeature, role: Role, height_m: float | None) -> Thing:
+def _says(tags: Tags, key: str) -> bool:
+    return str(tags.get(key, "no")).lower() not in _NO
+
+
+def _thing(feature: MapFeature, role: Role, options: ImportOptions, ledger: Ledger) -> Thing:
     tags = feature.tags
     own = str(tags.get("kind", tags.get("layer", ""))).lower()
     tnt_kg = tags.get("tnt_kg")
+    is_building = role is Role.BUILDING
+    heights = tagged_heights(feature, options, ledger) if is_building else None
+    building = str(tags.get("building", tags.get("building:part", "")))
+    kind = building if is_building and not own else own
+    if is_building and not building:
+        kind = str(tags.get("man_made", own)).lower()
     return Thing(
         role=role,
         geometry=feature.geometry,
         name=next((str(tags[key]) for key in _NAME_KEYS if tags.get(key)), ""),
         place=feature.place,
-        height_m=height_m,
+        height_m=None if heights is None else heights.top_m,
+        base_m=0.0 if heights is None else heights.base_m,
+        diameter_m=_diameter_m(feature) if is_building else None,
         protected=own == "protected_structure" or tags.get("protected") in _YES,
         part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else "",
         carries=own == "terrace" or tags.get("carries") in _YES,
         tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
+        kind=kind.lower(),
+        width_m=_width_m(feature, ledger) if role is Role.CHARGE else None,
+        is_part="building:part" in tags and not _says(tags, "building"),
+        fault=_fault(feature, role),
     )
 
 
-def _height_m(
-    feature: MapFeature, level_height_m: float, key: str | None
-) -> tuple[float | None, str | None]:
-    """Return the height of a feature, m, and a note if its height cannot be read."""
-    lower = {str(name).lower(): value for name, value in feature.tags.items()}
-    keys = _HEIGHT_KEYS if key is None else (key.lower(),)
-    given = next((lower[name] for name in keys if name in lower), None)
-    if given is not None:
-        height_m = _length_m(given)
-        if height_m is not None:
-            return height_m, None
-        return None, f"{feature.place}: the height {value_text(given)} is no length in m or ft"
-    levels = next((lower[name] for name in _LEVEL_KEYS if name in lower), None)
-    number = None if levels is None or key is not None else _length_m(levels)
-    return (None if number is None else number * level_height_m), None
-
-
-def _base_m(feature: MapFeature, level_height_m: float) -> float:
-    """Return the base of a feature, m; 0 if it has none."""
-    lower = {str(name).lower(): value for name, value in feature.tags.items()}
-    for keys, unit_m in ((_BASE_KEYS, 1.0), (_BASE_LEVEL_KEYS, level_height_m)):
-        given = next((lower[name] for name in keys if name in lower), None)
-        number = None if given is None else _length_m(given)
-        if number is not None:
-            return number * unit_m
-    return 0.0
+def _fault(feature: MapFeature, role: Role) -> str:
+    """Return why an object cannot be used; an empty string if it can."""
+    tags = feature.tags
+    if isinstance(feature, LostFeature):
+        return feature.reason
+    is_below = str(tags.get("location", "")).lower() in _BELOW
+    if role in (Role.BUILDING, Role.CHARGE) and "kind" not in tags:
+        with suppress(ValueError):  # the layer of a drawing is a name
+            is_below = is_below or float(str(tags.get("layer", "0"))) < 0.0
+    if role is Role.BUILDING:
+        if is_below:
+            return "buildings below the ground"
+        is_point = feature.geometry.geom_type in ("Point", "MultiPoint")
+        if is_point and _diameter_m(feature) is None:
+            return "buildings without an outline or a diameter"
+    if role is Role.CHARGE:
+        if is_below:
+            return "streets and car parks below the ground"
+        if str(tags.get("parking", "")).lower() in _NOT_ON_GROUND:
+            return "car parks that are not on the ground"
+    return ""
 
 
 def _diameter_m(feature: MapFeature) -> float | None:
@@ -246,51 +240,23 @@ def _diameter_m(feature: MapFeature) -> float | None:
     if feature.geometry.geom_type != "Point":
         return None
     given = next((feature.tags[key] for key in _DIAMETER_KEYS if key in feature.tags), None)
-    return None if given is None else _length_m(given)
+    return None if given is None else length_m(given)
 
 
-def _length_m(value: str | float | bool) -> float | None:
-    """Return a length above 0 in metres, or `None` if the value is not one."""
-    if isinstance(value, str):
-        match = _LENGTH.fullmatch(value[:MAX_TEXT].strip())
-        try:
-            number = typed_number("a length", match[1] if match else "")
-        except BlastEnvError:
-            return None
-        value = number * (1.0 if match is None or match[2] in (None, "m") else _FOOT_M)
-    return float(value) if isfinite(value) and value > 0.0 else None
+def _width_m(feature: MapFeature, ledger: Ledger) -> float | None:
+    """Return the width of a street, m; `None` for other places of charges."""
+    road = str(feature.tags.get("highway", "")).lower()
+    if not road or _is_outline(feature.geometry):
+        return None
+    width_m = length_m(feature.tags.get("width", ""))
+    if width_m is not None:
+        return width_m
+    lanes = length_m(feature.tags.get("lanes", ""))
+    width_m = _LANE_M * (lanes or (1 if road in _NARROW else 2))
+    if lanes is None:
+        ledger.add(Deed.GUESSED, _WIDTHS, feature.place, detail=f"{width_m:g} m as {road}")
+    return width_m
 
 
-def _untagged_outlines(site_map: SiteMap) -> list[Thing]:
-    """Return all outlines as buildings, for a map without any tag of a role."""
-    known = ("kind", "building", "highway", "layer")
-    if any(key in feature.tags for feature in site_map.features for key in known):
-        return []
-    return [
-        _thing(feature, Role.BUILDING, _height_m(feature, 1.0, None)[0])
-        for feature in site_map.features
-        if feature.geometry.geom_type in ("Polygon", "MultiPolygon")
-    ]
-
-
-def _closed(things: Iterable[Thing]) -> Iterator[Thing]:
-    """Yield things, with outlines drawn as separate open lines joined.
-
-    Places of charges may be lines, and remain so.
-    """
-    loose: dict[Role, list[Thing]] = {}
-    for thing in things:
-        is_line = thing.geometry.geom_type in ("LineString", "MultiLineString")
-        if is_line and thing.role not in (Role.CHARGE, Role.NAME):
-            loose.setdefault(thing.role, []).append(thing)
-        else:
-            yield thing
-    for role, lines in loose.items():
-        geometries = [each.geometry for each in lines]
-        outlines = shapely.get_parts(shapely.polygonize(geometries))
-        pairs = shapely.STRtree(geometries).query(outlines, "intersects")
-        first = np.full(len(outlines), len(lines))
-        np.minimum.at(first, *pairs)
-        for outline, index in zip(outlines, first, strict=True):
-            near = lines[index]
-            yield Thing(role, outline, near.name, near.place, near.height_m, near.protected)
+def _is_outline(geometry: BaseGeometry) -> bool:
+    return geometry.geom_type in ("Polygon", "MultiPolygon")

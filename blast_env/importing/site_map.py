@@ -28,6 +28,7 @@ MOST_COORDINATE: Final = 1e12
 """Largest coordinate in any unit; in millimetres the Earth's circumference is 4e10."""
 
 Tags = Mapping[str, str | float | bool]
+Remark = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,17 @@ class MapFeature:
 
 
 @dataclass(frozen=True)
+class LostFeature(MapFeature):
+    """An object of a map that is not usable; its geometry is as much as the file has.
+
+    Attributes:
+        reason: The kind of the fault, in the plural: `ways without all nodes`.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class SiteMap:
     """A map or drawing.
 
@@ -78,13 +90,15 @@ class SiteMap:
         path: The file.
         coordinates: System of the coordinates.
         features: All outlines, lines and points; texts are points.
-        notes: Omissions, one sentence each.
+        lost: Objects that are not usable.
+        remarks: What was mended while reading, as (kind, place, detail).
     """
 
     path: Path
     coordinates: SourceCoordinates
     features: tuple[MapFeature, ...]
-    notes: tuple[str, ...] = ()
+    lost: tuple[LostFeature, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse a map with too many points or too large coordinates.

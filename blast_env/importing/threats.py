@@ -16,9 +16,10 @@ from blast_env.importing.cells import (
     rectangles_of,
 )
 from blast_env.importing.fitting import FittedBuilding
+from blast_env.importing.ledger import Deed, Ledger
 from blast_env.importing.options import ImportOptions
-from blast_env.importing.placing import PlacedSite
-from blast_env.importing.roles import Role, Thing
+from blast_env.importing.placing import OUTSIDE, PlacedSite
+from blast_env.importing.things import Role, Thing
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -32,6 +33,8 @@ _LEAST_LENGTH_M: Final = 1.0
 _CLEAR_M: Final = 0.01  # more than the charge's radius, for rounding
 _DIGITS: Final = 3
 _AREA_BLOCK: Final = 4  # modules: scale of the blocks of an area, per m of tolerance
+_TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
+_BUILT_OVER: Final = "places of charges that are built over, or too near to a building or border"
 _POINT_SHARE_M: Final = 5.0
 
 
@@ -40,42 +43,68 @@ def charge_sources(
     buildings: Sequence[FittedBuilding],
     radius_m: float,
     options: ImportOptions,
-) -> list[dict[str, Any]]:
-    """Return the places of charges, as the charges of a scenario.
+    ledger: Ledger,
+) -> tuple[list[dict[str, Any]], frozenset[str]]:
+    """Return the places of charges, as the charges of a scenario, and their places in the file.
 
-    Streets become segments weighted by length, so that every metre is equally likely; areas become
-    rectangles weighted by area; points remain points with the weight of 5 m of street. All keep
-    clear of buildings and border by the charge's radius.
+    Streets become segments along both kerbs, weighted by length, so that every metre is equally
+    likely; areas become rectangles weighted by area; points remain points with the weight of 5 m
+    of street. All keep clear of buildings and border by the charge's radius.
 
     Args:
         site: The site.
         buildings: Its buildings.
         radius_m: Radius of the charge, m.
         options: Mass of the charges, and further places.
+        ledger: The ledger of the import.
 
     Raises:
         BlastEnvError: If there is no place for a charge, or there are too many.
     """
     free = _free(site, buildings, radius_m)
     things = _without_crossings(site)
-    for tolerance_m in _SIMPLER_M:
-        sources = [
-            *_asked(site, free, options),
-            *(source for each in things for source in _sources(each, free, tolerance_m, options)),
-        ]
-        if len(sources) <= MOST_SOURCES:
-            break
-    if len(sources) > MOST_SOURCES:
+    asked = list(_asked(site, free, options))
+    most = MOST_SOURCES - len(asked)
+    sources, kerbs = _fewest(things, free, most, options), True
+    if len(sources) > most and any(each.width_m for each in things):
+        kerbs = False
+        things = [replace(each, width_m=None) for each in things]
+        sources = _fewest(things, free, most, options)
+    if len(sources) > most:
         raise BlastEnvError(
-            f"{site.path}: charges may be at {len(sources)} places, must be at most "
+            f"{site.path}: charges may be at {len(sources) + len(asked)} places, must be at most "
             f"{MOST_SOURCES}: make the site smaller (--size), or choose fewer places "
             "(--charges-from)"
         )
-    if not sources:
+    if not sources and not asked:
         raise BlastEnvError(
             f"{site.path}: there is no place for a charge on the site clear of buildings: say "
-            "--charge-at X Y, or with --charges-from where one may be"
+            "--charge-at X,Y, with --charges-from where one may be, or --margin for more ground"
         )
+    used = frozenset(place for place, _ in sources)
+    for each in site.of_role(Role.CHARGE):
+        if each.place not in used:
+            on_site = shapely.intersects(each.geometry, site.box)
+            deed, kind = (Deed.LEFT_OUT, _BUILT_OVER) if on_site else (Deed.PASSED, OUTSIDE)
+            ledger.add(deed, kind, each.place, each.name)
+        elif each.width_m is not None and not kerbs:
+            kind = "streets of too many bends, with charges on the centre line instead of the kerbs"
+            ledger.add(Deed.GUESSED, kind, each.place, each.name)
+    return [*asked, *(source for _, source in sources)], used
+
+
+def _fewest(
+    things: Sequence[Thing], free: BaseGeometry, most: int, options: ImportOptions
+) -> list[tuple[str, dict[str, Any]]]:
+    """Return the sources of things with their places, in the finest form of at most `most`."""
+    for tolerance_m in _SIMPLER_M:
+        sources = [
+            (each.place, source)
+            for each in things
+            for source in _sources(each, free, tolerance_m, options)
+        ]
+        if len(sources) <= most:
+            break
     return sources
 
 
@@ -132,7 +161,18 @@ def _sources(
             if shapely.intersects(free, part):
                 yield _point(part.x, part.y, tnt_kg)
         else:
-            yield from _segments(part, free, tolerance_m, tnt_kg)
+            for line in _kerbs(part, thing.width_m):
+                yield from _segments(line, free, tolerance_m, tnt_kg)
+
+
+def _kerbs(line: BaseGeometry, width_m: float | None) -> Iterator[BaseGeometry]:
+    """Yield the lines of vehicles at both kerbs of a street; a line without a width itself."""
+    aside_m = 0.0 if width_m is None else 0.5 * width_m - _TO_KERB_M
+    if aside_m < _TO_KERB_M:  # too narrow for two rows of vehicles
+        yield line
+        return
+    for side in (aside_m, -aside_m):
+        yield from shapely.get_parts(shapely.offset_curve(line, side, join_style="mitre"))
 
 
 def _segments(

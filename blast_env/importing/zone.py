@@ -23,7 +23,7 @@ from blast_env.importing.cells import (
 from blast_env.importing.fitting import FittedBuilding
 from blast_env.importing.options import ImportOptions
 from blast_env.importing.placing import PlacedSite
-from blast_env.importing.roles import Role, Thing
+from blast_env.importing.things import Role, Thing
 from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):

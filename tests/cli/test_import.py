@@ -22,7 +22,7 @@ def test_table_says_how_far_each_building_is_off(tmp_path: Path) -> None:
     assert code == 0
     rows = [line.split() for line in text.splitlines()]
     assert ["Town_Hall", "yes", "1", "10.5", "339.2", "336.0", "0.9", "0.22"] in rows
-    assert "places of charges: 2" in text
+    assert "places of charges: 4" in text
     assert f"wrote {out}" in text
     assert picture.read_bytes().startswith(b"\x89PNG")
     scenario = load_scenario(out)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.importing import ImportOptions, convert, dxf, geojson, import_site, osm, site_map
+from blast_env.importing.ledger import Deed
 from blast_env.scenario import ScenarioError
 from tests.importing.maps import BLOCK, LAYERS, Places, charge, outline, rectangle, written
 
@@ -291,12 +292,15 @@ def test_what_the_scenario_refuses_is_named(tmp_path: Path) -> None:
     assert "build_zone.stock: is 5, must be at most" in str(caught.value)
 
 
-def test_heights_that_are_none_are_noted_and_left_out(tmp_path: Path) -> None:
+def test_heights_that_are_none_are_noted_and_guessed(tmp_path: Path) -> None:
     for height in ("tall", -3.0, "0", "1,250"):
         house = outline(rectangle(0, 0, 6, 4), height=height, protected=True)
         site = import_site(written(tmp_path, house, PLACE))
-        assert site.buildings[0].height_m is None
-        assert f"the height {height!r} is no length in m or ft" in site.notes[0]
+        assert site.buildings[0].height_m == 3.0
+        kind = "heights that cannot be read"
+        (entry,) = (each for each in site.ledger.of(Deed.GUESSED) if each.kind == kind)
+        assert entry.place == "features[0]"
+        assert entry.detail == f"height is {height!r}, which is no length in m or ft"
     feet = outline(rectangle(0, 0, 6, 4), height="20 ft", protected=True)
     assert import_site(written(tmp_path, feet, PLACE)).buildings[0].height_m == 6.0
 
@@ -324,8 +328,12 @@ def test_extract_that_cuts_a_building_says_so(tmp_path: Path) -> None:
     path = tmp_path / "cut.osm"
     path.write_text(text.replace(f"{line}\n", ""))
     site = import_site(path, HALL)
-    assert "ways of which the extract does not have all nodes, which were left out: 1" in site.notes
+    (cut,) = (each for each in site.ledger.of(Deed.LEFT_OUT) if each.kind == osm.CUT)
+    assert (cut.place, cut.name) == ("way 2", "Baker")
     assert "Baker" not in [each.name for each in site.buildings]
+    assert "--protect is 'baker', which is left out: way 2" in error_of(
+        path, replace(HALL, protect=("baker",))
+    )
 
 
 def test_nothing_is_imported_by_names_that_do_not_exist() -> None:
@@ -333,13 +341,15 @@ def test_nothing_is_imported_by_names_that_do_not_exist() -> None:
     assert set(convert._READERS) == {".geojson", ".json", ".dxf", *osm.SUFFIXES}
 
 
-@pytest.mark.parametrize(("suffix", "module"), [(".dxf", dxf), (".osm", osm)])
+@pytest.mark.parametrize(
+    ("suffix", "module", "name"), [(".dxf", dxf, "_closes"), (".osm", osm, "_places")]
+)
 def test_a_mistake_of_our_own_is_not_taken_for_a_damaged_file(
-    suffix: str, module: Any, monkeypatch: pytest.MonkeyPatch
+    suffix: str, module: Any, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def mistaken(*_: Any) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(module, "_places", mistaken)
+    monkeypatch.setattr(module, name, mistaken)
     with pytest.raises(ZeroDivisionError):
         import_site(BLOCK.with_suffix(suffix), HALL)

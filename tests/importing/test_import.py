@@ -14,7 +14,8 @@ from pyproj import Transformer
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.export import LayoutPlan, export_layout
 from blast_env.importing import ImportedSite, ImportOptions, import_site
-from blast_env.importing.roles import Role
+from blast_env.importing.ledger import Deed
+from blast_env.importing.things import Role
 from blast_env.scenario import (
     AnySource,
     RectangleSource,
@@ -82,17 +83,20 @@ def test_heights_are_those_of_the_map_in_whole_modules(block: ImportedSite) -> N
         "Pharmacy": 9.0,
         "Library": 7.5,  # 7.4 m
         "Water Tower": 18.0,
-        "Chapel": None,
+        "Chapel": 9.0,  # the median of its neighbours
     }
-    assert any("which are as high as the air" in note and "1 of 7" in note for note in block.notes)
+    (guess,) = (each for each in block.ledger.of(Deed.GUESSED) if "heights" in each.kind)
+    assert (guess.place, guess.name) == ("features[6]", "Chapel")
+    assert guess.detail.startswith("9.0 m as 7 neighbours, low ")
 
 
 def test_streets_are_places_of_charges_as_likely_on_every_metre(block: ImportedSite) -> None:
-    (west, east) = block.scenario.charge
-    for source in (west, east):
+    sources = block.scenario.charge
+    assert len(sources) == 4  # two straight pieces, at both kerbs
+    for source in sources:
         (x0, y0), (x1, y1) = ends_m(source)
         assert source.weight == pytest.approx(np.hypot(x1 - x0, y1 - y0), abs=0.01)
-    assert sum(each.weight for each in (west, east)) == pytest.approx(84.0, abs=1.0)
+    assert sum(each.weight for each in sources) == pytest.approx(2.0 * 84.0, abs=2.0)
 
 
 def test_zone_and_what_must_stay_empty_are_those_of_the_map(block: ImportedSite) -> None:
@@ -451,7 +455,7 @@ def test_streets_keep_clear_of_buildings_and_border(tmp_path: Path) -> None:
     )
     scenario = imported(path).scenario
     gap_m = scenario.charge_radius_m
-    west, east = scenario.charge
+    west, east = scenario.charge  # a lane is too narrow for two rows of vehicles
     assert ends_m(west)[0][0] == pytest.approx(gap_m, abs=0.02)
     assert ends_m(west)[1][0] == pytest.approx(10.0 - gap_m, abs=0.02)
     assert ends_m(east)[0][0] == pytest.approx(16.0 + gap_m, abs=0.02)

@@ -1,0 +1,129 @@
+"""The import of a file whose content is not known: options chosen from what it has."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import shapely
+
+from blast_env.errors import BlastEnvError
+from blast_env.importing import ImportOptions, import_site
+from blast_env.importing.convert import read_map, selectors_of
+from blast_env.importing.ledger import Deed, Ledger
+from blast_env.importing.roles import things_of
+from blast_env.importing.site_map import DrawingCoordinates, SiteMap
+from blast_env.importing.things import Role, Thing
+from blast_env.reading import ReadingError, ReadingLimits, read_apart
+
+SUFFIXES: Final = (".geojson", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf")
+
+_LIMITS: Final = ReadingLimits(processor_s=60, memory_bytes=1_000_000_000, wall_s=300.0)
+_DEGREE_M: Final = 111_000.0
+_LARGEST_M: Final = 300.0
+_SIZE_M: Final = (200.0, 200.0)
+_BESIDE_M: Final = (4.0, 8.0)
+
+
+@dataclass(frozen=True)
+class Survey:
+    """The outcome of an import.
+
+    Attributes:
+        path: The file.
+        refusal: Why it was refused; an empty string if it was not.
+        sums: Number of objects by deed and kind.
+    """
+
+    path: Path
+    refusal: str
+    sums: Counter[tuple[Deed, str]]
+
+
+def survey(path: Path) -> Survey:
+    """Return the outcome of importing a file, in a process with limits."""
+    try:
+        return read_apart(str(path), _surveyed, path, limits=_LIMITS)
+    except (BlastEnvError, ReadingError) as error:
+        return Survey(path, str(error).replace(str(path), "").strip(": "), Counter())
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Return the maps and drawings of a folder and those within it."""
+    return sorted(
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and path.name.lower().endswith(SUFFIXES)
+    )
+
+
+def _surveyed(path: Path) -> Survey:
+    """Import a file: its largest building is protected, on a site of 200 m in a large map."""
+    site_map, options = _read(path)
+    things = things_of(site_map, selectors_of(site_map, options), options, Ledger())
+    sound = [each for each in things if not each.fault]
+    outlines = [each for each in sound if each.role is Role.BUILDING]
+    if not outlines:
+        import_site(path, options)  # says why
+    chief = max(outlines, key=lambda each: float(each.geometry.area))
+    options = _around(site_map, sound, chief, options)
+    error = None
+    for attempt in _attempts(site_map, chief, options, sound):
+        try:
+            imported = import_site(path, attempt)
+        except BlastEnvError as refusal:
+            error = error or refusal
+            if "charge" not in str(refusal):
+                raise
+        else:
+            return Survey(path, "", Counter(imported.ledger.sums()))
+    assert error is not None
+    raise error
+
+
+def _read(path: Path) -> tuple[SiteMap, ImportOptions]:
+    """Return a map, with the options that it can be read with."""
+    layers = ("*",) if path.suffix.lower() == ".dxf" else ()
+    options = ImportOptions(buildings_from=layers, repair=True)
+    try:
+        return read_map(path, options), options
+    except BlastEnvError as error:
+        if "--units" not in str(error):
+            raise
+    options = replace(options, units="m")
+    return read_map(path, options), options
+
+
+def _unit_m(site_map: SiteMap) -> float:
+    """Return the length of a unit of coordinates, m; degrees are as long as on the equator."""
+    if isinstance(site_map.coordinates, DrawingCoordinates):
+        return site_map.coordinates.metres_per_unit
+    return _DEGREE_M if site_map.coordinates.crs == "EPSG:4326" else 1.0
+
+
+def _around(
+    site_map: SiteMap, things: list[Thing], chief: Thing, options: ImportOptions
+) -> ImportOptions:
+    """Return the options with the building protected, on a site around it if the map is large."""
+    point = chief.geometry.representative_point()
+    middle = float(point.x), float(point.y)
+    options = replace(options, protect_near=middle)
+    left, bottom, right, top = shapely.total_bounds([each.geometry for each in things])
+    if max(right - left, top - bottom) * _unit_m(site_map) > _LARGEST_M:
+        return replace(options, centre=middle, size_m=_SIZE_M)
+    return options
+
+
+def _attempts(
+    site_map: SiteMap, chief: Thing, options: ImportOptions, things: list[Thing]
+) -> Iterator[ImportOptions]:
+    """Yield the options, with a charge beside the building if the file has no place for one."""
+    if any(each.role is Role.CHARGE for each in things):
+        yield options
+    left, bottom, right, top = chief.geometry.bounds
+    for aside_m in _BESIDE_M:
+        aside = aside_m / _unit_m(site_map)
+        x, y = 0.5 * (left + right), 0.5 * (bottom + top)
+        for place in ((right + aside, y), (left - aside, y), (x, top + aside), (x, bottom - aside)):
+            yield replace(options, charge_at=(place,))
