@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from textwrap import wrap
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -551,13 +552,23 @@ def _ends_of(
 # Structures and charges.
 
 
+_LINE: Final = 20
+_MOST_LINES: Final = 3
+
+
+def wrapped(title: str) -> str:
+    """Return a title for a picture: in lines of at most 20 characters, three at most."""
+    return "\n".join(wrap(title, _LINE, max_lines=_MOST_LINES, placeholder=" ..."))
+
+
 def structure_features(structures: Iterable[AnyStructure]) -> Iterator[Feature]:
     """Yield the structures; the largest part of a building in several parts has the label."""
     structures = tuple(structures)
     for name, parts in buildings_of(structures).items():
         largest = max(parts, key=lambda each: each.modules)
         heights = [each.height_m for each in parts if each.height_m is not None]
-        label = f"{name}\n{max(heights):g} m" if len(heights) == len(parts) else name
+        words = wrapped(largest.title) or name
+        label = f"{words}\n{max(heights):g} m" if len(heights) == len(parts) else words
         for part in parts:
             kind = Kinds.TERRACE if part.carries else Kinds.STRUCTURE
             kind = Kinds.PROTECTED_STRUCTURE if part.protected else kind

@@ -17,7 +17,7 @@ from blast_env.cli.output import (
 )
 from blast_env.cli.targets import PICTURES
 from blast_env.files import write_atomically
-from blast_env.importing.options import ImportOptions
+from blast_env.importing.options import ImportOptions, plain
 from blast_env.scenario import save_scenario
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
     )
     for each in imported.buildings:
         table.add_row(
-            each.name + (" (cut)" if each.is_cut else ""),
+            _words(each),
             "yes" if each.protected else "no",
             f"{len(each.polygons)}",
             "air" if each.height_m is None else f"{each.height_m:g}",
@@ -110,6 +110,12 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
     for note in imported.notes:
         print_line(f"note: {note}")
     print_written(written)
+
+
+def _words(building: "FittedBuilding") -> str:
+    """Return the name of a building, with its name on the map if that is another."""
+    title = "" if plain(building.title) in ("", building.name) else f": {building.title}"
+    return f"{building.name}{title}" + (" (cut)" if building.is_cut else "")
 
 
 def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:

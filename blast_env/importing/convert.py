@@ -28,12 +28,13 @@ from blast_env.reading import read_apart
 from blast_env.scenario import Scenario, SimulationSection
 from blast_env.scenario.checks import charge_radius_m
 from blast_env.scenario.models import SCHEMA_VERSION
-from blast_env.values import path_of
+from blast_env.values import STEERING, path_of
 
 with import_extra("maps", "maps and drawings"):
     import shapely
 
 _MOST_DESCRIPTION: Final = 2000
+_MOST_TITLE: Final = 100
 _HASH_DIGITS: Final = 12
 _PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf")
 _READ_HERE_BYTES: Final = 100_000
@@ -230,6 +231,8 @@ def _structures(
         }
         if courtyards:
             part["courtyards_m"] = courtyards
+        if building.title and building.title != name:
+            part["title"] = STEERING.sub(" ", building.title)[:_MOST_TITLE]
         if len(walls) > 1:
             part["building"] = group[0].name
             part["weight"] = round(each.polygon.length * building.wall_height_m / whole, 6)

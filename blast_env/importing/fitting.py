@@ -1,7 +1,6 @@
 """Polygons of a map's buildings on a site."""
 
 import re
-import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -21,6 +20,7 @@ from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):
     import shapely
+    from anyascii import anyascii
     from shapely.geometry.base import BaseGeometry
 
 MOST_STRUCTURES: Final = 100
@@ -309,10 +309,9 @@ def _names(titles: Sequence[str]) -> list[str]:
 
 
 def plain_name(title: str) -> str:
-    """Return the characters of a title that are valid in names; an empty string if none are."""
-    plain = unicodedata.normalize("NFKD", title.replace("ß", "ss"))
-    letters = plain.encode("ascii", "ignore").decode()
-    return re.sub(r"[^A-Za-z0-9-]+", "_", letters).lstrip("_-0123456789").rstrip("_")[:_MOST_NAME]
+    """Return a title in the letters of names: `Lodz_Sad`, `b_1st_National`; empty without any."""
+    name = re.sub(r"[^A-Za-z0-9-]+", "_", anyascii(title).replace("'", "")).strip("_-")
+    return (f"b_{name}" if name[:1].isdigit() else name)[:_MOST_NAME].rstrip("_-")
 
 
 def _letters(number: int) -> str:

@@ -133,3 +133,8 @@ def _option(name: str) -> str:
 def _refuse_both(one: str, value: object, other: str, other_value: object) -> None:
     if value is not None and other_value is not None:
         raise BlastEnvError(f"{one} and {other} exclude each other")
+
+
+def plain(title: str) -> str:
+    """Return a title with `_` for spaces, as in the names of a scenario."""
+    return "_".join(title.split())

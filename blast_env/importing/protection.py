@@ -1,6 +1,5 @@
 """Choice of the protected buildings of an imported site, and their names."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -10,7 +9,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError, import_extra, shortened
 from blast_env.importing.fitting import FittedBuilding
 from blast_env.importing.ledger import Deed, Ledger
-from blast_env.importing.options import ImportOptions
+from blast_env.importing.options import ImportOptions, plain
 from blast_env.importing.placing import PlacedSite
 from blast_env.importing.things import Role, Thing
 
@@ -110,8 +109,3 @@ def _listed(buildings: Sequence[FittedBuilding]) -> str:
     ]
     more = len(buildings) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more else "")
-
-
-def plain(title: str) -> str:
-    """Return a title with `_` for spaces, as in the names of a scenario."""
-    return re.sub(r"\s+", "_", title)

@@ -1,9 +1,20 @@
 """The plan of an imported site: the outlines on the map, and the modules fitted to them."""
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
 import numpy as np
 
 from blast_env.importing import FittedBuilding, ImportedSite
-from blast_env.plan import INK, PROTECTED, STRUCTURE, Kinds, site_features, without
+from blast_env.plan import (
+    INK,
+    PROTECTED,
+    STRUCTURE,
+    Feature,
+    Kinds,
+    site_features,
+    without,
+)
 from blast_env.rendering.site_picture import draw_north
 from blast_env.rendering.site_plan import (
     PLAN,
@@ -12,12 +23,12 @@ from blast_env.rendering.site_plan import (
     outline_path,
     write_heading,
     write_legend,
+    write_names,
 )
 from blast_env.rendering.style import render_extra, unit_interval
 
 with render_extra():
     import shapely
-    from matplotlib import patheffects
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection
@@ -54,7 +65,8 @@ def imported_plan(imported: ImportedSite) -> Figure:
     height_in = np.clip(_WIDTH_IN * height_m / width_m + _HEADING_IN, _LEAST_IN, _MOST_IN)
     figure = Figure(figsize=(_WIDTH_IN, float(height_in)), layout="constrained")
     axes = figure.subplots()
-    features = without(site_features(scenario), Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE)
+    labelled = site_features(scenario)
+    features = without(labelled, Kinds.STRUCTURE, Kinds.PROTECTED_STRUCTURE, Kinds.TERRACE)
     draw_plan(axes, features)
     for building in imported.buildings:
         _draw_building(axes, building)
@@ -67,7 +79,23 @@ def imported_plan(imported: ImportedSite) -> Figure:
         f"{imported.site.path.name}, turned by {imported.site.rotation_deg:.1f}°; modules at most "
         f"{worst.deviation.outline_m:.2f} m from an outline ({worst.name})",
     )
+    write_names(axes, list(_with_deviations(labelled, imported.buildings)))
     return figure
+
+
+def _with_deviations(
+    features: Iterable[Feature], buildings: Iterable[FittedBuilding]
+) -> Iterator[Feature]:
+    """Yield features, with the deviation of each building in its label."""
+    deviations = {
+        part: f"{each.deviation.area_share:.1%}, {each.deviation.outline_m:.2f} m"
+        for each in buildings
+        for part in each.part_names
+    }
+    for feature in features:
+        title = feature.label.rpartition("\n")[0] or feature.label
+        own = deviations.get(feature.name)
+        yield replace(feature, label=f"{title}\n{own}") if feature.label and own else feature
 
 
 def _draw_building(axes: Axes, building: FittedBuilding) -> None:
@@ -81,16 +109,3 @@ def _draw_building(axes: Axes, building: FittedBuilding) -> None:
     ]
     lines = LineCollection(rings, colors=[unit_interval(INK)], linewidths=1.3, zorder=3)
     axes.add_collection(lines)
-    middle = building.outline.representative_point()
-    text = axes.text(
-        middle.x,
-        middle.y,
-        f"{building.name}\n{building.deviation.area_share:.1%}, "
-        f"{building.deviation.outline_m:.2f} m",
-        ha="center",
-        va="center",
-        fontsize=7.5,
-        fontweight="bold" if building.protected else "normal",
-        zorder=6,
-    )
-    text.set_path_effects([patheffects.withStroke(linewidth=2.5, foreground="white")])

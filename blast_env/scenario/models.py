@@ -270,6 +270,7 @@ class Scenario(Section):
         content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
         for structure in content["structures"]:
             structure.pop("building", None)
+            structure.pop("title")
             if not self.objective.is_response:
                 structure.pop("facade", None)
         if self.objective.is_response and self.components:

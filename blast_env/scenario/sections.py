@@ -451,6 +451,8 @@ class StructureSection(Section):
         faces: The walls whose load counts; a wall is named by the side that it faces.
         building: Name of its building, if that has several structures, for tables; no result
             depends on it.
+        title: Its name for readers, as on the map, for pictures and tables; no result depends on
+            it.
         facade: The components of its walls; no load depends on it.
     """
 
@@ -468,6 +470,7 @@ class StructureSection(Section):
         AfterValidator(_check_faces),
     ] = WALLS
     building: Name | None = None
+    title: Annotated[str, Field(max_length=100), FOR_PEOPLE] = ""
     facade: FacadeSection | None = None
 
     @property

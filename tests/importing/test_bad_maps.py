@@ -231,10 +231,9 @@ def test_a_building_that_modules_cannot_show_is_named(tmp_path: Path) -> None:
     thin = outline(rectangle(10, 0, 20, 0.4), name="wall")
     house = HOUSE | {"geometry": outline(rectangle(20, 8, 6, 4))["geometry"]}
     site = import_site(written(tmp_path, tower, house, thin, PLACE), ImportOptions())
-    off = [each for each in site.notes if "off its outline" in each]
-    assert any(each.startswith("features[0]: building_1: modules miss") for each in off)
-    lost = [each for each in site.notes if "left out" in each]
-    assert any("wall" in each for each in (*off, *lost))
+    off = [each.name for each in site.ledger.of(Deed.GUESSED) if "modules miss" in each.kind]
+    assert "building_1" in off
+    assert "wall" in (*off, *(each.name for each in site.ledger.of(Deed.LEFT_OUT)))
 
 
 def test_a_site_of_too_many_buildings(tmp_path: Path) -> None:

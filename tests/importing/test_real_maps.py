@@ -1,7 +1,7 @@
 """Faults of real maps and drawings: nothing vanishes, stops the file or is guessed in silence."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from blast_env.errors import BlastEnvError
 from blast_env.importing import ImportedSite, ImportOptions, import_site
 from blast_env.importing.ledger import Deed, Entry
-from blast_env.scenario import RectangleSource
+from blast_env.plan import site_features
+from blast_env.rendering.imported_site import imported_plan
+from blast_env.scenario import RectangleSource, Scenario
 from tests.importing.maps import Places, charge, outline, rectangle, written
 
 PLACE = charge(-5.0, 2.0)
@@ -291,6 +293,48 @@ def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
 def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
     assert "--charge-at X,Y" in error_of(written(tmp_path, HOUSE))
     assert "--margin" in error_of(written(tmp_path, HOUSE))
+
+
+@pytest.mark.parametrize(
+    ("title", "name"),
+    [
+        ("Дом культуры", "Dom_kultury"),
+        ("Łódź: Sąd", "Lodz_Sad"),
+        ("1st National", "b_1st_National"),
+    ],
+)
+def test_names_of_the_map_stay_titles_and_become_latin_ids(
+    title: str, name: str, tmp_path: Path
+) -> None:
+    house = outline(rectangle(0, 0, 6, 4), name=title, height=6.0)
+    path = written(tmp_path, house, PLACE)
+    site = imported(path, protect=(title,))
+    (structure,) = site.scenario.structures
+    assert (structure.name, structure.title) == (name, title)
+    assert f"{name} ({title})" in error_of(path)
+    (label,) = (each.label for each in site_features(site.scenario) if each.name == name)
+    assert label.startswith(title)
+    assert site.scenario.content_hash == retitled(site.scenario).content_hash
+
+
+def retitled(scenario: Scenario) -> Scenario:
+    document = scenario.model_dump()
+    document["structures"][0]["title"] = "other"
+    return Scenario.from_document(document, "retitled")
+
+
+def test_labels_of_real_names_do_not_lie_on_each_other(tmp_path: Path) -> None:
+    names = [f"Государственное бюджетное учреждение культуры № {k}" for k in range(8)]
+    row = [
+        outline(rectangle(12 * (k % 4), 14 * (k // 4), 10, 8), name=each, height=6.0)
+        for k, each in enumerate(names)
+    ]
+    site = imported(written(tmp_path, *row, PLACE), protect=(names[0],))
+    axes = imported_plan(site).axes[0]
+    boxes = [text.get_window_extent() for text in axes.texts if "\n" in text.get_text()]
+    assert len(boxes) == len(names)
+    for one, other in combinations(boxes, 2):
+        assert not one.overlaps(other)
 
 
 # Drawings.
