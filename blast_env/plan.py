@@ -599,6 +599,7 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float]:
         "height_m": structure.height_m,
         "base_m": structure.base_m or None,
         "building": structure.building,
+        "title": structure.title or None,
     }
     return {key: each for key, each in said.items() if each is not None}
 

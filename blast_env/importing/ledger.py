@@ -38,7 +38,7 @@ _FATES: Final = (Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
 
 
 @dataclass(frozen=True)
-class Entry:
+class LedgerEntry:
     """A line of the ledger.
 
     Attributes:
@@ -74,13 +74,13 @@ class Ledger:
         entries: All entries, in the order of the deeds done.
     """
 
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[LedgerEntry] = field(default_factory=list)
 
     def add(self, deed: Deed, kind: str, place: str, name: str = "", detail: str = "") -> None:
         """Add an entry."""
-        self.entries.append(Entry(deed, kind, place, name, detail))
+        self.entries.append(LedgerEntry(deed, kind, place, name, detail))
 
-    def of(self, *deeds: Deed) -> tuple[Entry, ...]:
+    def of(self, *deeds: Deed) -> tuple[LedgerEntry, ...]:
         """Return the entries of some deeds."""
         return tuple(each for each in self.entries if each.deed in deeds)
 
@@ -158,8 +158,8 @@ class Ledger:
                 f"{path}: --strict allows no guess and no omission, but there are:{listed}{more}"
             )
 
-    def _grouped(self, deeds: Sequence[Deed]) -> dict[tuple[Deed, str], list[Entry]]:
-        groups: dict[tuple[Deed, str], list[Entry]] = {}
+    def _grouped(self, deeds: Sequence[Deed]) -> dict[tuple[Deed, str], list[LedgerEntry]]:
+        groups: dict[tuple[Deed, str], list[LedgerEntry]] = {}
         for deed in deeds:
             for each in self.of(deed):
                 groups.setdefault((deed, each.kind), []).append(each)

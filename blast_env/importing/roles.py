@@ -187,6 +187,7 @@ def _thing(feature: MapFeature, role: Role, options: ImportOptions, ledger: Ledg
     tags = feature.tags
     own = str(tags.get("kind", tags.get("layer", ""))).lower()
     tnt_kg = tags.get("tnt_kg")
+    name_keys = ("title", *_NAME_KEYS) if own in _OWN_STRUCTURES else _NAME_KEYS
     is_building = role is Role.BUILDING
     heights = tagged_heights(feature, options, ledger) if is_building else None
     building = str(tags.get("building", tags.get("building:part", "")))
@@ -196,7 +197,7 @@ def _thing(feature: MapFeature, role: Role, options: ImportOptions, ledger: Ledg
     return Thing(
         role=role,
         geometry=feature.geometry,
-        name=next((str(tags[key]) for key in _NAME_KEYS if tags.get(key)), ""),
+        name=next((str(tags[key]) for key in name_keys if tags.get(key)), ""),
         place=feature.place,
         height_m=None if heights is None else heights.top_m,
         base_m=0.0 if heights is None else heights.base_m,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.importing import ImportedSite, ImportOptions, import_site
-from blast_env.importing.ledger import Deed, Entry
+from blast_env.importing.ledger import Deed, LedgerEntry
 from blast_env.plan import site_features
 from blast_env.rendering.imported_site import imported_plan
 from blast_env.scenario import RectangleSource, Scenario
@@ -25,11 +25,11 @@ DEGREE_M = 111_195.0
 """Length of a degree on the equator, where the extracts of these tests lie."""
 
 
-def entries(site: ImportedSite, deed: Deed, words: str) -> tuple[Entry, ...]:
+def entries(site: ImportedSite, deed: Deed, words: str) -> tuple[LedgerEntry, ...]:
     return tuple(each for each in site.ledger.of(deed) if words in each.kind)
 
 
-def places(found: Sequence[Entry]) -> list[str]:
+def places(found: Sequence[LedgerEntry]) -> list[str]:
     return [each.place for each in found]
 
 
