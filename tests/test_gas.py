@@ -219,7 +219,7 @@ def test_an_evaluation_takes_one_realisation_a_charge() -> None:
     assert evaluator.blasts == 1
     assert evaluator.calibration_name == "none"
     assert len({load.protected_impulse_pa_s for load in loads}) == 1
-    evaluation = evaluate_layout(HUT, WALL, range(2), engine="gas")
+    evaluation = evaluate_layout(HUT, WALL, range(2), engine="gas", cell_m=0.5)
     assert 0.05 < evaluation.mean_reduction < 0.6
     assert evaluation.to_dict()["calibration"] == "none"
 

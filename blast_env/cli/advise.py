@@ -1,6 +1,7 @@
 """`blast-env advise`: the protection for a budget by kind of measure, and the cost to pass."""
 
 from dataclasses import dataclass, replace
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Final
 
@@ -15,21 +16,24 @@ from blast_agents.search.advice import (
 )
 
 from blast_env.cli.command import argument, option
+from blast_env.cli.evaluation_report import impulse_text
 from blast_env.cli.options import (
     CELL_HELP,
     CELLS_HELP,
+    FINAL_CELLS,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
     wanted_level,
 )
-from blast_env.cli.output import ResultTable, print_line, progress_bar, result_console
+from blast_env.cli.output import ResultTable, print_cost, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
 from blast_env.engines.contract import JUDGE, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, consequences, verdict_word
+from blast_env.evaluation.grid_error import GridError, final_engine, grid_error
 from blast_env.geometry import Layout, layout_words
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
@@ -61,9 +65,11 @@ class AdviseCommand(ChargeOptions):
     processes: int = option(1, "Worker processes.", min=1)
     cell_m: float | None = option(None, CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default="uniform")
-    judge_cell_m: float = option(0.25, "Side of the cells for judging the layouts found, m.")
+    judge_cell_m: float | None = option(
+        None, "Side of the cells for judging the layouts found, m; else 0.25."
+    )
     judge_cells: str | None = option(
-        None, "The same as --cells, for judging the layouts found.", show_default="uniform"
+        None, "The same as --cells, for judging the layouts found.", show_default=FINAL_CELLS
     )
     out: Path | None = option(
         None, "Layout file of the best layout of all: .json.", writes=(".json",)
@@ -81,7 +87,7 @@ class AdviseCommand(ChargeOptions):
         fixed = [replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn]
         threats = one_of_each_charge(fixed)
         engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
-        judge = find_engine(JUDGE, self.judge_cell_m, cells=self.judge_cells)
+        judge = final_engine(JUDGE, [scenario], self.judge_cell_m, cells=self.judge_cells)
         problem = LayoutProblem(
             BlastEvaluator(scenario, engine), Case(scenario, threats), self.processes
         )
@@ -90,10 +96,14 @@ class AdviseCommand(ChargeOptions):
                 f"budget is {self.budget} blasts, must be at least {len(threats)}: one per charge"
             )
         kinds = kinds_for(scenario)
+        searched = islice(cycle(threats), len(kinds) * self.rounds * self.budget)
+        asked = [(engine, each.charge) for each in searched]
+        asked += [(judge, each.charge) for each in threats] * (len(kinds) * self.rounds)
         print_line(
             f"{len(kinds)} kinds, at most {self.rounds} searches of {self.budget} blasts each, "
             f"{engine.words}; each result is judged with {len(threats)}, {judge.words}"
         )
+        print_cost((each, scenario, charge) for each, charge in asked)
         charges = [threat.charge for threat in threats]
         judged: dict[Layout, Consequences] = {}
 
@@ -109,7 +119,8 @@ class AdviseCommand(ChargeOptions):
             with progress_bar(f"{kind}") as progress:
                 found.append(advise_until(*arguments, progress, rounds=self.rounds))
         best = best_of(found, verdict)
-        self._print(scenario, target, best, found, judged, judge)
+        error = _error(problem, best.layout, judged, judge)
+        self._print(scenario, target, best, found, judged, judge, error)
         if self.out is not None:
             made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
             print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
@@ -166,10 +177,14 @@ class AdviseCommand(ChargeOptions):
         found: list[Advice],
         judged: dict[Layout, Consequences],
         judge: Engine,
+        error: GridError | None,
     ) -> None:
         print_line(_answer(scenario, target, best, found, judged))
         for note in judged[best.layout].notes:
             print_line(f"flag: {note}")
+        if error is not None:
+            print_line(impulse_text(error))
+            print_line(error.words)
         title = f"{scenario.name}: budget {scenario.zone.budget:g}, required level {target.label!r}"
         table = ResultTable(title, _HEADERS, text_columns=2)
         for each in found:
@@ -190,6 +205,22 @@ class AdviseCommand(ChargeOptions):
             f"passes: by the search; judged: {judge.words}; level, sharp peaks: the same impulses "
             "with peaks that cells do not clip as well."
         )
+
+
+def _error(
+    problem: LayoutProblem, layout: Layout, judged: dict[Layout, Consequences], judge: Engine
+) -> GridError | None:
+    """Return the error of the cells for a judged layout; the search's blasts serve it if they can.
+
+    They do if the cells of the search are twice those of the judge.
+    """
+    fine, bare = judged[layout], judged[()]
+    threat = problem.threats[fine.worst_number]
+    of_both = fine.loads[fine.worst_number], bare.loads[fine.worst_number]
+    coarser: BlastEvaluator | None = problem.evaluator
+    if judge.coarser != problem.evaluator.engine:
+        coarser = BlastEvaluator(problem.scenario, judge).coarser()
+    return grid_error(coarser, problem.case, met_by_blasts(layout), threat, of_both)
 
 
 def _verdict_of(seen: Consequences, target: LevelOfProtection) -> AdviceVerdict:

@@ -19,6 +19,7 @@ from blast_agents.training.run_folder import RunFolder
 
 from blast_env.cli.evaluation_report import (
     EvaluateOptions,
+    asked_blasts,
     cache_record,
     cache_text,
     print_means,
@@ -29,12 +30,13 @@ from blast_env.cli.evaluation_report import (
 from blast_env.cli.output import (
     ResultTable,
     percent,
+    print_cost,
     print_line,
     print_written,
     progress_bar,
     result_console,
 )
-from blast_env.engines import Engine, find_engine
+from blast_env.engines import JUDGE, Engine
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -47,12 +49,13 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.cases import are_all, fixed_charges
 from blast_env.evaluation.comparison import case_table, comparison_record
+from blast_env.evaluation.grid_error import final_engine
 from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
 from blast_env.provenance import command, versions
 from blast_env.rendering.evaluation_figures import comparison_figure
 from blast_env.rendering.figures import save_figure
-from blast_env.scenario import save_scenario
+from blast_env.scenario import Scenario, save_scenario
 from blast_env.scenario.build_scene import charge_against
 from blast_env.sites import FAMILIES
 from blast_env.tables import write_csv
@@ -109,7 +112,7 @@ def _report_hidden(
     """Report on one layout for all possible places of the charge."""
     evaluator = BlastEvaluator(
         source.scenario,
-        _engine(settings, options),
+        _engine(settings, [source.scenario], options),
         cache=options.cache,
     )
     layout = agent.propose(source.scenario)
@@ -128,13 +131,19 @@ def _report_cases(
     seeds = options.seed_range
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
-    evaluators = Evaluators(_engine(settings, options), options.cache)
+    evaluators = Evaluators(
+        _engine(settings, [each.scenario for each in cases], options), options.cache
+    )
     if not evaluators.engine.has_noise:  # the same charge again would be the same blast
         distinct: dict[object, Case] = {}
         for each in cases:
             distinct.setdefault((each.scenario.content_hash, each.charge), each)
         cases = [*distinct.values()]
+    coarser = evaluators.coarser()
     told = [(each.scenario, each.charge) for each in cases]
+    if not options.any_json:
+        print_line(evaluators.engine.describe([case.scenario for case in cases]))
+        print_cost(asked_blasts(cases, evaluators.engine))
     proposals = [timed_proposal(partial(agent.propose, *each)) for each in told]
     with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
         comparison = compare(
@@ -142,6 +151,7 @@ def _report_cases(
             cases,
             [each.layout for each in proposals],
             options.processes,
+            coarser=coarser,
             cvar_level=options.cvar_level,
             progress=progress,
         )
@@ -150,7 +160,9 @@ def _report_cases(
     exported = _export(comparison, settings, provenance, options)
     if options.any_json:
         files = [str(path) for path in [*written, *exported]]
-        print_record({**record, "cache": cache_record(evaluators), "files": files}, options)
+        print_record(
+            {**record, "cache": cache_record(evaluators, coarser), "files": files}, options
+        )
         return
     title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
@@ -165,14 +177,16 @@ def _report_cases(
     print_written(written)
     if exported:
         print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
-    print_line(cache_text(evaluators))
+    print_line(cache_text(evaluators, coarser))
 
 
-def _engine(settings: TrainingSettings, options: EvaluateOptions) -> Engine:
-    """Return the engine that judges, with the run's cells if the run judged by the same engine."""
+def _engine(
+    settings: TrainingSettings, sites: Sequence[Scenario], options: EvaluateOptions
+) -> Engine:
+    """Return the engine that judges: gas dynamics for final statements, else that of the run."""
     own = settings.judge
-    engine = own if own.name == options.engine else options.engine
-    return find_engine(engine, options.cell_m, options.until, options.cells)
+    engine = own if own.name == options.engine != JUDGE else options.engine
+    return final_engine(engine, sites, options.cell_m, options.until, options.cells)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:
@@ -197,7 +211,6 @@ def _export(
 
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
-    print_line(engine.describe([case.scenario for case in comparison.cases]))
     table, cases = ResultTable(title, _HEADERS), case_table(comparison)
     objective = comparison.cases[0].scenario.objective
     for row in cases.to_dict("records"):
@@ -214,7 +227,7 @@ def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
     outside = int((~cases["in_range"]).sum())
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (marked ~)")
-    print_means(comparison, objective)
+    print_means(comparison, objective, "cases")
     if engine.needs_calibration:
         calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
         print_line(f"calibration {', '.join(calibrations)}")

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from blast_env.cli.command import argument, option
+from blast_env.cli.evaluation_report import impulse_text
 from blast_env.cli.options import (
-    CELL_HELP,
     CELLS_HELP,
+    FINAL_CELL_HELP,
+    FINAL_CELLS,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
@@ -16,6 +18,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     ResultTable,
+    print_cost,
     print_line,
     print_pieces,
     print_table,
@@ -23,15 +26,16 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.engines import JUDGE, find_engine
+from blast_env.engines import JUDGE, Engine
 from blast_env.engines.bays import LOADED_BAY_COLUMNS
 from blast_env.engines.pieces import PIECE_COLUMNS
-from blast_env.evaluation import draw_threats
+from blast_env.evaluation import Case, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import (
     CASE_COLUMNS,
     BuildingResponse,
     Consequences,
+    Neighbour,
     bay_table,
     consequences,
     other_glazing,
@@ -39,6 +43,7 @@ from blast_env.evaluation.consequences import (
     verdict_word,
 )
 from blast_env.evaluation.governing import governing
+from blast_env.evaluation.grid_error import GridError, convergence_index, final_engine
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
@@ -70,15 +75,16 @@ class AssessCommand(ChargeOptions):
 
     Gas dynamics runs one blast per charge, with and without the layout; the barrier is judged as
     well. A structure needs a facade in the scenario file; one without is judged as an ordinary
-    house. The effect of better glass needs no further blast, and is printed as well.
+    house. The effect of better glass needs no further blast, and is printed as well. The worst
+    charge runs on cells twice as large as well: the difference gives the error of the cells.
     """
 
     scenario: str = argument(SCENARIO_HELP)
     layout: Path | None = option(None, "Layout file; without it, the empty site.")
     target: str | None = option(None, TARGET_HELP.format("low"))
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
-    cell_m: float | None = option(None, CELL_HELP)
-    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
+    cell_m: float | None = option(None, FINAL_CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default=FINAL_CELLS)
     without_fallen: bool = option(
         False, "Remove pieces that overturn before the blast is over, and run it again."
     )
@@ -104,17 +110,35 @@ class AssessCommand(ChargeOptions):
             layout = tuple(load_layout(self.layout, scenario))
             layouts[layout_counts(layout, "barrier")] = layout
         charges = self._charges(scenario)
-        engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
+        engine = final_engine(JUDGE, [scenario], self.cell_m, cells=self.cells)
+        coarser = engine.coarser
+        print_line(engine.describe([scenario]))
+        asked = [(engine, each) for each in charges] + [(coarser, charges[0])]
+        print_cost((each, scenario, charge) for each, charge in asked for _ in layouts)
         found = {}
         for name, layout in layouts.items():
             with progress_bar(f"{len(charges)} blasts, {name}") as progress:
                 found[name] = consequences(
                     scenario, layout, charges, engine, progress, without_fallen=self.without_fallen
                 )
-        print_line(engine.describe([scenario]))
+        coarse: dict[str, Consequences] = {}
+        if coarser is not None:
+            worst = charges[list(found.values())[-1].worst_number]
+            for name, layout in layouts.items():
+                with progress_bar(f"1 blast, {coarser.words}, {name}") as progress:
+                    coarse[name] = consequences(
+                        scenario,
+                        layout,
+                        [worst],
+                        coarser,
+                        progress,
+                        without_fallen=self.without_fallen,
+                    )
         self._print_verdict(scenario, found, target)
-        self._print(scenario, found)
-        self._print_neighbours(found)
+        if coarser is not None:
+            _print_cells(scenario, layouts, found, coarse, coarser)
+        self._print(scenario, found, coarse)
+        self._print_neighbours(found, coarse)
         self._print_barriers(found)
         self._print_glazing(scenario, list(found.values())[-1], target)
         self._write(scenario, layouts, found)
@@ -138,9 +162,14 @@ class AssessCommand(ChargeOptions):
         if doubt := judged.doubt(target):
             print_line(doubt)
 
-    def _print(self, scenario: Scenario, found: dict[str, Consequences]) -> None:
+    def _print(
+        self,
+        scenario: Scenario,
+        found: dict[str, Consequences],
+        coarse: dict[str, Consequences],
+    ) -> None:
         rows = [
-            (name, building, *_row(each, building))
+            (name, building, *_row(each, building, coarse.get(name)))
             for name, each in found.items()
             for building in each.buildings
         ]
@@ -149,7 +178,9 @@ class AssessCommand(ChargeOptions):
             for note in each.notes:
                 print_line(f"flag, {name}: {note}")
 
-    def _print_neighbours(self, found: dict[str, Consequences]) -> None:
+    def _print_neighbours(
+        self, found: dict[str, Consequences], coarse: dict[str, Consequences]
+    ) -> None:
         if not any(each.neighbours for each in found.values()):
             return
         title = "without a facade: how likely an ordinary house there is damaged, worst charge"
@@ -157,8 +188,11 @@ class AssessCommand(ChargeOptions):
         for name, each in found.items():
             for worst in each.worst_neighbours:
                 shares = (f"{100.0 * worst.probability[damage]:.0f}" for damage in BuildingDamage)
-                peak = f"{worst.peak_pa / PA_PER_KPA:.1f}"
-                table.add_row(name, worst.building, peak, f"{worst.impulse_pa_s:,.0f}", *shares)
+                peak, impulse = (
+                    _with_cells(worst, each, coarse.get(name), load, unit, digits)
+                    for load, unit, digits in (("peak_pa", PA_PER_KPA, 1), ("impulse_pa_s", 1.0, 0))
+                )
+                table.add_row(name, worst.building, peak, impulse, *shares)
         result_console().print(table)
 
     def _print_barriers(self, found: dict[str, Consequences]) -> None:
@@ -230,7 +264,7 @@ class AssessCommand(ChargeOptions):
         pieces = piece_table(found)
         if len(pieces):
             tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))
-        engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
+        engine = final_engine(JUDGE, [scenario], self.cell_m, cells=self.cells)
         record: dict[str, str | int | float] = {
             "scenario": scenario.name,
             "scenario hash": scenario.content_hash,
@@ -253,12 +287,70 @@ def _charge_text(charge: Charge) -> str:
     return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
 
 
-def _row(found: Consequences, building: str) -> Sequence[str]:
+def _print_cells(
+    scenario: Scenario,
+    layouts: dict[str, Layout],
+    found: dict[str, Consequences],
+    coarse: dict[str, Consequences],
+    coarser: Engine,
+) -> None:
+    """Print the impulse under the worst charge with its error, and levels that cells change."""
+    *_, (name, layout) = layouts.items()
+    number = found[name].worst_number
+    threat = Threat(found[name].barriers[number].charge, 0)
+    bare = next(iter(found))
+    error = GridError(
+        case=Case(scenario, (threat,)),
+        layout=layout,
+        threat=threat,
+        coarser=coarser,
+        fine=(found[name].loads[number], found[bare].loads[number]),
+        coarse=(coarse[name].loads[0], coarse[bare].loads[0]),
+    )
+    print_line(impulse_text(error))
+    print_line(error.words)
+    for building in found[name].buildings:
+        fine = found[name].of(building)[number].facade.level_of_protection
+        other = coarse[name].level(building)
+        if other != fine:
+            print_line(
+                f"note: {building} reaches level {other.label!r} with {coarser.words}, and "
+                f"{fine.label!r} with the finer cells, under the worst charge"
+            )
+
+
+def _with_cells(
+    worst: Neighbour,
+    fine: Consequences,
+    coarse: Consequences | None,
+    load: str,
+    unit: float,
+    digits: int,
+) -> str:
+    """Return a load on a neighbour; its error has the share that it has under the worst charge."""
+    value = float(getattr(worst, load)) / unit
+    text = f"{value:,.{digits}f}"
+    if coarse is None:
+        return text
+    own = [each for each in fine.neighbours if each.building == worst.building]
+    (other,) = (each for each in coarse.neighbours if each.building == worst.building)
+    of_fine = float(getattr(own[fine.worst_number], load))
+    error = convergence_index(of_fine, float(getattr(other, load))) / of_fine * value
+    return f"{text} +- {error:,.{digits}f}"
+
+
+def _row(found: Consequences, building: str, coarse: Consequences | None = None) -> Sequence[str]:
+    """Return the response of a building; of the panes with the error of the cells."""
     facades = [each.facade for each in found.of(building)]
     worst = max(facades, key=lambda facade: facade.broken_panes)
+    broken = f"{worst.broken_panes:.1f}"
+    if coarse is not None:
+        fine = facades[found.worst_number].broken_panes
+        other = coarse.of(building)[0].facade.broken_panes
+        broken += f" +- {convergence_index(fine, other):.1f}"
     return (
         found.level_words(building),
-        f"{worst.broken_panes:.1f} of {worst.panes}",
+        f"{broken} of {worst.panes}",
         max(facade.worst_condition for facade in facades).label,
         max(facade.worst_damage for facade in facades).name.lower(),
     )

@@ -7,9 +7,9 @@ from typing import Final
 from blast_env.cli.command import option
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
 from blast_env.cli.options import running_on
-from blast_env.engines import find_engine
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.grid_error import final_engine
 from blast_env.export import LayoutPlan
 from blast_env.scenario import LayoutFile, load_layout, load_scenario
 from blast_env.statistics import check_cvar_level
@@ -24,6 +24,9 @@ class EvaluateCommand(EvaluateOptions):
     Each seed draws a charge from the scenario; for particles, also the fan and the air. With --run,
     an agent trained on visible charges proposes one layout per charge, any other agent one layout
     for all.
+
+    Gas dynamics runs on cells of 0.25 m. The worst charge runs on cells twice as large as well: the
+    difference gives the error of the cells beside each number.
     """
 
     layout: Path | None = option(None, "JSON file of the (row, column) cells.")
@@ -47,7 +50,7 @@ class EvaluateCommand(EvaluateOptions):
         scenario = load_scenario(self.scenario or _SCENARIO)
         layout = load_layout(path, scenario)
         plan = LayoutPlan(scenario, layout, provenance=LayoutFile.load(path).provenance)
-        engine = find_engine(self.engine, self.cell_m, self.until, self.cells)
+        engine = final_engine(self.engine, [scenario], self.cell_m, self.until, self.cells)
         report_layout(plan, BlastEvaluator(scenario, engine, cache=self.cache), self)
 
     def _evaluate_run(self, run: Path) -> None:

@@ -1,17 +1,18 @@
 """The options of `blast-env evaluate`, and its printed and written output."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan
+from math import isnan, nan
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
-    CELL_HELP,
     CELLS_HELP,
     CVAR_HELP,
     ENGINE_HELP,
+    FINAL_CELL_HELP,
+    FINAL_CELLS,
     UNTIL_HELP,
     CacheOptions,
     ChargeOptions,
@@ -23,6 +24,7 @@ from blast_env.cli.output import (
     LAYOUT_PICTURE,
     ResultTable,
     percent,
+    print_cost,
     print_json,
     print_line,
     print_written,
@@ -33,8 +35,10 @@ from blast_env.cli.output import (
 )
 from blast_env.cli.targets import Target
 from blast_env.engines import JUDGE, Engine
+from blast_env.engines.contract import BlastLoads
 from blast_env.evaluation import (
     BlastEvaluator,
+    Case,
     Evaluators,
     LayoutEvaluation,
     SeedRange,
@@ -43,11 +47,12 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.grid_error import GridError, points, with_errors
 from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
-from blast_env.scenario import ObjectiveSection, Scenario
-from blast_env.statistics import CVAR_LEVEL, Estimate
+from blast_env.scenario import AnyCharge, ObjectiveSection, Scenario
+from blast_env.statistics import CVAR_LEVEL, Estimate, reductions
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
 
@@ -64,8 +69,8 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         show_default="the first one outside training and search",
     )
     engine: str = option(JUDGE, ENGINE_HELP)
-    cell_m: float | None = option(None, CELL_HELP)
-    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
+    cell_m: float | None = option(None, FINAL_CELL_HELP)
+    cells: str | None = option(None, CELLS_HELP, show_default=FINAL_CELLS)
     until: str | None = option(None, UNTIL_HELP, show_default="structures")
     cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
     export: Path | None = option(
@@ -123,15 +128,24 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         make_folder(self.out)
 
 
-def cache_record(evaluator: BlastEvaluator | Evaluators) -> dict[str, float]:
-    """Return the number of blasts run, the number found in the cache, and the hit rate."""
-    blasts, hits = evaluator.blasts, evaluator.cache_hits
-    return {"blasts": blasts, "hits": hits, "hit_rate": evaluator.cache_hit_rate}
+AnyEvaluator: TypeAlias = BlastEvaluator | Evaluators
 
 
-def cache_text(evaluator: BlastEvaluator | Evaluators) -> str:
+def cache_record(*evaluators: AnyEvaluator | None) -> dict[str, float]:
+    """Return the number of blasts run, the number found in the cache, and the hit rate.
+
+    Args:
+        evaluators: Those that ran the blasts, perhaps with several sizes of cells.
+    """
+    found = [each for each in evaluators if each is not None]
+    blasts, hits = (sum(each.blasts for each in found), sum(each.cache_hits for each in found))
+    asked = blasts + hits
+    return {"blasts": blasts, "hits": hits, "hit_rate": hits / asked if asked else 0.0}
+
+
+def cache_text(*evaluators: AnyEvaluator | None) -> str:
     """Return the record of the cache in words."""
-    record = cache_record(evaluator)
+    record = cache_record(*evaluators)
     return (
         f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
         f"(cache hit rate {percent(record['hit_rate'])})"
@@ -143,6 +157,31 @@ def interval(estimate: Estimate) -> str:
     if isnan(estimate.low):
         return "-"
     return f"{percent(estimate.low)} to {percent(estimate.high)}"
+
+
+def share_text(estimate: Estimate, error: float = nan, sampled: str = "charges") -> str:
+    """Return a share with its errors: `48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)`.
+
+    Args:
+        estimate: The share with its 95 % interval.
+        error: Its error of the cells; NaN for none.
+        sampled: The samples of the interval.
+    """
+    half = points(estimate.value - estimate.low)
+    return with_errors(percent(estimate.value), points(error), half and f"{half} (95 %, {sampled})")
+
+
+def load_text(
+    objective: ObjectiveSection, estimate: Estimate, error: float = nan, sampled: str = "charges"
+) -> str:
+    """Return a load with its unit and its errors; see `share_text`."""
+
+    def number(load: float) -> str:
+        return objective.text(load).removesuffix(f" {objective.unit}")
+
+    half = "" if isnan(estimate.low) else number(estimate.value - estimate.low)
+    cells = "" if isnan(error) else number(error)
+    return with_errors(objective.text(estimate.value), cells, half and f"{half} (95 %, {sampled})")
 
 
 def threats_text(count: int, seeds: range) -> str:
@@ -173,17 +212,32 @@ _HEADERS: Final = (
 )
 
 
+def asked_blasts(
+    cases: Sequence[Case], engine: Engine
+) -> Iterator[tuple[Engine | None, Scenario, AnyCharge]]:
+    """Yield the blasts of an evaluation, for their cost: both layouts, and the worst threat."""
+    for case in cases:
+        for threat in case.threats:
+            yield from [(engine, case.scenario, threat.charge)] * 2
+    worst = cases[0]
+    yield from [(engine.coarser, worst.scenario, worst.threats[0].charge)] * 2
+
+
 def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: EvaluateOptions) -> None:
     """Evaluate a layout on the threats drawn by the seeds; print and write the result."""
-    engine = evaluator.engine
+    engine, coarser = evaluator.engine, evaluator.coarser()
     threats = options.threats(plan.scenario, engine)
     options.prepare_files(1)
+    if not options.any_json:
+        print_line(engine.describe([plan.scenario]))
+        print_cost(asked_blasts([Case(plan.scenario, threats)], engine))
     with progress_bar(f"{2 * len(threats)} blasts in {plan.scenario.name}") as progress:
         evaluation = evaluate_against(
             evaluator,
             plan.layout,
             threats,
             options.processes,
+            coarser=coarser,
             cvar_level=options.cvar_level,
             progress=progress,
         )
@@ -196,14 +250,14 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
             "scenario_name": plan.scenario.name,
             "preset": engine.preset(plan.scenario),
             "provenance": dict(plan.provenance),
-            "cache": cache_record(evaluator),
+            "cache": cache_record(evaluator, coarser),
             "files": [str(path) for path in written],
         }
         print_record(record, options)
         return
-    _print_evaluation(evaluation, options.seed_range, engine)
+    _print_evaluation(evaluation, options.seed_range)
     print_written(written)
-    print_line(cache_text(evaluator))
+    print_line(cache_text(evaluator, coarser))
 
 
 def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
@@ -229,10 +283,9 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
     ]
 
 
-def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine) -> None:
+def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
     """Print the buildings' mean loads, and the effect of the layout over all threats."""
     count = len(evaluation.threats)
-    print_line(engine.describe([evaluation.scenario]))
     table = ResultTable(
         f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
         f"{threats_text(count, seeds)}",
@@ -244,9 +297,9 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine
         table.add_row(
             str(row["structure"]),
             "yes" if row["protected"] else "no",
-            f"{row['unprotected_impulse_pa_s']:,.0f}",
-            f"{row['impulse_pa_s']:,.0f}",
-            percent(reduction.value),
+            _number(row["unprotected_impulse_pa_s"], row["unprotected_impulse_error_pa_s"]),
+            _number(row["impulse_pa_s"], row["impulse_error_pa_s"]),
+            percent(reduction.value) + _of_cells(points(row["reduction_error"])),
             interval(reduction),
             f"{row['threats_in_range']} of {count}",
         )
@@ -256,11 +309,38 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range, engine: Engine
         print_line(f"note: {note}")
 
 
+def impulse_text(error: GridError) -> str:
+    """Return the impulse on the protected structures under one charge, with errors of the cells."""
+
+    def impulse_of(loads: BlastLoads) -> float:
+        return loads.protected_impulse_pa_s
+
+    def text(number: int, share: float) -> str:
+        pa_s = impulse_of(error.fine[number])
+        return with_errors(f"{pa_s:,.0f} Pa s", "" if isnan(share) else f"{share * pa_s:,.0f}")
+
+    walled, bare = text(0, error.of_load(impulse_of)), text(1, error.of_unprotected(impulse_of))
+    words = "impulse on the protected structures under the worst charge"
+    if not error.layout:
+        return f"{words}: {walled}"
+    gone = reductions(*map(impulse_of, error.fine)).item()
+    share = with_errors(percent(gone), points(error.of_reduction(impulse_of)))
+    return f"{words}: {bare} without barrier, {walled} with, reduction {share}"
+
+
+def _number(load: float, error: float) -> str:
+    return f"{load:,.0f}" + _of_cells("" if isnan(error) else f"{error:,.0f}")
+
+
+def _of_cells(error: str) -> str:
+    return error and f" +- {error}"
+
+
 def _print_totals(evaluation: LayoutEvaluation) -> None:
     """Print the loads on the protected structures together, and the worst threat."""
     worst, objective = evaluation.worst, evaluation.scenario.objective
     comparison = evaluation.comparison
-    print_means(comparison, objective)
+    print_means(comparison, objective, "threats" if evaluation.engine.has_noise else "charges")
     if objective != ObjectiveSection():
         print_line(
             f"objective ({_objective_text(objective)}): "
@@ -285,28 +365,28 @@ def _objective_text(objective: ObjectiveSection) -> str:
     return f"{noun}, {over[objective.charges]} the charges"
 
 
-def print_means(comparison: Comparison, objective: ObjectiveSection) -> None:
+def print_means(
+    comparison: Comparison, objective: ObjectiveSection, sampled: str = "charges"
+) -> None:
     """Print the reduction, and the mean loads without and with barrier.
 
     Args:
         comparison: The loads.
         objective: Their quantity and unit.
+        sampled: The samples of the intervals.
     """
-    reduction = comparison.reduction
-    print_line(
-        f"protected structures, by weight: mean reduction {percent(reduction.value)} "
-        f"(95 % interval {interval(reduction)})"
-    )
+    reduction = share_text(comparison.reduction, comparison.reduction_error, sampled)
+    print_line(f"protected structures, by weight: mean reduction {reduction}")
     share = f"{100.0 * (1.0 - comparison.cvar_level):.3g} %"
-    for words, load, cvar in (
-        ("without barrier", comparison.unprotected_mean, comparison.unprotected_cvar),
-        ("with barrier", comparison.mean, comparison.cvar),
+    bare_error, bare_cvar = comparison.unprotected_mean_error, comparison.unprotected_cvar
+    for words, load, error, cvar in (
+        ("without barrier", comparison.unprotected_mean, bare_error, bare_cvar),
+        ("with barrier", comparison.mean, comparison.mean_error, comparison.cvar),
     ):
-        half_width = ""
-        if not isnan(load.low):
-            half_width = f" +- {objective.text(load.high - load.value)}"
         psi_s = "" if objective.needs_peaks else f" ({load.value / PA_PER_PSI:.4f} psi s)"
         print_line(
-            f"{words}: mean {objective.text(load.value)}{half_width}{psi_s}, "
+            f"{words}: mean {load_text(objective, load, error, sampled)}{psi_s}, "
             f"mean of the worst {share} {objective.text(cvar)}"
         )
+    if comparison.grid_error is not None:
+        print_line(comparison.grid_error.words)

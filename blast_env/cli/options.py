@@ -52,6 +52,8 @@ CELLS_HELP: Final = (
     "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
     "for search; fine: later, for final results."
 )
+FINAL_CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.25, for final statements."
+FINAL_CELLS: Final = "uniform of 0.25 m, fine on sites wider than 40 m"
 UNTIL_HELP: Final = (
     "Loads that a blast of gas dynamics waits for. structures: those protected; walls: all; "
     "gauges; or a number of seconds."

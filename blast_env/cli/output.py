@@ -22,12 +22,15 @@ from rich.text import Text
 
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.geometry import Element
-from blast_env.scenario import Scenario
+from blast_env.scenario import AnyCharge, Scenario
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from blast_env.values import STEERING
 
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
+
+    from blast_env.engines import Engine
+    from blast_env.physics.gas.cost import CostGuess
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
@@ -181,6 +184,26 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task(printable(label), total=1.0)
         yield lambda share: progress.update(task, completed=share)
+
+
+def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> None:
+    """Print the cost of blasts before they start, if it can be estimated.
+
+    Args:
+        asked: Engine, scenario and charge of each blast; without an engine there is none.
+    """
+    known: dict[Any, CostGuess | None] = {}
+    costs = []
+    for engine, scenario, charge in asked:
+        key = engine, id(scenario), charge
+        if key not in known:
+            known[key] = None if engine is None else engine.cost(scenario, charge)
+        costs.append(known[key])
+    found = [each for each in costs if each is not None]
+    if found:
+        from blast_env.app.cost import cost_words  # the page's words; takes long to import
+
+        print_line(f"up to {cost_words(found)}")
 
 
 def _progress_lines(console: Console, label: str) -> Callable[[float], None]:

@@ -2,18 +2,29 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import cycle, islice
+from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import Final
 
+import numpy as np
 from blast_agents.proposal import Chosen, chosen_for, problem_of
 from blast_agents.rules import expected_charge
 from blast_agents.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
 
 from blast_env.cli.command import argument, option
-from blast_env.cli.options import CELLS_HELP, SCENARIO_HELP, ChargeOptions, ProcessOptions
+from blast_env.cli.evaluation_report import load_text, share_text
+from blast_env.cli.options import (
+    CELLS_HELP,
+    FINAL_CELLS,
+    SCENARIO_HELP,
+    ChargeOptions,
+    ProcessOptions,
+)
 from blast_env.cli.output import (
     ResultTable,
+    print_cost,
     print_line,
     print_written,
     progress_bar,
@@ -21,16 +32,16 @@ from blast_env.cli.output import (
     save_layout_picture,
     save_pictures,
 )
-from blast_env.cli.search import print_cost
 from blast_env.engines import JUDGE, find_engine
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case
+from blast_env.evaluation import BlastEvaluator, Case, Comparison
+from blast_env.evaluation.grid_error import final_engine, grid_error
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import Charge
 from blast_env.provenance import command, versions
 from blast_env.scenario import LayoutFile, Placement, Scenario, load_scenario
 from blast_env.scenario.zone import source_bounds_m
-from blast_env.statistics import reductions
+from blast_env.statistics import Estimate
 from blast_env.units import MS_PER_S
 
 _PROPOSAL: Final = "this proposal"
@@ -54,11 +65,13 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
     budget: int | None = option(
         None,
         "Most blasts of gas dynamics, for --verify or for the best rule: limits the rules, then "
-        "the charges that are compared.",
+        "the charges that are compared. The error of the cells takes one more for each layout.",
         show_default="as many as are needed",
         min=2,
     )
-    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
+    cells: str | None = option(
+        None, CELLS_HELP, show_default=f"uniform; with --verify {FINAL_CELLS}"
+    )
     out: Path | None = option(
         None, "JSON file for the layout; its picture is drawn beside it.", writes=(".json",)
     )
@@ -73,7 +86,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         print_line(f"{scenario.name}: {_words(scenario, result)}, by {result.by}")
         if self.verify:
             self._verify(problem, result.layout)
-        if not problem.evaluator.blasts:
+        if not (self.verify or problem.evaluator.blasts):
             print_line("no blast was run")
         if self.out is not None:
             self._write(scenario, result.layout, chosen.source, self.out)
@@ -108,7 +121,8 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
             )
             budget = chosen.budget if self.budget is None else min(self.budget, chosen.budget)
             print_line(problem.evaluator.engine.describe())
-            print_cost(problem.evaluator, problem.case, budget)
+            evaluator, turns = problem.evaluator, islice(cycle(problem.threats), budget)
+            print_cost((evaluator.engine, problem.scenario, each.charge) for each in turns)
         elif self.budget is not None and not self.verify:
             raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast here")
         began_s = perf_counter()
@@ -133,17 +147,10 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
             most = self.budget // len(case.threats)
             distinct = list(dict.fromkeys(layouts.values()))[:most]
             layouts = {name: each for name, each in layouts.items() if each in distinct}
-        print_line(problem.evaluator.engine.describe())
-        print_cost(problem.evaluator, case, len({*layouts.values()}) * len(case.threats))
-        pairs = [(each, threat) for each in layouts.values() for threat in case.threats]
-        with progress_bar(f"{len(set(pairs))} blasts of gas dynamics") as progress:
-            found = problem.evaluator.loads_of_many(pairs, problem.processes, progress)
-        loads = iter(each.load(case.scenario.objective) for each in found)
-        by_name = {
-            name: case.counted([next(loads) for _ in case.threats], each)
-            for name, each in layouts.items()
-        }
-        _print_verdict(by_name, case)
+        engine = final_engine(JUDGE, [problem.scenario], cells=self.cells)
+        evaluator = BlastEvaluator(problem.scenario, engine)
+        found = _compared(evaluator, case, layouts, problem.processes)
+        _print_verdict(found, case)
         left_out = [name for name in rules if name not in layouts]
         if left_out:
             print_line(f"note: not compared, for lack of blasts: {', '.join(left_out)}")
@@ -170,16 +177,60 @@ def _words(scenario: Scenario, result: SearchResult) -> str:
     return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
 
 
-def _print_verdict(loads: Mapping[str, float], case: Case) -> None:
+def _compared(
+    evaluator: BlastEvaluator, case: Case, layouts: Mapping[str, Layout], processes: int
+) -> dict[str, Comparison]:
+    """Return layouts compared with no barrier, each with its error of the cells.
+
+    That is from the charge with the largest load behind the proposal.
+    """
+    engine, coarser, threats = evaluator.engine, evaluator.coarser(), case.threats
+    distinct = dict.fromkeys(layouts.values())
+    print_line(engine.describe())
+    asked = [(engine, each) for each in threats] + [(engine.coarser, threats[0])]
+    print_cost((each, case.scenario, threat.charge) for each, threat in asked for _ in distinct)
+    pairs = [(each, threat) for each in distinct for threat in threats]
+    with progress_bar(f"{len(pairs)} blasts of gas dynamics") as progress:
+        found = iter(evaluator.loads_of_many(pairs, processes, progress))
+    blasts = {each: [next(found) for _ in threats] for each in distinct}
+    objective = case.scenario.objective
+    counted = {each: np.array([[x.load(objective) for x in blasts[each]]]) for each in distinct}
+    worst = int(counted[layouts[_PROPOSAL]].argmax())
+    return {
+        name: Comparison(
+            cases=(case,),
+            layouts=(each,),
+            loads=counted[each],
+            unprotected=counted[()],
+            in_range=np.array([[x.in_range for x in blasts[each]]]),
+            grid_error=grid_error(
+                coarser,
+                case,
+                each,
+                threats[worst],
+                (blasts[each][worst], blasts[()][worst]),
+                processes,
+            ),
+        )
+        for name, each in layouts.items()
+    }
+
+
+def _print_verdict(found: Mapping[str, Comparison], case: Case) -> None:
     """Print one row per layout: no barrier, the rules with the best last, and the proposal."""
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     objective = case.scenario.objective
-    headers = ("layout", f"load ({objective.unit})", "reduction")
-    table = ResultTable(f"{case.scenario.name}: judged by gas dynamics on {charges}", headers)
+    loads = {name: case.counted(each.loads[0], each.layouts[0]) for name, each in found.items()}
+    title = f"{case.scenario.name}: judged by gas dynamics on {charges}"
+    table = ResultTable(title, ("layout", "load", "reduction"))
     rules = sorted(loads.keys() - {_NOTHING, _PROPOSAL}, key=lambda name: -loads[name])
     for name in (_NOTHING, *rules, _PROPOSAL):
-        share = reductions(loads[name], loads[_NOTHING]).item()
-        table.add_row(name, f"{loads[name]:,.1f}", f"{share:.1%}")
+        each, load = found[name], Estimate(loads[name], nan, nan)
+        share = share_text(each.reduction, each.reduction_error) if name != _NOTHING else "-"
+        table.add_row(name, load_text(objective, load, each.objective_error), share)
     result_console().print(table)
+    error = found[_PROPOSAL].grid_error
+    if error is not None:
+        print_line(error.words)
     if rules and loads[rules[-1]] < loads[_PROPOSAL]:
         print_line(f"note: {rules[-1]} does better here than the proposal")

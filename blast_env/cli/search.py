@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from itertools import cycle, islice
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -37,6 +38,7 @@ from blast_env.cli.output import (
     ResultTable,
     message_console,
     percent,
+    print_cost,
     print_line,
     print_written,
     progress_bar,
@@ -174,7 +176,8 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
         case = self._practice(evaluator.scenario, evaluator.engine)
         problem = LayoutProblem(evaluator, case, self.processes)
         print_line(evaluator.engine.describe([evaluator.scenario]))
-        print_cost(evaluator, case, self.budget)
+        turns = islice(cycle(case.threats), self.budget)
+        print_cost((evaluator.engine, evaluator.scenario, each.charge) for each in turns)
         problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
         hits, begun_s = evaluator.cache_hits, perf_counter()
         result = self._with_progress(method, problem)
@@ -253,22 +256,6 @@ class SearchRun:
     result: SearchResult
     seconds: float
     cache_hits: int
-
-
-def print_cost(evaluator: BlastEvaluator, case: Case, blasts: int) -> None:
-    """Print the cost of blasts before they start, if the engine can estimate it.
-
-    Args:
-        evaluator: Will run them.
-        case: The load cases of the layouts.
-        blasts: Greatest number of blasts.
-    """
-    found = (evaluator.engine.cost(case.scenario, each.charge) for each in case.threats)
-    costs = [each for each in found if each is not None]
-    if costs and blasts:
-        from blast_env.app.cost import cost_words  # the page's words; takes long to import
-
-        print_line(f"up to {cost_words([costs[i % len(costs)] for i in range(blasts)])}")
 
 
 def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:

@@ -438,6 +438,19 @@ class Engine(ABC):
         """The engine's name and the settings that affect its results, for display."""
         return self.name
 
+    def final(self, scenarios: Sequence[Scenario]) -> "Engine":  # noqa: ARG002
+        """Return the engine with the resolution of final statements on some sites.
+
+        Args:
+            scenarios: The sites.
+        """
+        return self
+
+    @property
+    def coarser(self) -> "Engine | None":
+        """The engine with cells twice as large, for their error; `None` if it has none."""
+        return None
+
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:  # noqa: ARG002
         """Describe the engine in one line.
 

@@ -5,7 +5,7 @@ for a given charge and layout; a seed only draws the charge.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
@@ -65,6 +65,7 @@ from blast_env.scenario import (
 from blast_env.scenario.build_scene import build_site, draw_threat, outlines
 from blast_env.scenario.zone import source_bounds_m
 from blast_env.tables import table_of
+from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
@@ -77,6 +78,9 @@ NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when
 
 _PROGRESS_CALLS: Final = 100
 
+_FINAL_CELL_M: Final = 0.25
+_WIDEST_UNIFORM_M: Final = 40.0
+"""Side of the cells of final statements, and the widest site on which they do not grow."""
 
 _PEAK_AND_REBOUND: Final = 0.75
 """Share of a natural period in which a loaded component swings in and rebounds."""
@@ -154,6 +158,23 @@ class GasEngine(GasSettings, Engine):
             air_height_m=scenario.air_height_m,
         )
         return cost_of_run(self, site, response_time_s(scenario))
+
+    def final(self, scenarios: Sequence[Scenario]) -> "GasEngine":
+        """Return the engine with cells of 0.25 m, which grow if a site is wider than 40 m."""
+        sides_m = [each.site.width_m for each in scenarios]
+        sides_m += [each.site.height_m for each in scenarios]
+        if max(sides_m, default=0.0) > _WIDEST_UNIFORM_M:
+            return replace(self, cells="fine")
+        return replace(self, cell_m=_FINAL_CELL_M)
+
+    @property
+    def coarser(self) -> "GasEngine | None":
+        """The engine with cells twice as large; `None` if they would exceed a module."""
+        cell_m = 2.0 * self.smallest_m
+        modules = MODULE_SIDE_M / cell_m
+        if modules < 1.0 - 1e-9 or abs(modules - round(modules)) > 1e-9:
+            return None
+        return replace(self, cell_m=cell_m, cells="coarse" if self.is_growing else self.cells)
 
     @property
     def words(self) -> str:
@@ -402,10 +423,11 @@ class GasResult:
             raise UnknownNameError("structure", structure, names)
         return self._scaled(names.index(structure))
 
-    def loads(self) -> BlastLoads:
-        """Return the loads on all structures; values in simulation units are NaN."""
+    @property
+    def structure_loads(self) -> tuple[StructureLoad, ...]:
+        """The loads on all structures; values in simulation units are NaN."""
         named = {each.name: each for each in self.blast.scenario.structures}
-        loads = tuple(
+        return tuple(
             StructureLoad.on(
                 named[outline.name],
                 scaled.pa_s,
@@ -418,11 +440,14 @@ class GasResult:
             if not outline.is_barrier
             for scaled in [self._scaled(index)]
         )
+
+    def loads(self) -> BlastLoads:
+        """Return the loads on all structures and, for a response, the damage of all bays."""
         bays: tuple[BayDamage, ...] = ()
         if self.bay_loads is not None and self.blast.scenario.objective.is_response:
             factor = peak_factor(self.run.grid.cell_m, self.run.site.charge.tnt_kg)
             bays = self.bay_loads.damages(self.blast.scenario.alternatives, factor)
-        return BlastLoads(loads, self.module_impulse_n_s, bays)
+        return BlastLoads(self.structure_loads, self.module_impulse_n_s, bays)
 
     def _walls(self, index: int) -> NDArray[np.int64]:
         """Return the indices of the faces of the counted walls of a structure (n,)."""

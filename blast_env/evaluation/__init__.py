@@ -9,6 +9,7 @@ from blast_env.evaluation.comparison import (
     compare,
 )
 from blast_env.evaluation.evaluator import BlastEvaluator, BlastMeter, BudgetError, Evaluators
+from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.report import (
     LayoutEvaluation,
     ThreatOutcome,
@@ -38,6 +39,7 @@ __all__ = [
     "DiskCache",
     "Estimate",
     "Evaluators",
+    "GridError",
     "LayoutEvaluation",
     "LoadsCache",
     "Objective",
@@ -47,6 +49,7 @@ __all__ = [
     "ThreatOutcome",
     "compare",
     "conditional_value_at_risk",
+    "convergence_index",
     "draw_threats",
     "evaluate_against",
     "evaluate_layout",

@@ -17,6 +17,7 @@ from blast_env.engines.contract import BlastLoads, Engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, check_distinct
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
+from blast_env.evaluation.grid_error import GridError, grid_error
 from blast_env.geometry import Element, Layout
 from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
@@ -147,6 +148,8 @@ class Comparison:
         unprotected: The same without a barrier (cases, threats).
         in_range: Whether each blast is in the range of the calibration (cases, threats).
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
+        grid_error: Error of the cells, from the threat with the largest load behind a layout;
+            `None` without one.
 
     Raises:
         BlastEnvError: If no load reaches the protected structures of a case without a barrier.
@@ -158,6 +161,7 @@ class Comparison:
     unprotected: FloatArray
     in_range: BoolArray
     cvar_level: float = CVAR_LEVEL
+    grid_error: GridError | None = None
 
     def __post_init__(self) -> None:
         check_cvar_level(self.cvar_level)
@@ -223,6 +227,34 @@ class Comparison:
         return mean_estimate(self._samples(self.unprotected))
 
     @property
+    def reduction_error(self) -> float:
+        """Error of the cells of the reduction, as under the worst threat; NaN without one."""
+        return np.nan if self.grid_error is None else self.grid_error.reduction
+
+    @property
+    def objective_error(self) -> float:
+        """Error of the cells of the objective of the first case, as `mean_error`."""
+        error, case = self.grid_error, self.cases[0]
+        if error is None:
+            return np.nan
+        share = error.of_load(lambda each: case.counted([error.objective(each)], self.layouts[0]))
+        return share * case.counted(self.loads[0], self.layouts[0])
+
+    @property
+    def mean_error(self) -> float:
+        """Error of the cells of `mean`, the share as under the worst threat; NaN without one."""
+        error = self.grid_error
+        return np.nan if error is None else self.mean.value * error.of_load(error.objective)
+
+    @property
+    def unprotected_mean_error(self) -> float:
+        """The same without a barrier."""
+        error = self.grid_error
+        if error is None:
+            return np.nan
+        return self.unprotected_mean.value * error.of_unprotected(error.objective)
+
+    @property
     def cvar(self) -> float:
         """Mean load of the worst cases (of the worst threats of a single case)."""
         return conditional_value_at_risk(self._samples(self.loads), self.cvar_level)
@@ -250,6 +282,7 @@ def compare(
     layouts: Sequence[Sequence[Element]],
     processes: int = 1,
     *,
+    coarser: Evaluators | None = None,
     cvar_level: float = CVAR_LEVEL,
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
@@ -260,6 +293,7 @@ def compare(
         cases: At least one, all with the same number of threats.
         layouts: One per case: (row, column) of the cells that hold a module, in any order.
         processes: Number of worker processes; it changes only the time.
+        coarser: `evaluators.coarser()`, for the error of the cells; there is none without it.
         cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level`.
         progress: Called with the finished share of the blasts.
 
@@ -278,13 +312,22 @@ def compare(
         for case, layout in zip(cases, layouts, strict=True)
     ]
     blasts = list(_both(evaluators, cases, cells, processes, progress))
+    loads = _counted(cases, [protected for protected, _ in blasts])
+    error = None
+    if coarser is not None:
+        number, worst = (int(each) for each in np.unravel_index(loads.argmax(), loads.shape))
+        case, (walled, bare) = cases[number], blasts[number]
+        fine = walled[worst], bare[worst]
+        threat, there = case.threats[worst], coarser.of(case.scenario)
+        error = grid_error(there, case, cells[number], threat, fine, processes)
     return Comparison(
         cases=tuple(cases),
         layouts=tuple(cells),
-        loads=_counted(cases, [protected for protected, _ in blasts]),
+        loads=loads,
         unprotected=_counted(cases, [bare for _, bare in blasts]),
         in_range=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
         cvar_level=cvar_level,
+        grid_error=error,
     )
 
 
@@ -427,6 +470,7 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
         "engine": engine.name,
         "versions": versions(engine.version),
         "result": {
+            "grid_error": grid_error_record(comparison, engine),
             "reduction": estimate_record(comparison.reduction),
             "load": estimate_record(comparison.mean),
             "unprotected_load": estimate_record(comparison.unprotected_mean),
@@ -436,6 +480,21 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
             "unprotected_cvar": comparison.unprotected_cvar,
         },
         "cases": cases,
+    }
+
+
+def grid_error_record(comparison: Comparison, engine: Engine) -> dict[str, Any] | None:
+    """Return the errors of the cells as JSON-compatible data; `None` without any."""
+    error = comparison.grid_error
+    if error is None:
+        return None
+    return {
+        "engine": engine.words,
+        "coarser": error.coarser.words,
+        "worst_seed": error.threat.seed,
+        "reduction": number_or_none(comparison.reduction_error),
+        "load": number_or_none(comparison.mean_error),
+        "unprotected_load": number_or_none(comparison.unprotected_mean_error),
     }
 
 

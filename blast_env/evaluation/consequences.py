@@ -28,7 +28,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
-from blast_env.engines.contract import Engine
+from blast_env.engines.contract import BlastLoads, Engine
 from blast_env.engines.gas_tables import means_by_wall
 from blast_env.engines.oblique_walls import STEPPED, stepped_buildings
 from blast_env.engines.pieces import PIECE_COLUMNS
@@ -160,6 +160,7 @@ class Consequences:
         unchecked: A building and the reason to distrust its loads, one per charge and building
             with such a reason.
         unjudged: Walls of buildings with a facade that no verdict covers.
+        loads: Loads on the structures, one per charge.
     """
 
     responses: tuple[BuildingResponse, ...]
@@ -167,6 +168,7 @@ class Consequences:
     barriers: tuple[BarrierResponse, ...] = ()
     unchecked: tuple[tuple[str, str], ...] = ()
     unjudged: tuple[UnjudgedWalls, ...] = ()
+    loads: tuple[BlastLoads, ...] = ()
 
     @classmethod
     def together(cls, parts: Iterable["Consequences"]) -> "Consequences":
@@ -178,7 +180,14 @@ class Consequences:
             tuple(each for part in every for each in part.barriers),
             tuple(each for part in every for each in part.unchecked),
             tuple(dict.fromkeys(each for part in every for each in part.unjudged)),
+            tuple(each for part in every for each in part.loads),
         )
+
+    @property
+    def worst_number(self) -> int:
+        """The number of the charge with the governing response."""
+        worst = governing(self.responses, lambda each: each.severity)
+        return self.responses.index(worst) // len(self.buildings)
 
     @property
     def buildings(self) -> tuple[str, ...]:
@@ -435,6 +444,7 @@ def consequences_of(
         (BarrierResponse(charge, result.pieces, taken_away),),
         tuple(unchecked(scenario, result)),
         result.unjudged,
+        (BlastLoads(result.structure_loads, result.module_impulse_n_s),),
     )
 
 

@@ -100,6 +100,11 @@ class BlastEvaluator:
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
 
+    def coarser(self) -> "BlastEvaluator | None":
+        """Return an evaluator with `Engine.coarser` and the same cache on disk, if there is one."""
+        engine = self.engine.coarser
+        return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self._cache)
+
     def loads(self, layout: Sequence[Element], threat: Threat) -> BlastLoads:
         """Return the loads of one blast.
 
@@ -280,6 +285,11 @@ class Evaluators:
         """Share of the requested loads that needed no blast; 0 without requests."""
         asked = self.blasts + self.cache_hits
         return self.cache_hits / asked if asked else 0.0
+
+    def coarser(self) -> "Evaluators | None":
+        """Return evaluators with `Engine.coarser` and the same cache on disk, if there is one."""
+        engine = self.engine.coarser
+        return None if engine is None else Evaluators(engine, self._cache, self._most)
 
     def run_ahead(self, asked: Sequence[BlastAsked], processes: int = 1) -> list[bool]:
         """Run blasts of any scenarios in one batch and cache their loads.

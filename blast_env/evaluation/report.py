@@ -2,15 +2,15 @@
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines import JUDGE, Engine, find_engine
+from blast_env.engines import JUDGE, Engine
 from blast_env.engines.contract import BlastLoads, StructureLoad, on_buildings
 from blast_env.evaluation.cases import Case, Threat, draw_threats
 from blast_env.evaluation.comparison import (
@@ -18,15 +18,17 @@ from blast_env.evaluation.comparison import (
     Comparison,
     charge_values,
     estimate_record,
+    grid_error_record,
     loads_of_both,
 )
 from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.evaluation.grid_error import GridError, LoadOf, final_engine, grid_error
 from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
 from blast_env.physics.scene import Charge
 from blast_env.provenance import versions
-from blast_env.scenario import AnyScenario, Scenario, check_layout
+from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
 from blast_env.scenario.build_scene import build_site
 from blast_env.scenario.worst_places import stand_off_m
 from blast_env.statistics import (
@@ -53,6 +55,9 @@ STRUCTURE_COLUMNS: Final = (
     Column("reduction", "", "of the calibrated impulse"),
     Column("reduction_low", "", "lower end of its 95 % confidence interval"),
     Column("reduction_high", "", "upper end of its 95 % confidence interval"),
+    Column("reduction_error", "", "error of the cells of the reduction; particles have none"),
+    Column("impulse_error_pa_s", "Pa s", "error of the cells of the impulse with the barrier"),
+    Column("unprotected_impulse_error_pa_s", "Pa s", "the same without it"),
     Column("impulse_psi_s", "psi s", "calibrated impulse per area with the barrier"),
     Column("unprotected_impulse_psi_s", "psi s", "calibrated impulse per area without it"),
     Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
@@ -93,7 +98,10 @@ THREAT_COLUMNS: Final = (
 
 
 def _structure_row(
-    loads: Sequence[StructureLoad], bare: Sequence[StructureLoad]
+    loads: Sequence[StructureLoad],
+    bare: Sequence[StructureLoad],
+    error: GridError | None,
+    impulse_of: LoadOf,
 ) -> dict[str, object]:
     first = loads[0]
     pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, bare))
@@ -110,6 +118,13 @@ def _structure_row(
     for name in ("impulse_pa_s", "impulse_sim", "transferred_impulse_sim"):
         for column, each in ((name, loads), (f"unprotected_{name}", bare)):
             row[column] = float(np.mean([getattr(load, name) for load in each]))
+    off, walled_off, bare_off = np.nan, np.nan, np.nan
+    if error is not None:
+        off = error.of_reduction(impulse_of)
+        walled_off, bare_off = error.of_load(impulse_of), error.of_unprotected(impulse_of)
+    row["reduction_error"] = off
+    row["impulse_error_pa_s"] = walled_off * float(pa_s.mean())
+    row["unprotected_impulse_error_pa_s"] = bare_off * float(bare_pa_s.mean())
     row["impulse_psi_s"] = float(pa_s.mean()) / PA_PER_PSI
     row["unprotected_impulse_psi_s"] = float(bare_pa_s.mean()) / PA_PER_PSI
     for column, each in (("peak_pa", loads), ("unprotected_peak_pa", bare)):
@@ -143,6 +158,7 @@ def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
             "unprotected_load": evaluation.unprotected_load,
         },
         "worst": _worst(evaluation.worst),
+        "grid_error": grid_error_record(evaluation.comparison, evaluation.engine),
         "in_range": evaluation.in_range,
     }
 
@@ -215,6 +231,7 @@ class LayoutEvaluation:
         calibration: Name of the calibration; `"none"` for gas dynamics.
         engine: The engine.
         cvar_level: Level of the CVaR: 0.8 is the mean of the worst 20 %.
+        grid_error: Error of the cells, from the worst threat; `None` without one.
 
     Raises:
         BlastEnvError: If no load reaches the protected structures without a barrier.
@@ -227,6 +244,7 @@ class LayoutEvaluation:
     calibration: str
     engine: Engine
     cvar_level: float
+    grid_error: GridError | None = None
 
     def __post_init__(self) -> None:
         self.comparison  # noqa: B018
@@ -252,6 +270,7 @@ class LayoutEvaluation:
             unprotected=np.array([[load.load(counts) for load in self.unprotected]]),
             in_range=np.array([[load.in_range for load in self.loads]]),
             cvar_level=self.cvar_level,
+            grid_error=self.grid_error,
         )
 
     @cached_property
@@ -297,6 +316,11 @@ class LayoutEvaluation:
     def mean_reduction(self) -> float:
         """The value of `reduction`: 0 for an unchanged load, 1 for none."""
         return self.reduction.value
+
+    @property
+    def reduction_error(self) -> float:
+        """Error of the cells of `mean_reduction`, an absolute share; NaN without one."""
+        return self.comparison.reduction_error
 
     @property
     def ci95(self) -> tuple[float, float]:
@@ -347,7 +371,15 @@ class LayoutEvaluation:
         loads, bare = (
             zip(*map(loads_of, blasts), strict=True) for blasts in (self.loads, self.unprotected)
         )
-        return table_of(list(map(_structure_row, loads, bare)), STRUCTURE_COLUMNS)
+
+        def impulse_of(blast: BlastLoads, number: int) -> float:
+            return loads_of(blast)[number].impulse_pa_s
+
+        rows = [
+            _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
+            for number, both in enumerate(zip(loads, bare, strict=True))
+        ]
+        return table_of(rows, STRUCTURE_COLUMNS)
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":
@@ -463,14 +495,16 @@ def evaluate_layout(
         layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
         seeds: At least one, without repetition; 16 or more for a useful interval.
         processes: Number of worker processes; it changes only the time.
-        engine: Name of an engine, or an engine; gas dynamics by default. There, a seed only draws
-            the charge, a charge has one realisation, and no calibration is needed.
+        engine: Name of an engine, or an engine, which keeps its cells; gas dynamics by default.
+            There, a seed only draws the charge, a charge has one realisation, and no calibration
+            is needed. The worst threat runs on cells twice as large as well, for their error.
         threats: Used instead of threats drawn with `seeds`.
         cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level` of the threats.
         cache: Folder or cache of earlier blasts; see `BlastEvaluator`.
         progress: Called with the finished share of the blasts.
-        cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
-        cells: Growth of these cells with the blast; see `GasSettings`.
+        cell_m: Side of the cells of gas dynamics, 0.25 m unless given.
+        cells: Growth of these cells with the blast; see `GasSettings`. On sites wider than 40 m
+            they grow from 0.25 m unless one of the two is given.
 
     Raises:
         LayoutError: If the layout does not fit the build zone.
@@ -482,10 +516,18 @@ def evaluate_layout(
             `processes` or `cvar_level` is out of bounds, or if no load reaches the protected
             structures even without a barrier.
     """
-    evaluator = BlastEvaluator(scenario, find_engine(engine, cell_m, cells=cells), cache=cache)
-    drawn = draw_threats(evaluator.scenario, seeds) if threats is None else tuple(threats)
+    found = find_scenario(scenario)
+    judge = final_engine(engine, [found], cell_m, cells=cells)
+    evaluator = BlastEvaluator(found, judge, cache=cache)
+    drawn = draw_threats(found, seeds) if threats is None else tuple(threats)
     return evaluate_against(
-        evaluator, layout, drawn, processes, cvar_level=cvar_level, progress=progress
+        evaluator,
+        layout,
+        drawn,
+        processes,
+        coarser=evaluator.coarser(),
+        cvar_level=cvar_level,
+        progress=progress,
     )
 
 
@@ -495,6 +537,7 @@ def evaluate_against(
     threats: Sequence[Threat],
     processes: int = 1,
     *,
+    coarser: BlastEvaluator | None = None,
     cvar_level: float = CVAR_LEVEL,
     progress: Callable[[float], None] | None = None,
 ) -> LayoutEvaluation:
@@ -507,6 +550,7 @@ def evaluate_against(
         layout: Same as for `evaluate_layout`.
         threats: At least one, without repetition.
         processes: Same as for `evaluate_layout`.
+        coarser: `evaluator.coarser()`, for the error of the cells; there is none without it.
         cvar_level: Same as for `evaluate_layout`.
         progress: Same as for `evaluate_layout`.
 
@@ -518,7 +562,7 @@ def evaluate_against(
     cells = tuple(sorted(check_layout(scenario, layout)))
     case = Case(scenario, tuple(threats))
     loads, unprotected = loads_of_both(evaluator, case, cells, processes, progress)
-    return LayoutEvaluation(
+    evaluation = LayoutEvaluation(
         case=case,
         layout=cells,
         loads=loads,
@@ -527,3 +571,7 @@ def evaluate_against(
         engine=evaluator.engine,
         cvar_level=cvar_level,
     )
+    worst = evaluation.outcomes.index(evaluation.worst)
+    fine = loads[worst], unprotected[worst]
+    error = grid_error(coarser, case, cells, threats[worst], fine, processes)
+    return replace(evaluation, grid_error=error)

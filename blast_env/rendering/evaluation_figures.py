@@ -9,6 +9,7 @@ import numpy as np
 
 from blast_env.evaluation.cases import Case
 from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.grid_error import points
 from blast_env.evaluation.report import LayoutEvaluation
 from blast_env.geometry import Layout, layout_counts
 from blast_env.physics.scene import BlastSite, Charge
@@ -179,7 +180,8 @@ def _title(evaluation: LayoutEvaluation) -> str:
     layout = evaluation.layout
     barrier = layout_counts(layout, "barrier") if layout else "no barrier"
     noun = evaluation.scenario.objective.noun
-    reduction = f"reduction of the {noun} {_percent(evaluation.mean_reduction)}"
+    share, error = evaluation.mean_reduction, evaluation.reduction_error
+    reduction = f"reduction of the {noun} {_with_error(share, error)}"
     return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
 
 
@@ -197,6 +199,13 @@ def _subtitle(evaluation: LayoutEvaluation) -> str:
 
 def _percent(share: float) -> str:
     return "-" if isnan(share) else f"{_PERCENT * share:.0f} %"
+
+
+def _with_error(share: float, error: float) -> str:
+    """Return a reduction with its error of the cells, if there is one."""
+    if isnan(error):
+        return _percent(share)
+    return f"{_PERCENT * share:.1f} % \N{PLUS-MINUS SIGN} {points(error)} (cells)"
 
 
 def _interval(reduction: Estimate) -> str:
@@ -384,7 +393,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     place = panels[0].case.scenario.name if is_one_site else "different sites"
     write_heading(
         figure,
-        f"{place}: {_headline(len(panels), comparison.reduction)}",
+        f"{place}: {_headline(comparison)}",
         _cases_subtitle(panels),
     )
     return figure
@@ -435,10 +444,11 @@ def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
     )
 
 
-def _headline(count: int, reduction: Estimate) -> str:
-    if count == 1:
-        return f"reduction {_percent(reduction.value)}"
-    mean = f"a layout for each case, mean reduction {_percent(reduction.value)}"
+def _headline(comparison: Comparison) -> str:
+    reduction, error = comparison.reduction, comparison.reduction_error
+    if comparison.has_one_case:
+        return f"reduction {_with_error(reduction.value, error)}"
+    mean = f"a layout for each case, mean reduction {_with_error(reduction.value, error)}"
     return f"{mean}{_interval(reduction)}"
 
 

@@ -144,7 +144,9 @@ def test_a_proposal_is_verified_and_written(
 ) -> None:
     out = tmp_path / "layout.json"
     charge = ("--charge", *CHARGE.position_m)
-    done = proposed(folder, monkeypatch, yard, *charge, "--verify", "--out", out)
+    done = proposed(
+        folder, monkeypatch, yard, *charge, "--verify", "--cells", "coarse", "--out", out
+    )
     assert done.exit_code == 0, done.output
     assert "by the weights of walled_yard" in done.output
     for row in ("no barrier", "wall near the charge", "most sight lines cut", "this proposal"):

@@ -82,7 +82,10 @@ def test_the_rule_is_among_those_that_a_proposal_is_chosen_from_and_held_against
     save_scenario(hut(), tmp_path / "hut.toml")
     shown = run("propose", tmp_path / "hut.toml", "--verify").stdout
     assert "up to 5 blasts of gas: about " in shown
-    assert "from the corner" in shown.partition("judged by gas dynamics")[2]
+    verdict = shown.partition("judged by gas dynamics")[2]
+    assert "from the corner" in verdict
+    ruled = next(line for line in verdict.splitlines() if line.startswith("from the corner"))
+    assert ruled.count("(cells)") == 2  # beside the load and its reduction
 
 
 def test_both_enter_a_league(tmp_path: Path) -> None:

@@ -80,7 +80,8 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     options = ("--tnt-kg", "1", "--budget", "3", "--judge-cell", "0.5")
     files = ("--out", out, "--picture", picture)
     text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
-    first, verdict = text.splitlines()[:2]
+    first, cost, verdict = text.splitlines()[:3]
+    assert cost.startswith("up to 48 blasts of gas")  # 4 kinds, 3 searches of 3, each judged once
     assert first.startswith("4 kinds, at most 3 searches of 3 blasts each, gas, cells of 0.5 m; ")
     assert first.endswith("each result is judged with 1, gas, cells of 0.5 m")
     assert "walled_yard" in verdict
@@ -93,8 +94,8 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     page = ("--cells", "0.5", "0.5", "--no-items", "--stills", "0", "--places", "1")
     for command, *words in (
         ("draw", site, "--layout", out, "--out", tmp_path / "plan.svg"),
-        ("assess", site, "--layout", out, "--charges", "1", *charge),
-        ("evaluate", "--scenario", site, "--layout", out, "--seeds", "1", *charge),
+        ("assess", site, "--layout", out, "--charges", "1", "--cell", 0.5, *charge),
+        ("evaluate", "--scenario", site, "--layout", out, "--seeds", "1", "--cell", 0.5, *charge),
         ("report", site, "--layout", out, "--charge", "2,6,1", *page, "--out", tmp_path / "a.html"),
     ):
         done = CliRunner().invoke(app, [command, *map(str, words)])

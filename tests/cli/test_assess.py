@@ -11,6 +11,7 @@ from blast_env.cli import app
 from blast_env.cli.options import wanted_level
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario
+from tests.gas_sites import WALL, glazed_hut
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +41,9 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
         tmp_path / name for name in ("facade.png", "view.png", "diagram.png", "bays.xlsx")
     )
     files = ("--picture", picture, "--view", view, "--diagram", diagram, "--table", table)
-    output = run(site, "--tnt-kg", "1", "--target", "medium", *files)
-    engine, verdict = output.splitlines()[:2]
+    output = run(site, "--tnt-kg", "1", "--target", "medium", "--cell", "0.5", *files)
+    engine, cost, verdict = output.splitlines()[:3]
+    assert cost.startswith("up to a blast of gas")
     assert engine.startswith("engine gas ")
     assert verdict.startswith("glazed_room, no barrier: FAILS level 'medium' under 1 charges")
     rows = {line.split()[0]: line for line in output.splitlines() if line.startswith("window")}
@@ -55,7 +57,7 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
 @pytest.mark.slow
 def test_no_verdict_passes_without_the_flags_of_its_loads(site: Path) -> None:
     """1 kg on cells of 0.5 m: 2 cells per m/kg^(1/3), where 9.2 are wanted."""
-    lines = run(site, "--tnt-kg", "1", "--target", "very low").splitlines()
+    lines = run(site, "--tnt-kg", "1", "--target", "very low", "--cell", "0.5").splitlines()
     verdict = next(k for k, line in enumerate(lines) if "glazed_room, no barrier" in line)
     assert "PASSES (flagged) level 'very low'" in lines[verdict]
     assert lines[verdict + 1].startswith("flag: control_room: 1 of 1 charges are outside")
@@ -84,3 +86,16 @@ def test_a_site_s_own_target_counts_unless_another_one_is_asked_for(
 
 def test_a_level_that_does_not_exist(site: Path) -> None:
     assert "did you mean 'medium'" in run(site, "--target", "meduim")
+
+
+def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
+    """Beside impulses, reduction and panes; not with the largest cells, which have no coarser."""
+    site = tmp_path / "glazed.toml"
+    blast_env.save_scenario(glazed_hut(), site)
+    layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
+    output = run(site, "--layout", layout)
+    line = next(each for each in output.splitlines() if each.startswith("impulse on the protected"))
+    assert line.count("(cells)") == 3
+    panes = [each for each in output.splitlines() if each.startswith(("no barrier", "6 barrier"))]
+    assert all(" +- " in each for each in panes)
+    assert len(panes) == 2

@@ -166,7 +166,7 @@ def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path
 def test_a_fixed_charge_has_one_blast_of_gas_dynamics(hut_file: Path, tmp_path: Path) -> None:
     wall = tmp_path / "wall.json"
     wall.write_text("[[1, 0], [2, 0]]")
-    given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3)
+    given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3, "--cell", 0.5)
     shown = run("evaluate", *given, "--charge", 2, 3.5, "--tnt-kg", 4).stdout
     assert "4 kg TNT at (2.00, 3.50) m" in shown
     assert "2 blasts run" in shown

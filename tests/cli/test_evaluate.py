@@ -45,8 +45,8 @@ def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: P
     expected = evaluate_layout(load_scenario("courtyard"), CELLS, (7, 8, 9), engine="event")
     content = json.loads((out / "evaluation.json").read_text())
     assert content == expected.to_dict()
-    low, high = (100.0 * end for end in expected.ci95)
-    interval = f"(95 % interval {low:.1f} % to {high:.1f} %)"
+    half = 100.0 * (expected.mean_reduction - expected.ci95[0])
+    interval = f"+- {half:.1f} (95 %, threats)"
     assert f"mean reduction {100.0 * expected.mean_reduction:.1f} % {interval}" in result.stdout
     assert f"mean of the worst 20 % {expected.cvar_pa_s:,.0f} Pa s" in result.stdout
     assert f"seed {expected.worst.threat.seed}: {expected.worst.impulse_pa_s:,.0f}" in result.stdout
@@ -69,7 +69,9 @@ def test_it_prints_json_and_says_when_one_threat_has_no_interval(layout: Path) -
     assert content["files"] == []
     assert content["cache"] == {"blasts": 2, "hits": 0, "hit_rate": 0.0}
     table = evaluate("--layout", layout, "--seeds", "1")
-    assert "(95 % interval -)" in table.stdout
+    share = 100.0 * content["result"]["reduction"]["value"]
+    assert f"mean reduction {share:.1f} %\n" in table.stdout
+    assert "(cells)" not in table.stdout
 
 
 def test_it_says_what_is_outside_the_calibration(tmp_path: Path) -> None:

@@ -58,11 +58,20 @@ def test_json_has_the_loads_and_the_cell(site: Path) -> None:
 
 def test_a_layout_is_evaluated_by_gas_unless_told_otherwise(site: Path, tmp_path: Path) -> None:
     layout = write_layout(tmp_path / "wall.json", hut(), WALL, {"made by": "hand"})
-    options = ("--layout", layout, "--scenario", site, "--seeds", 1, "--json")
-    content = json.loads(run("evaluate", *options).stdout)
+    options = ("--layout", layout, "--scenario", site, "--seeds", 1)
+    content = json.loads(run("evaluate", *options, "--json").stdout)
     assert content["engine"] == "gas"
     assert 0.05 < content["result"]["reduction"]["value"] < 0.6
-    assert content["cache"]["blasts"] == 2
+    assert content["cache"] == {"blasts": 4, "hits": 0, "hit_rate": 0.0}
+    error = 100.0 * content["result"]["grid_error"]["reduction"]
+    share = f"{100.0 * content['result']['reduction']['value']:.1f} %"
+    shown = run("evaluate", *options).stdout
+    assert "up to 4 blasts of gas" in shown
+    assert f"mean reduction {share} +- {error:.1f} (cells)" in shown
+    assert shown.count("(cells)") == 4  # three numbers, and how it is found
+    coarse = run("evaluate", *options, "--cell", 0.5).stdout
+    assert "up to 2 blasts of gas" in coarse
+    assert "(cells)" not in coarse
 
 
 @pytest.mark.parametrize(

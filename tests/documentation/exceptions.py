@@ -125,7 +125,9 @@ _LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
 
 SMALLER: Final[dict[str, str]] = {
     # README.md
-    "blast-env evaluate --layout walls.json --scenario visitor_entrance --seeds 4": "--seeds 1",
+    "blast-env evaluate --layout walls.json --scenario visitor_entrance --seeds 4": (
+        "--seeds 1 --cell 0.5"
+    ),
     "blast-env report visitor_entrance --layout walls.json --out report.html --pdf report.pdf": (
         "--threats 1 --places 1 --stills 1 --no-items"
     ),
@@ -149,7 +151,7 @@ SMALLER: Final[dict[str, str]] = {
         f"--scenario visitor_entrance --budget 4 --held-out 1 {_CLUSTER}"
     ),
     "blast-env evaluate --engine gas --layout wall.json --seeds 1000 --cluster dask.json": (
-        "--seeds 1"
+        "--seeds 1 --cell 0.5"
     ),
     "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786 --run runs/gas": (
         f"{_TRAIN} --engine event {_CLUSTER}"
@@ -166,7 +168,7 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --layout found/layout.json --scenario my_site.toml --engine gas"
     " --cells fine": "--seeds 1 --cells coarse",
     "blast-env evaluate --layout wall.json --scenario my_site.toml --engine gas --seeds 8": (
-        "--seeds 1"
+        "--seeds 1 --cell 0.5"
     ),
     "python -m studies.gas source": "--cell 1",
     # docs/engineers/response.md
@@ -199,9 +201,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/studies/scenarios.md
     "blast-env evaluate --scenario visitor_entrance --layout"
-    " docs/data/best_found/visitor_entrance.json --engine gas --cell 0.25 --seeds 3": (
-        "--cell 0.5 --seeds 1"
-    ),
+    " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
     # docs/researchers/surrogate.md
     "python -m studies.surrogate blasts --first 79 --sites 337 --layouts 4 --rules 3"
     " --cache blasts": "--sites 1 --layouts 1 --rules 1",

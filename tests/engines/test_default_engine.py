@@ -60,8 +60,9 @@ def test_each_result_names_its_engine_first(tmp_path: Path) -> None:
     site = tmp_path / "glazed_hut.toml"
     save_scenario(glazed_hut(), site)
     layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
-    judged = run("evaluate", "--layout", layout, "--scenario", site, "--seeds", "1")
+    coarse = ("--cell", "0.5")
+    judged = run("evaluate", "--layout", layout, "--scenario", site, "--seeds", "1", *coarse)
     assert judged.stdout.startswith("engine gas")
-    assert run("assess", site, "--charges", "1").stdout.startswith("engine gas")
+    assert run("assess", site, "--charges", "1", *coarse).stdout.startswith("engine gas")
     found = run("search", "--method", "random", "--scenario", site, "--budget", "2")
     assert found.stdout.startswith("engine gas")

@@ -25,7 +25,7 @@ def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
     zone = HUT.zone
     _, reward, ended, _, info = env.step(WALL[-1][0] * zone.columns + WALL[-1][1])
     assert ended
-    expected = evaluate_layout(HUT, WALL, [0], engine="gas")
+    expected = evaluate_layout(HUT, WALL, [0], engine="gas", cell_m=0.5)
     assert info["impulse_pa_s"] == pytest.approx(expected.impulse_pa_s.value)
     assert info["reduction"] == pytest.approx(expected.mean_reduction)
     assert reward == pytest.approx(-info["impulse_psi_s"])

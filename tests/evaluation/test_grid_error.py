@@ -1,0 +1,136 @@
+"""The error of the cells: the index, the cells it takes, and where it stands."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blast_env.engines import find_engine
+from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Evaluators, compare, evaluate_layout
+from blast_env.evaluation.cases import Case, draw_threats
+from blast_env.evaluation.grid_error import (
+    convergence_index,
+    final_engine,
+    points,
+    with_errors,
+)
+from blast_env.scenario import load_scenario
+from blast_env.statistics import reductions
+from tests.gas_sites import WALL, hut, site_document
+
+NUMBERS = st.floats(-1e6, 1e6)
+
+
+def test_the_index_is_that_of_a_published_example() -> None:
+    """Pressure recovery of an inlet on three grids, in NASA's tutorial on grid convergence."""
+    fine, medium, coarse = 0.97050, 0.96854, 0.96178
+    one = convergence_index(fine, medium, 2.0, 1.786170, 1.25) / fine
+    other = convergence_index(medium, coarse, 2.0, 1.786170, 1.25) / medium
+    assert one == pytest.approx(0.00103083, rel=1e-4)
+    assert other == pytest.approx(0.00356244, rel=2e-4)
+
+
+def test_with_two_sizes_it_is_three_times_the_extrapolated_change() -> None:
+    """By hand: 3 |0.48 - 0.50| / (2^2 - 1) = 0.02, and 3 * 0.02 / (2 - 1) with order 1."""
+    assert convergence_index(0.48, 0.50) == pytest.approx(0.02)
+    assert convergence_index(0.48, 0.50, order=1.0) == pytest.approx(0.06)
+
+
+@given(NUMBERS, NUMBERS)
+def test_it_has_no_sign(one: float, other: float) -> None:
+    assert convergence_index(one, other) == convergence_index(other, one) >= 0.0
+    assert convergence_index(-one, -other) == convergence_index(one, other)
+    assert convergence_index(one, one) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("ratio", 1.0), ("order", 0.0), ("factor", -1.25), ("ratio", float("nan"))]
+)
+def test_nonsense_is_refused(name: str, value: float) -> None:
+    with pytest.raises(BlastEnvError, match=f"{name} is .*, must be above"):
+        convergence_index(1.0, 2.0, **{name: value})
+
+
+def test_final_cells_are_uniform_up_to_40_m_and_grow_beyond() -> None:
+    small, wide = load_scenario("courtyard"), load_scenario("street_front")
+    assert (small.site.width_m, wide.site.width_m > 40.0) == (40.0, True)
+    assert final_engine("gas", [small]) == GasEngine(cell_m=0.25)
+    assert final_engine("gas", [small, wide]) == GasEngine(cells="fine")
+    assert final_engine("gas", [wide], 0.5) == GasEngine(cell_m=0.5)
+    assert final_engine("gas", [small], cells="coarse") == GasEngine(cells="coarse")
+    assert final_engine(GasEngine(), [wide]) == GasEngine()
+    assert final_engine("event", [small]) == find_engine("event")
+
+
+@pytest.mark.parametrize(
+    ("engine", "coarser"),
+    [
+        (GasEngine(cell_m=0.25), GasEngine(cell_m=0.5)),
+        (GasEngine(cell_m=0.125, until="walls"), GasEngine(cell_m=0.25, until="walls")),
+        (GasEngine(cells="fine"), GasEngine(cells="coarse")),
+        (GasEngine(cells="fine", cell_m=0.125), GasEngine(cells="coarse", cell_m=0.25)),
+        (GasEngine(cell_m=0.5), None),
+        (GasEngine(cells="coarse"), None),
+        (GasEngine(cell_m=0.5 / 3), None),
+        (find_engine("event"), None),
+    ],
+)
+def test_the_coarser_cells_are_twice_as_large(engine: GasEngine, coarser: GasEngine | None) -> None:
+    assert engine.coarser == coarser
+
+
+def test_words() -> None:
+    assert with_errors("48.5 %", points(0.0141), "2.1 (95 %, charges)") == (
+        "48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)"
+    )
+    assert with_errors("48.5 %", points(float("nan"))) == "48.5 %"
+
+
+def test_final_statements_have_it_beside_each_number() -> None:
+    """The loads on the hut by hand: fine cells, and coarse ones under the only charge."""
+    evaluation = evaluate_layout(hut(), WALL, [0])
+    assert evaluation.engine == GasEngine(cell_m=0.25)
+    walled, bare = (
+        [
+            GasBlast(hut(), layout, 0, GasEngine(cell_m=cell_m)).run().impulse("hut").pa_s
+            for cell_m in (0.25, 0.5)
+        ]
+        for layout in (WALL, ())
+    )
+    gone = [reductions(*each).item() for each in zip(walled, bare, strict=True)]
+    (row,) = evaluation.table.to_dict("records")
+    assert row["reduction_error"] == pytest.approx(convergence_index(*gone))
+    assert row["impulse_error_pa_s"] == pytest.approx(convergence_index(*walled))
+    assert row["unprotected_impulse_error_pa_s"] == pytest.approx(convergence_index(*bare))
+    found = evaluation.to_dict()["result"]["grid_error"]
+    assert found["coarser"] == "gas, cells of 0.5 m"
+    assert found["reduction"] == pytest.approx(convergence_index(*gone))
+    assert found["load"] == pytest.approx(convergence_index(*walled))
+    assert found["unprotected_load"] == pytest.approx(convergence_index(*bare))
+    assert evaluation.comparison.objective_error == pytest.approx(found["load"])
+    assert 0.001 < found["reduction"] < 0.05
+
+
+@pytest.mark.parametrize("engine", ["event", GasEngine(border_m=0.0)])
+def test_particles_and_the_largest_cells_have_none(engine: str | GasEngine) -> None:
+    site = load_scenario("courtyard") if engine == "event" else hut()
+    evaluation = evaluate_layout(site, (), [0], engine=engine)
+    assert evaluation.to_dict()["result"]["grid_error"] is None
+    assert evaluation.table["reduction_error"].isna().all()
+
+
+def test_several_cases_have_that_of_the_worst_charge() -> None:
+    document = site_document()
+    document["charge"][0]["tnt_kg"] = 2.0
+    light = hut().from_document(document, "light")
+    evaluators = Evaluators(GasEngine(cell_m=0.25, border_m=0.0))
+    coarser = evaluators.coarser()
+    assert coarser is not None
+    cases = [Case(each, draw_threats(each, [0])) for each in (light, hut())]
+    found = compare(evaluators, cases, [WALL, WALL], coarser=coarser)
+    assert found.grid_error is not None
+    assert found.grid_error.case is cases[1]
+    assert coarser.blasts == 2
+    assert 0.0 < found.reduction_error < 0.05
+    assert 0.0 < found.mean_error < 0.1 * found.mean.value
