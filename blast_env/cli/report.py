@@ -19,7 +19,7 @@ from blast_env.errors import BlastEnvError, value_text
 from blast_env.physics.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import check_layout, load_layout, load_scenario
+from blast_env.scenario import Scenario, check_layout, load_layout, load_scenario
 from blast_env.values import plain_number
 
 if TYPE_CHECKING:
@@ -48,11 +48,12 @@ class ReportCommand(ProcessOptions, CacheOptions):
         show_default="of each charge source the worst of its places with the layout",
     )
     most_threats: int = option(2, "How many of those, 1 to 6.", flag="--threats")
-    cells: tuple[str, str] = option(
-        ("0.5", "0.25"),
-        "Sides of the cells of gas dynamics, m; the same twice is one size. On large sites coarse "
-        "fine.",
+    cells: tuple[str, str] | None = option(
+        None,
+        "Sides of the cells of gas dynamics, m, or coarse fine, which grow; the same twice is one "
+        "size, without the error of the cells.",
         metavar="COARSE FINE",
+        show_default="0.5 0.25; coarse fine on sites wider than 40 m",
     )
     limits: tuple[str, ...] = option(
         (),
@@ -76,7 +77,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         from blast_env.reporting.page import check_targets
 
         check_targets(self.out, self.pdf)
-        options = self._study_options()
+        options = self._study_options(scenario)
         check_layout(scenario, layout)
         cost = ReportCost.of(scenario, layout, options)
         message_console().print(cost.words)
@@ -100,8 +101,8 @@ class ReportCommand(ProcessOptions, CacheOptions):
         kept = super().how_to_resume()
         return kept if self.cache is None else f"{kept}, and draws the threats again"
 
-    def _study_options(self) -> "StudyOptions":
-        from blast_env.reporting import Limit, StudyOptions, UnitSystem
+    def _study_options(self, scenario: Scenario) -> "StudyOptions":
+        from blast_env.reporting import Limit, StudyOptions, UnitSystem, final_cells
 
         units = UnitSystem.named(self.units)
         given: dict[str, Any] = {
@@ -110,7 +111,9 @@ class ReportCommand(ProcessOptions, CacheOptions):
         given["charges"] = tuple(Charge((x_m, y_m), tnt_kg) for x_m, y_m, tnt_kg in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units
-        given["cells"] = tuple(_cells(each) for each in self.cells)
+        given["cells"] = final_cells(scenario)
+        if self.cells is not None:
+            given["cells"] = tuple(_cells(each) for each in self.cells)
         given["target"] = None if self.target is None else LevelOfProtection.named(self.target)
         return StudyOptions(**given)
 

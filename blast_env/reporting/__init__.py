@@ -3,6 +3,15 @@
 from blast_env.reporting.loads import UNITS, UnitSystem
 from blast_env.reporting.outcomes import Limit
 from blast_env.reporting.page import write_report
-from blast_env.reporting.study import Study, StudyOptions, run_study
+from blast_env.reporting.study import Study, StudyOptions, final_cells, run_study
 
-__all__ = ["UNITS", "Limit", "Study", "StudyOptions", "UnitSystem", "run_study", "write_report"]
+__all__ = [
+    "UNITS",
+    "Limit",
+    "Study",
+    "StudyOptions",
+    "UnitSystem",
+    "final_cells",
+    "run_study",
+    "write_report",
+]

@@ -6,8 +6,10 @@ This module has no model of damage: judging loads takes knowledge of the buildin
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
+from typing import Self
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation.grid_error import convergence_index
 from blast_env.geometry import Layout, Rectangle
 from blast_env.physics.gas.settings import Cells
 from blast_env.reporting.loads import ReportedBuilding, TargetLoad, UnitSystem
@@ -101,6 +103,37 @@ class LoadPair:
     def reduction(self) -> float:
         """Share of the impulse that is gone; NaN if there is none."""
         return reductions(self.walled.impulse_pa_s, self.bare.impulse_pa_s).item()
+
+
+@dataclass(frozen=True)
+class LoadErrors:
+    """Errors of the cells of the impulses on a building under a threat.
+
+    Attributes:
+        bare_pa_s: Of the impulse without the layout.
+        walled_pa_s: Of that with it.
+        reduction: Of its reduction, an absolute share.
+    """
+
+    bare_pa_s: float
+    walled_pa_s: float
+    reduction: float
+
+    @classmethod
+    def of(cls, fine: LoadPair, coarse: LoadPair, ratio: float) -> Self:
+        """Return the errors from the loads with two sizes of cells.
+
+        Args:
+            fine: The loads with the finer cells.
+            coarse: The same with the coarser ones.
+            ratio: Side of the coarser cells over that of the finer ones.
+        """
+        pairs = (
+            (fine.bare.impulse_pa_s, coarse.bare.impulse_pa_s),
+            (fine.walled.impulse_pa_s, coarse.walled.impulse_pa_s),
+            (fine.reduction, coarse.reduction),
+        )
+        return cls(*(convergence_index(*each, ratio) for each in pairs))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import tomli_w
 from blast_env.engines.bays import bay_rows
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation.consequences import verdict_word
+from blast_env.evaluation.grid_error import FACTOR, ORDER
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.geometry import layout_counts, layout_text
 from blast_env.physics.gas.settings import CHECKED_SCALED_DISTANCE
@@ -29,7 +30,7 @@ from blast_env.reporting.figures import (
     worth_map,
 )
 from blast_env.reporting.loads import TargetLoad, UnitSystem
-from blast_env.reporting.outcomes import LoadPair
+from blast_env.reporting.outcomes import LoadErrors, LoadPair
 from blast_env.reporting.peaks import PeakSource
 from blast_env.reporting.study import Study
 from blast_env.reporting.threats import other_places
@@ -46,6 +47,7 @@ HTML_SUFFIXES: Final = (".html", ".htm")
 _TEMPLATE: Final = "report.html.j2"
 _NONE: Final = "\N{EN DASH}"
 _MINUS: Final = "\N{MINUS SIGN}"
+_PLUS_MINUS: Final = "\N{PLUS-MINUS SIGN}"
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "matplotlib")
 _HASH_DIGITS: Final = 16
 _MOST_BAYS: Final = 40
@@ -125,6 +127,8 @@ def report_html(study: Study, commands: list[str]) -> str:
         "counted": lambda load: _counted(load, units),
         "word": lambda passes, flagged: verdict_word(passes, flagged).lower(),
         "percent": _percent,
+        "impulse_error": lambda pa_s: _error(units.impulse_of(pa_s)),
+        "share_error": lambda share: _error(100.0 * share, 1),
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),
         "money": lambda cost: f"{cost:,.10g}",
@@ -166,6 +170,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "two_sizes": coarse != fine,
         "cells": " and ".join(dict.fromkeys(options.words)),
         "grid_error": study.grid_error,
+        "index": {"ratio": options.ratio, "factor": FACTOR, "order": ORDER},
         "worth_map": worth_map(scenario, study.items) if study.items else None,
         "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
         "place_figure": place_figure(scenario, places, study.places) if study.places else None,
@@ -192,12 +197,16 @@ class SummaryLine:
         worst: The threat with the largest impulse with the layout.
         least: Smallest reduction of its impulse under a threat.
         most: Largest reduction.
+        errors: Errors of the cells of the impulses under the worst threat.
+        error: Largest error of the cells of a reduction.
     """
 
     name: str
     worst: LoadPair
     least: float
     most: float
+    errors: LoadErrors
+    error: float
 
 
 def _summary(study: Study) -> list[SummaryLine]:
@@ -212,7 +221,9 @@ def _summary(study: Study) -> list[SummaryLine]:
         if own:
             gone = [each.reduction for each in own]
             worst = max(own, key=lambda each: each.walled.impulse_pa_s)
-            lines.append(SummaryLine(target.name, worst, float(min(gone)), float(max(gone))))
+            error = max(study.errors(each).reduction for each in own)
+            ends = float(min(gone)), float(max(gone))
+            lines.append(SummaryLine(target.name, worst, *ends, study.errors(worst), error))
     return lines
 
 
@@ -303,25 +314,27 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
             )
             found += [(f"{each.name}, {words}: {what}", value, where) for what, value in values]
     for line in summary:
-        for words, of_blast, load in (
-            (*sides[0], line.worst.bare),
-            (*sides[1], line.worst.walled),
+        for words, of_blast, load, error in (
+            (*sides[0], line.worst.bare, line.errors.bare_pa_s),
+            (*sides[1], line.worst.walled, line.errors.walled_pa_s),
         ):
             label = f"{line.worst.threat.name} {of_blast}, {fine}"
             where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
             impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
+            impulse += _of_cells(_error(units.impulse_of(error)))
             peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
             found.append((f"{line.name}, {words}: impulse", impulse, where))
             found.append((f"{line.name}, {words}: peak", peak, where))
         span = f"{_percent(line.least)} to {_percent(line.most)}"
+        span += _of_cells(_error(100.0 * line.error, 1))
         found.append((f"{line.name}: reduction", span, "1 - impulse with / without, all threats"))
     found.append(("cost of the layout", f"{study.cost:,.10g}", "bill of quantities"))
     if isfinite(study.grid_error):
         found.append(
             (
-                "difference between the cells",
+                "error of the cells",
                 _percent(study.grid_error),
-                "largest difference of a reduction between the two sizes of cells",
+                "grid convergence index, the largest of all reductions",
             )
         )
     if verdict.barrier is not None:
@@ -356,6 +369,22 @@ def _number(value: float) -> str:
         return "0"
     digits = max(0, 2 - int(np.floor(np.log10(abs(value)))))
     return f"{value:,.{digits}f}".replace("-", _MINUS)
+
+
+def _error(value: float, digits: int | None = None) -> str:
+    """Return an error with its sign, with two significant digits or the given decimals.
+
+    Empty if it is not finite.
+    """
+    if not isfinite(value):
+        return ""
+    if digits is None:
+        digits = max(0, 1 - int(np.floor(np.log10(value)))) if value > 0.0 else 0
+    return f" {_PLUS_MINUS} {value:,.{digits}f}"
+
+
+def _of_cells(error: str) -> str:
+    return error and f"{error} (cells)"
 
 
 def _counted(load: TargetLoad, units: UnitSystem) -> str:

@@ -38,6 +38,7 @@ from blast_env.reporting.outcomes import (
     FrontPoint,
     ItemWorth,
     Limit,
+    LoadErrors,
     LoadPair,
     Outcome,
     check_limits,
@@ -60,6 +61,12 @@ _BARE, _WALLED = "without a barrier", "with the layout"
 _FILM, _MASSES_PART, _ITEMS, _PLACES, _FRONT = (
     *("film", "other masses", "without each item", "other places", "front"),
 )
+
+
+def final_cells(scenario: Scenario) -> tuple[Cells, Cells]:
+    """Return the coarser and the finer cells of a report on a site, by `GasEngine.final`."""
+    fine = GasEngine().final([scenario])
+    return ("coarse", "fine") if fine.is_growing else (2.0 * fine.cell_m, fine.cell_m)
 
 
 @dataclass(frozen=True)
@@ -121,6 +128,12 @@ class StudyOptions:
     def sizes(self) -> tuple[Cells, ...]:
         """The cells, each once."""
         return tuple(dict.fromkeys(self.cells))
+
+    @property
+    def ratio(self) -> float:
+        """Side of the coarser cells over that of the finer ones; 1 for one size."""
+        coarse, fine = (GasEngine.with_cells(each).smallest_m for each in self.cells)
+        return coarse / fine
 
     @property
     def coarse(self) -> GasEngine:
@@ -198,22 +211,21 @@ class Study:
             if (each.target.name, each.threat.name, each.cells) == (target.name, threat.name, cells)
         )
 
+    def errors(self, pair: LoadPair) -> LoadErrors:
+        """Return the errors of the cells of the impulses on a building; NaN with one size."""
+        coarse, fine = self.options.cells
+        if self.options.ratio == 1.0 or pair.cells != fine:
+            return LoadErrors(float("nan"), float("nan"), float("nan"))
+        return LoadErrors.of(pair, self.pair(pair.target, pair.threat, coarse), self.options.ratio)
+
     @property
     def grid_error(self) -> float:
-        """Largest difference of a reduction between the two sizes of cells; NaN with one."""
-        coarse, fine = self.options.cells
-        if coarse == fine:
-            return float("nan")
-        differences = [
-            abs(
-                self.pair(target, threat, coarse).reduction
-                - self.pair(target, threat, fine).reduction
-            )
-            for target in self.targets
-            if target.protected
-            for threat in self.threats
-        ]
-        return float(np.nanmax(differences))
+        """Largest error of the cells of a reduction of the impulse; NaN with one size."""
+        fine = self.options.cells[1]
+        own = [each for each in self.pairs if each.target.protected and each.cells == fine]
+        found = [self.errors(each).reduction for each in own]
+        known = [each for each in found if np.isfinite(each)]
+        return max(known, default=float("nan"))
 
 
 Told = Callable[[str, float], None]
@@ -242,7 +254,7 @@ def run_study(
         BlastEnvError: If the layout is not legal, a charge is out of place, a limit names no
             building, or a front cannot be read; all before the first blast.
     """
-    options = options or StudyOptions()
+    options = options or StudyOptions(cells=final_cells(scenario))
     cells = check_layout(scenario, layout)
     if not cells:
         raise BlastEnvError("the layout is empty: there is nothing to report on")

@@ -17,6 +17,7 @@ from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat
 from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation.grid_error import convergence_index
 from blast_env.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.physics.gas.settings import Cells
@@ -69,7 +70,12 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     assert 0.1 < pair.reduction < 0.5
     assert {each.cells for each in study.pairs} == {0.5, 0.25}
     fine = study.pair(target, threat, 0.25)
-    assert study.grid_error == pytest.approx(abs(pair.reduction - fine.reduction))
+    errors = study.errors(fine)
+    assert study.grid_error == errors.reduction
+    assert errors.reduction == pytest.approx(convergence_index(fine.reduction, pair.reduction))
+    both = (each.walled.impulse_pa_s for each in (fine, pair))
+    assert errors.walled_pa_s == pytest.approx(convergence_index(*both))
+    assert np.isnan(study.errors(pair).reduction)  # of the coarser cells there is none
     digests = dict(study.digests)
     assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
 
@@ -325,6 +331,9 @@ def test_a_report_that_is_stopped_has_what_was_done(
     assert f"three dimensions), {words}." in page
     assert f"take those with {words.split(' and ')[-1]} as a lower bound" in page
     assert not re.search(r"\b(coarse|fine) m\b", page)
+    shown = f"{100.0 * stopped.pairs[-1].reduction:.1f} %"
+    error = f"{shown} \N{PLUS-MINUS SIGN} {100.0 * stopped.grid_error:.1f}"
+    assert (error in page) == ("\N{PLUS-MINUS SIGN}" in page) == (cells[0] != cells[1])
 
 
 @pytest.mark.usefixtures("_without_pictures")
