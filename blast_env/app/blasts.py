@@ -7,6 +7,7 @@ earlier pictures stay comparable when a layout is added.
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from functools import partial
+from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
@@ -15,18 +16,22 @@ import numpy as np
 
 from blast_env.app import placing
 from blast_env.app.records import (
+    COARSE,
     FILM,
     FRAME,
     RECORD,
     BlastRecord,
+    CoarseLoads,
     Film,
     Kept,
     Load,
+    LoadJudge,
     Picture,
     Wave,
     blast_key,
     read_kept,
     read_record,
+    worst_first,
     write_kept,
 )
 from blast_env.app.threats import NamedThreat
@@ -34,6 +39,7 @@ from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask
 from blast_env.calibration.model import CalibrationError
 from blast_env.engines import Blast
+from blast_env.engines.contract import StructureLoad, on_buildings
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.consequences import unchecked
@@ -109,7 +115,8 @@ def warm_engines() -> None:
 def run_blasts(task: BlastTask, tell: Tell) -> None:
     """Run one blast per threat with the layout, and one without a barrier for comparison.
 
-    Blasts with a complete record are not run again. The film of the first threat comes first.
+    Blasts with a complete record are not run again. The film of the first threat comes first. The
+    worst threat of the layout runs on coarser cells at the end, for the error of the cells.
 
     Args:
         task: The site, layout, threats and engine.
@@ -129,6 +136,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
     for number, (threat, cells) in enumerate(work):
         part = share_of(tell, number, len(work))
         _run_one(task, scenario, threat, cells, part)
+    _run_coarse(task, scenario, layout)
 
 
 def _run_one(
@@ -157,6 +165,55 @@ def _run_one(
         **found,
     )
     write_kept(record, folder / RECORD)
+
+
+def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
+    """Keep the loads with coarser cells under the charge with the largest load."""
+    coarser = task.engine.coarser
+    if coarser is None:
+        return
+    judge = LoadJudge(scenario)
+
+    def folder_of(threat: NamedThreat, cells: Layout) -> Path:
+        charge = charge_against(scenario, cells, threat.charge)
+        return Path(task.blasts) / blast_key(scenario, cells, charge, task.engine)
+
+    def load(threat: NamedThreat) -> float:
+        record = read_record(folder_of(threat, layout))
+        return nan if record is None else worst_first(judge, record)
+
+    worst = max(task.threats, key=load)
+    evaluator = BlastEvaluator(scenario, coarser.gas, cache=task.cache)
+    for cells in dict.fromkeys([layout, ()]):
+        path = folder_of(worst, cells) / COARSE
+        if not path.is_file():
+            found = evaluator.loads(cells, Threat(worst.charge, 0))
+            write_kept(_coarse_loads(scenario, found), path)
+
+
+def _coarse_loads(scenario: Scenario, found: BlastLoads) -> CoarseLoads:
+    together = Load(
+        structure="",
+        protected=True,
+        impulse_pa_s=found.protected_impulse_pa_s,
+        peak_kpa=found.protected_peak_pa / PA_PER_KPA,
+    )
+    sizes = Counter(each.building_name for each in scenario.structures)
+    buildings = (each for each in on_buildings(found.structures) if sizes[each.name] > 1)
+    return CoarseLoads(
+        loads=(together, *map(_load_of, found.structures)),
+        buildings=tuple(map(_load_of, buildings)),
+    )
+
+
+def _load_of(load: StructureLoad) -> Load:
+    return Load(
+        structure=load.name,
+        protected=load.protected,
+        impulse_pa_s=load.impulse_pa_s,
+        peak_kpa=nan if load.peak_pa is None else load.peak_pa / PA_PER_KPA,
+        area_m2=load.area_m2,
+    )
 
 
 # Particles.

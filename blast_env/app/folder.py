@@ -18,11 +18,14 @@ from pydantic import Field
 
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.records import (
+    COARSE,
     MOST_BYTES,
     RECORD,
     BlastRecord,
+    CoarseLoads,
     Kept,
     check_key,
+    read_kept,
     read_record,
     write_kept,
 )
@@ -125,6 +128,14 @@ class DesignFolder:
                 return None
             self._records[key] = record  # it never changes again
         return self._records[key]
+
+    def coarse_of(self, key: str) -> CoarseLoads | None:
+        """Return the loads of a blast on coarser cells, or `None` if they are not there."""
+        return read_kept(CoarseLoads, self.blast_of(key) / COARSE)
+
+    def coarse_there(self) -> frozenset[str]:
+        """Return the keys of the blasts with loads on coarser cells."""
+        return frozenset(path.parent.name for path in self.blasts.glob(f"*/{COARSE}"))
 
     def _content(self) -> Any:
         path = self.path / _DESIGN

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from math import nan
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from types import MappingProxyType
+from typing import Any, Final, Self, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -21,6 +22,7 @@ from blast_env.engines.contract import (
 )
 from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.grid_error import convergence_index, points
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.physics.gas.settings import UNIFORM
@@ -33,8 +35,12 @@ from blast_env.units import PA_PER_KPA
 RECORD: Final = "record.json"
 """Name of the file in the folder of a blast; written last, it marks a complete blast."""
 
+COARSE: Final = "coarse.json"
+"""Name of the file with its loads on coarser cells, if it is that of the worst charge."""
+
+_PLUS_MINUS: Final = "\N{PLUS-MINUS SIGN}"
 _DASH: Final = "\N{EN DASH}"
-_TOGETHER: Final = "all protected"
+TOGETHER: Final = "all protected"
 FILM: Final = "film.json"
 MOST_BYTES: Final = 50_000_000
 """Largest size of a file of the work folder."""
@@ -80,6 +86,21 @@ class EngineRecord(Kept):
     def gas(self) -> GasEngine:
         """Gas dynamics with its cells."""
         return GasEngine(cells=self.cells).configured(cell_m=self.cell_m)
+
+    @property
+    def coarser(self) -> "EngineRecord | None":
+        """Gas dynamics with cells twice as large; `None` if there are none, as with particles."""
+        engine = None if self.is_first_look else self.gas.coarser
+        if engine is None:
+            return None
+        return EngineRecord(name=self.name, cell_m=engine.cell_m, cells=engine.cells)
+
+    @classmethod
+    def final(cls, scenario: Scenario) -> Self:
+        """Return gas dynamics with the cells of final statements on a site."""
+        engine = GasEngine().final([scenario])
+        cell_m = None if engine.is_growing else engine.cell_m
+        return cls(name=engine.name, cell_m=cell_m, cells=engine.cells)
 
     @property
     def found(self) -> Engine:
@@ -191,6 +212,18 @@ class BlastRecord(Kept):
     waves: tuple[Wave, ...] = ()
     seconds: float
     repeat: dict[str, Any]
+
+
+class CoarseLoads(Kept):
+    """The loads of a blast with cells twice as large, for the error of the cells.
+
+    Attributes:
+        loads: Same as those of `BlastRecord`.
+        buildings: Same as those of `BlastRecord`.
+    """
+
+    loads: tuple[Load, ...]
+    buildings: tuple[Load, ...] = ()
 
 
 class Film(Kept):
@@ -354,10 +387,54 @@ class LoadJudge:
         return _DASH if load != load else self.objective.text(load)
 
 
+@dataclass(frozen=True)
+class CellErrors:
+    """The errors of the cells of a layout, from the blasts of its worst charge.
+
+    Attributes:
+        judge: Counts the loads.
+        walled: The blast with the layout, and its loads on the coarser cells.
+        bare: The same without a barrier, under the same charge.
+    """
+
+    judge: LoadJudge
+    walled: tuple[BlastRecord, CoarseLoads]
+    bare: tuple[BlastRecord, CoarseLoads]
+
+    def of_impulse(self, name: str) -> float:
+        """Return the error of the impulse on a structure or building, as a share of it."""
+        fine, coarse = (
+            next(
+                each.impulse_pa_s for each in (*own.buildings, *own.loads) if each.structure == name
+            )
+            for own in self.walled
+        )
+        return convergence_index(fine, coarse) / fine if fine > 0.0 else nan
+
+    def of_load(self, parts: Iterable[Load]) -> float:
+        """Return the error of the load that counts of some structures, as a share of it."""
+        fine, coarse = (self._counted(self.walled, parts)[index] for index in (0, 1))
+        return convergence_index(fine, coarse) / fine if fine > 0.0 else nan
+
+    def of_reduction(self, parts: Iterable[Load]) -> float:
+        """Return the error of its reduction, an absolute share."""
+        both = (self._counted(each, parts) for each in (self.walled, self.bare))
+        fine, coarse = (reductions(*pair).item() for pair in zip(*both, strict=True))
+        return convergence_index(fine, coarse)
+
+    def _counted(
+        self, blast: tuple[BlastRecord, CoarseLoads], parts: Iterable[Load]
+    ) -> tuple[float, float]:
+        record, coarse = blast
+        other = record.model_copy(update={"loads": coarse.loads})
+        return self.judge.counted(record, parts), self.judge.counted(other, parts)
+
+
 def comparison(
     records: Sequence[tuple[str, float, BlastRecord]],
     bare: Mapping[str, BlastRecord],
     scenario: Scenario,
+    coarse: Mapping[str, CoarseLoads] = MappingProxyType({}),
 ) -> list[Row]:
     """Return the comparison of layouts, one row per layout, threat and structure.
 
@@ -368,32 +445,62 @@ def comparison(
         records: Name, cost and blast of each layout.
         bare: The blast without a barrier, by the name of the threat.
         scenario: The site.
+        coarse: Loads on the coarser cells, by the key of the blast.
     """
     judge = LoadJudge(scenario)
+    errors = _errors(records, bare, judge, coarse)
     rows = []
     for name, cost, record in records:
-        unprotected = bare.get(record.threat)
+        unprotected, error = bare.get(record.threat), errors.get(name)
         without = {each.structure: each for each in _loads_of(unprotected)}
         for load, parts in _shown(record, scenario):
-            counted, share = judge.counted(record, parts), nan
+            counted, share, off = judge.counted(record, parts), nan, nan
             if unprotected is not None and without and record.layout:
                 bare_parts = [without[each.structure] for each in parts]
                 bare_load = judge.counted(unprotected, bare_parts)
                 share = reductions(counted, bare_load).item()
+                off = nan if error is None else error.of_reduction(parts)
+            impulse_off = nan if error is None else error.of_impulse(load.structure)
+            load_off = nan if error is None else error.of_load(parts)
             rows.append(
                 Row(
                     layout=name,
                     threat=record.threat,
-                    structure=load.structure or _TOGETHER,
-                    impulse=_impulse_text(load),
+                    structure=load.structure or TOGETHER,
+                    impulse=_impulse_text(load) + _error(impulse_off * load.impulse_pa_s),
                     peak=_number(load.peak_kpa),
-                    load=judge.text(counted),
+                    load=judge.text(counted) + _error(load_off * counted),
                     cost=f"{cost:g}",
-                    reduction=_percent(share),
+                    reduction=_percent(share, off),
                     engine=record.engine.label,
                 )
             )
-    return rows + list(_all_threats(records, judge))
+    return rows + list(_all_threats(records, judge, errors))
+
+
+def _errors(
+    records: Sequence[tuple[str, float, BlastRecord]],
+    bare: Mapping[str, BlastRecord],
+    judge: LoadJudge,
+    coarse: Mapping[str, CoarseLoads],
+) -> dict[str, CellErrors]:
+    """Return the errors of the cells by the name of the layout, from its largest load."""
+    found: dict[str, CellErrors] = {}
+    for name, _, record in sorted(records, key=lambda each: -worst_first(judge, each[2])):
+        unprotected = bare.get(record.threat)
+        if unprotected is None or name in found:
+            continue
+        if record.key in coarse and unprotected.key in coarse:
+            pairs = ((each, coarse[each.key]) for each in (record, unprotected))
+            found[name] = CellErrors(judge, *pairs)
+    return found
+
+
+def worst_first(judge: LoadJudge, record: BlastRecord) -> float:
+    """Return the load by which the worst charge of a layout is chosen."""
+    if not record.loads:
+        return nan
+    return record.loads[0].impulse_pa_s if judge.objective.is_response else judge.together(record)
 
 
 def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tuple[Load, ...]]]:
@@ -409,7 +516,9 @@ def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tupl
 
 
 def _all_threats(
-    records: Sequence[tuple[str, float, BlastRecord]], judge: LoadJudge
+    records: Sequence[tuple[str, float, BlastRecord]],
+    judge: LoadJudge,
+    errors: Mapping[str, CellErrors],
 ) -> Iterator[Row]:
     """Yield the load over all threats, one row per layout blasted under all of them."""
     threats = dict.fromkeys(record.threat for _, _, record in records)
@@ -425,18 +534,26 @@ def _all_threats(
         for name, own in whole.items()
     }
     for name, own in whole.items():
-        cost, last = own[-1]
+        (cost, last), error = own[-1], errors.get(name)
+        load_off, off = nan, nan
+        if error is not None:
+            load_off = error.of_load(last.loads[:1]) * loads[name]
+            off = error.of_reduction(last.loads[:1])
         without = next((loads[each] for each in whole if not whole[each][-1][1].layout), nan)
         share = reductions(loads[name], without).item() if last.layout else nan
         yield Row(
             layout=name,
             threat=f"all {len(threats)}: {judge.objective.charges}",
-            structure=_TOGETHER,
-            impulse=_number(loads[name]) if judge.objective.quantity == "impulse" else _DASH,
+            structure=TOGETHER,
+            impulse=(
+                _number(loads[name]) + _error(load_off)
+                if judge.objective.quantity == "impulse"
+                else _DASH
+            ),
             peak=_DASH,
-            load=judge.text(loads[name]),
+            load=judge.text(loads[name]) + _error(load_off),
             cost=f"{cost:g}",
-            reduction=_percent(share),
+            reduction=_percent(share, off),
             engine=last.engine.label,
         )
 
@@ -459,10 +576,19 @@ def _number(value: float) -> str:
     return f"{float(f'{value:.3g}'):,g}"
 
 
-def _percent(share: float) -> str:
+def _percent(share: float, error: float = nan) -> str:
+    """Return a share in per cent, with its error of the cells in points, if there is one."""
     if share != share:
         return _DASH
-    return f"{100.0 * share:.1f} %".replace("-", "\N{MINUS SIGN}")
+    text = f"{100.0 * share:.1f} %".replace("-", "\N{MINUS SIGN}")
+    return text if error != error else f"{text} {_PLUS_MINUS} {points(error)}"
+
+
+def _error(error: float) -> str:
+    """Return an error of the cells with its sign, with two digits; empty for NaN."""
+    if error != error:
+        return ""
+    return f" {_PLUS_MINUS} {float(f'{error:.2g}'):,g}"
 
 
 def check_key(key: str) -> str:

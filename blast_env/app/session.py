@@ -69,7 +69,7 @@ class Session:
         work: The work folder.
         workers: The worker processes.
         history: The design with its steps.
-        engine: The engine of new blasts and of the results shown.
+        engine: The engine of new blasts and of the results shown; searches take coarser cells.
         threats: Names of the threats of blasts; by default `usual_threats` of the site.
         view: The view opened last; a reloaded page starts with it.
     """
@@ -94,6 +94,7 @@ class Session:
         session = cls(folder, work, workers, folder.load())
         settle(folder.jobs, workers)
         session.threats = usual_threats(session.scenario)
+        session.engine = EngineRecord.final(session.scenario)
         return session
 
     @property
@@ -226,10 +227,10 @@ class Session:
             **self._on_site(),
             method=method,
             budget=budget,
-            engine=self.engine,
+            engine=self._search_engine,
             begin_with=placing.plain(self.design.layout) if from_layout else (),
         )
-        return self._begin(task, f"{method} search, {budget} blasts, {self.engine.label}")
+        return self._begin(task, f"{method} search, {budget} blasts, {task.engine.label}")
 
     def film(self, path: Path) -> Path:
         """Write a film of the active layout beside no barrier, under the first threat.
@@ -311,6 +312,26 @@ class Session:
         there = self.folder.blasts_there()
         return tuple(self._cost(charge) for key, charge in keys.items() if key not in there)
 
+    def cost_of_error(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
+        """Return the costs of the missing blasts with coarser cells: the worst charge of each."""
+        coarser, there = self.engine.coarser, self.folder.coarse_there()
+        threats = self.chosen_threats()
+        if coarser is None:
+            return ()
+        layouts = dict.fromkeys([(), *(self.design.layouts[each] for each in slots)])
+        missing = [
+            layout
+            for layout in layouts
+            if not any(self.key(layout, threat) in there for threat in threats)
+        ]
+        cost = coarser.gas.cost(self.scenario, threats[0].charge)
+        return (cost,) * len(missing)
+
+    @property
+    def _search_engine(self) -> EngineRecord:
+        """The engine of searches: with coarser cells than those of final statements."""
+        return self.engine.coarser or self.engine
+
     def cost_of_report(self, choice: ReportChoice) -> ReportCost:
         """Return the cost of a report on the active layout.
 
@@ -333,7 +354,8 @@ class Session:
         charges = [each.charge for each in self.chosen_threats()]
         if self.engine.is_first_look or not charges:
             return ()
-        costs = [self._cost(each) for each in charges]
+        engine = self._search_engine.gas
+        costs = [engine.cost(self.scenario, each) for each in charges]
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
 
     def _cost(self, charge: AnyCharge) -> CostGuess:
@@ -371,7 +393,12 @@ class Session:
                 if each.name == BARE:
                     bare[record.threat] = record
                 records.append((each.name, placing.cost_of(self.scenario, each.layout), record))
-        return comparison(records, bare, self.scenario)
+        coarse = {
+            record.key: loads
+            for _, _, record in records
+            if (loads := self.folder.coarse_of(record.key)) is not None
+        }
+        return comparison(records, bare, self.scenario, coarse)
 
     def verdicts(self) -> list[VerdictRow]:
         """Return the verdicts on the buildings in all blasts of the current design."""

@@ -189,9 +189,11 @@ def test_a_report_is_followed_when_the_page_is_loaded_anew_and_fetched_at_the_en
 def test_gas_results_have_maps_walls_and_gauges(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        session.engine = EngineRecord(name="gas", cell_m=0.5)
         session.blast([1])  # an empty one: no barrier
         await user.should_see("mean impulse on protected facades: ", retries=10)
+        (label,) = user.find("mean impulse on protected facades: ").elements
+        assert "\N{PLUS-MINUS SIGN}" in str(getattr(label, "text", ""))
+        await user.should_see("error of the cells, from the worst charge")
         pictures = next(
             each for each in user.find(kind=ui.select).elements if each.props["label"] == "picture"
         )

@@ -34,7 +34,7 @@ from blast_env.app.work import ReportChoice, Status, read_status, write_status
 from blast_env.engines import find_engine
 from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, Threat, evaluate_layout
 from blast_env.evaluation.consequences import consequences
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
@@ -304,7 +304,7 @@ def test_a_proposal_can_be_taken(tmp_path: Path, proposer: str) -> None:
 
 def test_what_is_best_is_offered_first(tmp_path: Path) -> None:
     session = Sessions(WorkFolder(tmp_path), Here()).new(hut(), "begin")
-    assert session.engine == EngineRecord(name="gas", cell_m=0.5)
+    assert session.engine == EngineRecord(name="gas", cell_m=0.25)
     assert next(iter(offers.offered(hut()))) == f"rule {offers.PACKAGED}"
     assert offers.offered(load_scenario("free_field")) == {}
     session.propose(offers.PACKAGED)  # modules: the best rule by gas
@@ -354,6 +354,45 @@ def test_a_blast_has_cells_that_grow(tmp_path: Path) -> None:
     result = GasBlast(session.scenario, (), 0, GasEngine(cells="coarse"), threat.charge).run()
     load = next(each for each in record.loads if each.structure == "hut")
     assert load.impulse_pa_s == pytest.approx(result.impulse("hut").pa_s, rel=1e-6)
+
+
+def test_a_blast_is_a_final_statement_with_the_error_of_its_cells(tmp_path: Path) -> None:
+    """By default, beside each load and reduction; as `evaluate` has it for the same charge."""
+    session = Sessions(WorkFolder(tmp_path), Here()).new(hut(), "begin")
+    session.put("wall", session.design.with_layout(WALL))
+    assert [len(session.cost([0])), len(session.cost_of_error([0]))] == [2, 2]
+    session.blast([0])
+    assert state_of(session).state == "done", state_of(session).text
+    assert session.cost([0]) == session.cost_of_error([0]) == ()
+    (threat,) = session.chosen_threats()
+    expected = evaluate_layout(hut(), WALL, threats=[Threat(threat.charge, 0)])
+    found = expected.to_dict()["result"]["grid_error"]
+    rows = session.comparison()
+    assert all(row.impulse.count("\N{PLUS-MINUS SIGN}") == 1 for row in rows)
+    bare, *_, walled = rows
+    assert bare.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['unprotected_load']:.2g}")
+    assert walled.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['load']:.2g}")
+    assert walled.reduction.endswith(f"\N{PLUS-MINUS SIGN} {100.0 * found['reduction']:.1f}")
+    (blast,) = session.cost_of_search(1)
+    assert blast == GasEngine().cost(hut(), threat.charge)  # searches stay on larger cells
+
+
+def test_of_several_threats_the_worst_one_gives_the_error(tmp_path: Path) -> None:
+    document = site_document()
+    document["charge"][0] |= {"kind": "segment", "start_m": [2.0, 2.0], "end_m": [2.0, 4.0]}
+    del document["charge"][0]["position_m"]
+    session = Sessions(WorkFolder(tmp_path), Here()).new(
+        Scenario.from_document(document, "line"), "begin"
+    )
+    start, end = (each.name for each in threats_of(session.scenario)[1:])
+    session.threats = (start, end)
+    session.blast([0])
+    assert state_of(session).state == "done", state_of(session).text
+    there = session.folder.coarse_there()
+    assert there == {session.key((), threats_of(session.scenario)[2])}  # nearest to the hut
+    rows = session.comparison()
+    assert [row.threat.split(":")[0] for row in rows] == [start, start, end, end, "all 2"]
+    assert all("\N{PLUS-MINUS SIGN}" in row.impulse for row in rows)
 
 
 def test_a_site_too_large_for_memory_is_a_message(tmp_path: Path) -> None:

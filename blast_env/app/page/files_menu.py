@@ -21,7 +21,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.scenario import Scenario
 
 _CELLS: Final[dict[tuple[Cells, Cells], str]] = {
-    (0.5, 0.25): "0.5 and 0.25 m: shows the grid error",
+    (0.5, 0.25): "0.5 and 0.25 m: with the error of the cells",
     (0.5, 0.5): "0.5 m only: much quicker",
     ("coarse", "fine"): "coarse and fine: growing cells, for sites of 40 m and more",
 }
@@ -149,7 +149,10 @@ class ReportDialog:
             ui.label(f"Report on layout {SLOTS[session.design.active]}: {kind}").style(
                 "font-weight: 600"
             )
-            self._cells = ui.select(_CELLS, value=(0.5, 0.25), label="cells of gas dynamics")
+            from blast_env.reporting import final_cells  # needs an extra
+
+            cells = final_cells(session.scenario)
+            self._cells = ui.select(_CELLS, value=cells, label="cells of gas dynamics")
             wanted = session.scenario.objective.level or ReportChoice().target
             self._target = ui.select(_LEVELS, value=wanted, label="required level")
             self._target.visible = bool(session.scenario.bays)

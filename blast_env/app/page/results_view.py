@@ -6,7 +6,14 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from blast_env.app.records import BlastRecord, LoadJudge, Row, VerdictRow, frames_in
+from blast_env.app.records import (
+    TOGETHER,
+    BlastRecord,
+    LoadJudge,
+    Row,
+    VerdictRow,
+    frames_in,
+)
 from blast_env.app.session import BARE, Session, Shown
 from blast_env.app.threats import NamedThreat
 from blast_env.scenario import ObjectiveSection
@@ -80,6 +87,7 @@ class ResultsView:
         self._with_bare = True
         self._large = False
         self._state: object = None
+        self._loads: dict[tuple[str, str], str] = {}
         self._build()
 
     def _build(self) -> None:
@@ -116,6 +124,10 @@ class ResultsView:
             columns = _columns(self._session.scenario.objective)
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
             self._table.props("dense flat bordered")
+            self._errors = ui.label(
+                "\N{PLUS-MINUS SIGN}: error of the cells, from the worst charge of each layout on "
+                "cells twice as large; of reductions in percentage points."
+            ).classes("be-quiet")
             self._notes = ui.column().classes("gap-0 mt-1")
 
     def _set(self, name: str, value: Any) -> None:
@@ -137,12 +149,16 @@ class ResultsView:
         ]
         running = session.is_at_work
         options = (self._what, self._threat, self._with_bare, self._large, running)
-        blasts = session.folder.blasts_there()
+        blasts = session.folder.blasts_there(), session.folder.coarse_there()
         state = (options, session.engine, there, tuple(threats), blasts, session.scenario)
         if state == self._state:
             return
         self._state = state
         found = [*self._found(there, threat)]
+        rows = session.comparison()
+        self._loads = {
+            (each.layout, each.threat): each.load for each in rows if each.structure == TOGETHER
+        }
         records = [each.record for each in found if each.record is not None]
         self._offer(found)
         self._show_cards([each for each in found if self._with_bare or each.shown.name != BARE])
@@ -152,11 +168,11 @@ class ResultsView:
         self._verdicts.visible = bool(verdicts)
         self._sharp.visible = any("; " in each.level for each in verdicts)
         self._unglazed.visible = bool(found) and not verdicts
-        rows = session.comparison()
         judge = LoadJudge(session.scenario)
         self._table.columns = _columns(judge.objective)
         self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
         self._table.visible = bool(rows)
+        self._errors.visible = any("\N{PLUS-MINUS SIGN}" in each.impulse for each in rows)
         self._empty.visible = not found
         self._empty.text = _RUNNING if running else _NOTHING
         self._show_notes(records)
@@ -204,7 +220,7 @@ class ResultsView:
                 title = name if name == BARE else f"layout {name}"
                 ui.label(title).style("font-weight: 600")
                 ui.space()
-                ui.label(self._summary(found.record)).classes("be-quiet")
+                ui.label(self._summary(name, found.record)).classes("be-quiet")
             if self._what == _FILM:
                 if found.frames:
                     image = ui.element("img")
@@ -220,7 +236,7 @@ class ResultsView:
             else:
                 ui.element("img").props(f'src="{address}" alt="{self._what}, {title}"')
 
-    def _summary(self, record: BlastRecord | None) -> str:
+    def _summary(self, name: str, record: BlastRecord | None) -> str:
         if record is None or not record.loads:
             return "" if record is not None else "loads not yet available"
         judge = LoadJudge(self._session.scenario)
@@ -228,7 +244,7 @@ class ResultsView:
         noun = "mean impulse on protected facades" if is_impulse else judge.objective.noun
         parts = sum(each.protected for each in self._session.scenario.structures)
         added = f" ({parts} structures, weighted)" if parts > 1 else ""
-        return f"{noun}: {judge.text(judge.together(record))}{added}"
+        return f"{noun}: {self._loads[name, record.threat]}{added}"
 
     def _show_chart(self, threat: NamedThreat) -> None:
         self._chart.clear()

@@ -25,15 +25,21 @@ from blast_env.geometry import Layout
 from blast_env.scenario import Scenario
 
 _ENGINES: Final = {
-    "gas 0.5": (EngineRecord(name="gas", cell_m=0.5), "gas, cells of 0.5 m"),
-    "gas 0.25": (EngineRecord(name="gas", cell_m=0.25), "gas, cells of 0.25 m (16 times as long)"),
-    "gas coarse": (
-        EngineRecord(name="gas", cells="coarse"),
-        "gas, coarse growing cells: for sites of 40 m and more",
+    "gas 0.25": (
+        EngineRecord(name="gas", cell_m=0.25),
+        "gas, cells of 0.25 m: final results, with the error of the cells",
     ),
     "gas fine": (
         EngineRecord(name="gas", cells="fine"),
-        "gas, fine growing cells: for final results there",
+        "gas, fine growing cells: the same on sites of 40 m and more",
+    ),
+    "gas 0.5": (
+        EngineRecord(name="gas", cell_m=0.5),
+        "gas, cells of 0.5 m: a look in a tenth of the time",
+    ),
+    "gas coarse": (
+        EngineRecord(name="gas", cells="coarse"),
+        "gas, coarse growing cells: the same on sites of 40 m and more",
     ),
     "particles": (EngineRecord(name="event"), "particles: a first look"),
 }
@@ -117,7 +123,7 @@ class WorkPanel:
         self._runs = {each.name: each for each in runs}
         self._filling = False
         self._cards: list[_Card] | None = None
-        self._there: frozenset[str] = frozenset()
+        self._there: tuple[frozenset[str], ...] = ()
         self._build()
 
     @property
@@ -164,7 +170,7 @@ class WorkPanel:
             every.tooltip("blast every layout that is not empty")
         self._engine = ui.select(
             {name: words for name, (_, words) in _ENGINES.items()},
-            value="gas 0.5",
+            value="gas 0.25",
             label="engine",
             on_change=lambda e: self._use(e.value),
         )
@@ -321,10 +327,16 @@ class WorkPanel:
 
     def _say_cost(self) -> None:
         session = self._session
-        self._there = session.folder.blasts_there()
+        self._there = self._files_there
         self._cost.visible = not session.engine.is_first_look
-        costs = session.cost([session.design.active])
-        self._cost.text = cost_words(costs, drawn=len(costs))
+        slots = [session.design.active]
+        costs = session.cost(slots)
+        self._cost.text = cost_words([*costs, *session.cost_of_error(slots)], drawn=len(costs))
+
+    @property
+    def _files_there(self) -> tuple[frozenset[str], ...]:
+        folder = self._session.folder
+        return folder.blasts_there(), folder.coarse_there()
 
     def _say_cost_of_search(self) -> None:
         costs = []
@@ -360,7 +372,7 @@ class WorkPanel:
 
     def follow(self) -> None:
         """Show the progress of work."""
-        if self._session.folder.blasts_there() != self._there:
+        if self._files_there != self._there:
             self._say_cost()
         jobs = self._session.jobs(_SHOWN_JOBS)
         cards = self._cards
