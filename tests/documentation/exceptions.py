@@ -128,6 +128,9 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --layout walls.json --scenario visitor_entrance --seeds 4": (
         "--seeds 1 --cell 0.5"
     ),
+    "blast-env evaluate --layout found/layout.json --scenario visitor_entrance --seeds 4": (
+        "--seeds 1 --cell 0.5"
+    ),
     "blast-env report visitor_entrance --layout walls.json --out report.html --pdf report.pdf": (
         "--threats 1 --places 1 --stills 1 --no-items"
     ),
@@ -198,6 +201,9 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "python -m studies.gas cells --scenario visitor_entrance --random-layouts 18 --finest 0.125": (
         "--sizes 0.5 --random-layouts 0 --finest 0.5"
+    ),
+    "python -m studies.gas cells --scenario visitor_entrance --random-layouts 0 --finest 0.125": (
+        "--sizes 0.5 --finest 0.5"
     ),
     # docs/studies/scenarios.md
     "blast-env evaluate --scenario visitor_entrance --layout"
