@@ -146,8 +146,9 @@ def test_page_needs_nothing_else(page: str) -> None:
 
 def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: str) -> None:
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
-    assert f"<td>{fine.bare.impulse_pa_s:.0f}</td>" in page
-    assert f"<td>{100 * fine.reduction:.1f} %</td>" in page
+    pm, errors = "\N{PLUS-MINUS SIGN}", study.errors(fine)
+    assert f"<td>{fine.bare.impulse_pa_s:.0f} {pm} {errors.bare_pa_s:.1f}</td>" in page
+    assert f"<td>{100 * fine.reduction:.1f} % {pm} {100 * errors.reduction:.1f}</td>" in page
     assert small_hut().content_hash in page
     assert "<code>blast-env report &#34;a site.toml&#34;</code>" in page
     assert "&#34;cells&#34;: [[1, 0], [2, 0], [3, 0], [4, 0]]" in page
@@ -187,7 +188,7 @@ def test_other_units_and_loads_within_what_was_checked(study: Study, page: str) 
     other = replace(study, notes=(), options=replace(study.options, units=UNITS["psi"]))
     changed = report_html(other, ["blast-env"])
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
-    assert f"<td>{fine.bare.impulse_pa_s / 6.894757:.1f}</td>" in changed
+    assert f"<td>{fine.bare.impulse_pa_s / 6.894757:.1f} \N{PLUS-MINUS SIGN} " in changed
     assert f"<td>{fine.bare.peak_pa / 6894.757:.1f}</td>" in changed
     assert "Impulses in psi·ms, overpressures in psi" in changed
     assert "No load in this report is outside that range." in changed
