@@ -8,7 +8,6 @@ from blast_agents.training import TrainingSettings, load_hyperparameters
 from blast_agents.training.environments import (
     SITES_ID,
     EnvironmentMaker,
-    RelativeReward,
     SharedBlastsVecEnv,
     ThreatPool,
     make_environments,
@@ -29,21 +28,21 @@ def environment() -> gym.Env:
         scenario=small_scenario(),
         engine="event",
         realisations=1,
-        invalid_action="penalty",
         disable_env_checker=True,
     )
 
 
-def test_the_reward_is_the_reduction_less_what_illegal_actions_cost() -> None:
-    env = RelativeReward(environment(), illegal_action_cost=0.25)
+def test_training_pays_the_reduction() -> None:
+    """The second action means the nearest legal cell, and the fourth module is the last one."""
+    configuration = RunConfiguration(
+        settings=TrainingSettings(algorithm="ppo", scenario="small", steps=1),
+        hyperparameters=load_hyperparameters("ppo", "default", {}),
+        scenario_hash="0" * 64,
+    )
+    env = EnvironmentMaker(configuration, scenario_source(small_scenario()), 0)()
     env.reset(seed=0)
-    rewards = [env.step(np.int64(action))[1] for action in (3, 3, 4, 5)]
-    *_, info = env.step(np.int64(6))
-    assert rewards == [0.0, -0.25, 0.0, 0.0]
-    assert info["illegal_actions"] == 1
-    env.reset(seed=0)
-    last = [env.step(np.int64(action))[1] for action in (3, 4, 5, 6)][-1]
-    assert last == info["reduction"]
+    rewards = [env.step(np.int64(action)) for action in (3, 3, 5, 6)]
+    assert [float(each[1]) for each in rewards] == [0.0, 0.0, 0.0, rewards[-1][4]["reduction"]]
 
 
 def test_a_pool_repeats_its_threats_so_that_half_of_the_blasts_are_known() -> None:
@@ -96,8 +95,6 @@ def test_the_seed_of_a_reset_decides_the_episodes_that_follow() -> None:
 def test_bounds_are_named() -> None:
     with pytest.raises(BlastEnvError, match="size is 0, must be an integer from 1"):
         ThreatPool(environment(), size=0)
-    with pytest.raises(BlastEnvError, match="illegal_action_cost is -1"):
-        RelativeReward(environment(), illegal_action_cost=-1)
 
 
 def test_environments_whose_blasts_run_together_are_those_that_run_their_own() -> None:

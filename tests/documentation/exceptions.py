@@ -362,7 +362,7 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m rl_zoo3.train --algo ppo --env BlastBarrier-v0 --gym-packages blast_env"
     " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
-    """ --env-kwargs 'engine:'"'"'event'"'"'' realisations:1"""
+    """ --env-kwargs 'engine:'"'"'event'"'"'' 'reward:'"'"'relative'"'"'' realisations:1"""
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing import get_all_start_methods, get_context
-from typing import Any, Final, SupportsFloat
+from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +16,6 @@ from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration
 from blast_env.engines import Engine
 from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
-from blast_env.envs.episode import ILLEGAL_TERM
 from blast_env.envs.observations import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators
@@ -24,7 +23,7 @@ from blast_env.evaluation.store import BlastCache, LoadsCache
 from blast_env.runner import workers_told
 from blast_env.scenario import bundled_scenarios
 from blast_env.sites import FAMILIES
-from blast_env.values import checked_seed, real_number, whole_number
+from blast_env.values import checked_seed, whole_number
 
 _Env = gym.Env[Array, np.int64]
 
@@ -36,35 +35,6 @@ class _Masked(gym.Wrapper[Array, np.int64, Array, np.int64]):
         """Return the mask of the actions that are legal now (actions,)."""
         masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
         return masks
-
-
-class RelativeReward(_Masked):
-    """Rewards the relative reduction of the load at the end of an episode.
-
-    The reward of the environment, minus the load, depends mainly on the place of the charge. The
-    reduction is relative to the same blast without a barrier, so that it isolates the effect of the
-    layout; it is of the order of 1 in every scenario.
-
-    Args:
-        env: A `BlastBarrier` environment with `reward="terminal"`.
-        illegal_action_cost: Cost of an illegal action, from 0 to 1.
-
-    Raises:
-        BlastEnvError: If the cost is out of bounds.
-    """
-
-    def __init__(self, env: _Env, illegal_action_cost: float = 0.01) -> None:
-        super().__init__(env)
-        self.illegal_action_cost = real_number("illegal_action_cost", illegal_action_cost, 0.0, 1.0)
-
-    def step(self, action: np.int64) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Place a module or finish."""
-        observation, _, ended, truncated, info = self.env.step(action)
-        # If nothing arrives without a barrier, the reduction is undefined and the reward 0.
-        reward = float(np.nan_to_num(info["reduction"])) if ended else 0.0
-        if info["reward_terms"][ILLEGAL_TERM] < 0.0:
-            reward -= self.illegal_action_cost
-        return observation, reward, ended, truncated, info
 
 
 class ThreatPool(_Masked):
@@ -183,6 +153,7 @@ class EnvironmentMaker:
             "blast_env:BlastBarrier-v0",
             disable_env_checker=True,
             scenario=self.source,
+            reward="relative",
             realisations=1,
             engine=settings.blast_engine,
             observation=settings.observation,
@@ -190,13 +161,10 @@ class EnvironmentMaker:
             threat=settings.threat,
             **threats,
         )
-        for name, arguments in self.configuration.ppo.wrappers():
-            if name.endswith(RelativeReward.__name__):
-                env = RelativeReward(env, **arguments)
-            else:
-                sequence = np.random.SeedSequence((settings.seed, self.index))
-                own_seed = {"seed": int(sequence.generate_state(1)[0])}
-                env = ThreatPool(env, **(own_seed | arguments))
+        for _, arguments in self.configuration.ppo.wrappers():
+            sequence = np.random.SeedSequence((settings.seed, self.index))
+            own_seed = {"seed": int(sequence.generate_state(1)[0])}
+            env = ThreatPool(env, **(own_seed | arguments))
         return Monitor(env)
 
 

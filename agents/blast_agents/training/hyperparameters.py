@@ -127,11 +127,8 @@ PolicyName = Literal[
 ]
 """Policies, by their names for import in RL Zoo."""
 
-WrapperName = Literal[
-    "blast_agents.training.environments.RelativeReward",
-    "blast_agents.training.environments.ThreatPool",
-]
-"""Wrappers of the environment, by their names for import in RL Zoo."""
+WrapperName = Literal["blast_agents.training.environments.ThreatPool"]
+"""The wrapper of the environment, by its name for import in RL Zoo."""
 
 Share = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
 
