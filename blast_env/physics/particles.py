@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import ceil, prod
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
 from blast_env.physics.parameters import AirParameters, BallParameters, ExplosiveParameters
+
+_ROUNDING: Final = 1e-9  # of distances, units
 
 
 class CollisionType(IntEnum):
@@ -146,8 +149,14 @@ def air_lattice(
         & (position[:, 1] < inner.top)
         & (np.hypot(*(position - charge_centre).T) > charge_radius + radius)
     )
+    places, is_free = position.reshape(len(y), len(x), 2), free.reshape(len(y), len(x))
+    near = radius + reach + _ROUNDING
     for obstacle in obstacles:
-        free &= distance_to_rectangle(position, obstacle) > radius
+        around = obstacle.grown(near)
+        rows = slice(*np.searchsorted(y, (around.bottom, around.top)))
+        columns = slice(*np.searchsorted(x, (around.left, around.right)))
+        distance = distance_to_rectangle(places[rows, columns].reshape(-1, 2), obstacle)
+        is_free[rows, columns] &= (distance > radius).reshape(is_free[rows, columns].shape)
     position = position[free]
     return Balls.of_one_kind(CollisionType.AirBall, parameters, position, np.zeros_like(position))
 

@@ -275,8 +275,12 @@ def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
         skirt=skirt,
     )
     grid = replace(grid, solid=np.zeros(shape, dtype=bool))
+    z_m = grid.centres_m(2)
     for outline in site.structures:
-        grid.solid[_cells_of(outline, grid, site)] = True
+        row, column = _modules_at(outline, grid)
+        x, y = np.nonzero(row >= 0)
+        base_m, top_m = _ends_m(outline, site.air_height_m)[:, row[x, y], column[x, y], np.newaxis]
+        grid.solid[x, y] |= (base_m <= z_m) & (z_m < top_m)
     return grid
 
 
@@ -327,10 +331,13 @@ def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
     structure, row, column = np.full((3, len(faces)), -1)
     for index, outline in enumerate(site.structures):
         rows, columns = _modules_at(outline, grid)
-        base_m, top_m = _ends_m(outline, site.air_height_m)[:, rows, columns][:, *behind[:2]]
-        own = (rows[behind[:2]] >= 0) & (base_m <= z_m) & (z_m < top_m)
+        here = np.flatnonzero(rows[behind[:2]] >= 0)
+        of_row, of_column = (each[behind[0][here], behind[1][here]] for each in (rows, columns))
+        base_m, top_m = _ends_m(outline, site.air_height_m)[:, of_row, of_column]
+        inside = (base_m <= z_m[here]) & (z_m[here] < top_m)
+        own = here[inside]
         structure[own] = index
-        row[own], column[own] = (each[behind[:2]][own] for each in (rows, columns))
+        row[own], column[own] = of_row[inside], of_column[inside]
     # West, east, south, north by axis and side; upward faces are roofs, downward ones undersides.
     upright = 2 * faces.axis + (faces.side > 0)
     face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
