@@ -199,7 +199,6 @@ def _refuse(value: object, option: str, what: str) -> None:
 
 def selectors_of(site_map: SiteMap, options: ImportOptions) -> Selectors:
     """Return the selectors of the user; roles without any follow the usual tags."""
-    is_drawing = any("layer" in each.tags for each in site_map.features)
     chosen = {
         Role.ZONE: options.zone_from,
         Role.KEEP_OUT: options.keep_outs_from,
@@ -207,7 +206,7 @@ def selectors_of(site_map: SiteMap, options: ImportOptions) -> Selectors:
         Role.BUILDING: options.buildings_from,
     }
     return {
-        role: tuple(Selector.parsed(text, is_drawing) for text in texts)
+        role: tuple(Selector.parsed(text, site_map.is_drawing) for text in texts)
         for role, texts in chosen.items()
         if texts
     }

@@ -75,7 +75,7 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
         for index, each in enumerate(lines)
         for part in shapely.get_parts(each.geometry)
     ]
-    owners = [index for index, _ in parts]
+    owners = np.array([index for index, _ in parts])
     sides, gaps_m = _snapped([places for _, places in parts])
     outlines = shapely.get_parts(shapely.polygonize(sides))
     tree = shapely.STRtree(sides)
@@ -84,16 +84,17 @@ def _joined(lines: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     for outline in outlines:
         near = tree.query(outline, "intersects")
         rim = shapely.buffer(outline.boundary, _HAIR_M)
-        of_rim = sorted({owners[k] for k in near if shapely.covers(rim, sides[k])})
+        of_rim = sorted({int(owners[k]) for k in near if shapely.covers(rim, sides[k])})
         if not of_rim:
             continue
         chief = next((lines[k] for k in of_rim if lines[k].name), lines[of_rim[0]])
         found.append(replace(chief, geometry=outline))
         for k in of_rim:
             used.setdefault(k, len(found) - 1)
+    bridged_m = np.zeros(len(lines))
+    np.maximum.at(bridged_m, owners, gaps_m)
     for k, outline in used.items():
-        gap = max(gaps_m[i] for i, owner in enumerate(owners) if owner == k) if gaps_m.any() else 0
-        words = f", {1000.0 * gap:.1f} mm bridged" if gap > _ROUNDING_M else ""
+        words = f", {1000.0 * bridged_m[k]:.1f} mm bridged" if bridged_m[k] > _ROUNDING_M else ""
         detail = f"outline of {found[outline].place}{words}"
         ledger.add(Deed.CLOSED, JOINED, lines[k].place, lines[k].name, detail)
     left = [replace(each, fault=OPEN) for k, each in enumerate(lines) if k not in used]

@@ -18,7 +18,7 @@ from blast_env.importing.joining import closed, with_courtyards
 from blast_env.importing.ledger import Deed, Ledger
 from blast_env.importing.options import MOST_SITE_M, ImportOptions
 from blast_env.importing.plane import Plane, plane_around, rotated
-from blast_env.importing.site_map import DrawingCoordinates, SiteMap
+from blast_env.importing.site_map import SiteMap
 from blast_env.importing.things import Role, Thing
 from blast_env.scenario.sections import AnyGeoreference
 from blast_env.units import MODULE_SIDE_M
@@ -167,7 +167,7 @@ def place_site(
         raise _nothing(site_map, faulty, options)
     plane = plane_around(site_map.coordinates, _reference(things, options))
     near = closed(_near(site_map, things, plane, options, ledger), ledger)
-    if isinstance(site_map.coordinates, DrawingCoordinates):
+    if site_map.is_drawing:
         near = with_courtyards(near, ledger)
     open_lines = [each for each in near if each.fault]
     near = [each for each in near if not each.fault]

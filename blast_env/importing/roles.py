@@ -12,7 +12,6 @@ from blast_env.importing.heights import length_m, tagged_heights
 from blast_env.importing.ledger import Deed, Ledger
 from blast_env.importing.options import ImportOptions
 from blast_env.importing.site_map import (
-    DrawingCoordinates,
     LostFeature,
     MapFeature,
     SiteMap,
@@ -128,8 +127,7 @@ def things_of(
     for kind, place, detail in site_map.remarks:
         ledger.add(Deed.GUESSED, kind, place, detail=detail)
     features = (*site_map.features, *site_map.lost)
-    is_drawing = isinstance(site_map.coordinates, DrawingCoordinates)
-    roles = [_role(each, selectors, is_drawing) for each in features]
+    roles = [_role(each, selectors, site_map.is_drawing) for each in features]
     known = ("kind", "building", "highway", "layer")
     if not any(key in each.tags for each in features for key in known) and not selectors:
         roles = [Role.BUILDING if _is_outline(each.geometry) else None for each in features]
@@ -141,13 +139,17 @@ def things_of(
             fault = "walls of the map, which shield"
             found.append(Thing(Role.OTHER, feature.geometry, "", feature.place, fault=fault))
         else:
-            ledger.add(Deed.PASSED, f"without a role: {_kind(feature.tags)}", feature.place)
+            ledger.add(
+                Deed.PASSED,
+                f"without a role: {_kind(feature.tags, site_map.is_drawing)}",
+                feature.place,
+            )
     return tuple(found)
 
 
-def _kind(tags: Tags) -> str:
+def _kind(tags: Tags, is_drawing: bool) -> str:
     """Return the kind of an object without a role: the layer, or the key of its chief tag."""
-    if "layer" in tags and "building" not in tags and len(tags) <= 4:
+    if is_drawing:
         return f"layer {tags['layer']}"
     return next((key for key in (*_CHIEF_KEYS, *tags) if key in tags), "no tag")
 

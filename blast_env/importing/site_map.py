@@ -100,6 +100,11 @@ class SiteMap:
     lost: tuple[LostFeature, ...] = ()
     remarks: tuple[Remark, ...] = ()
 
+    @property
+    def is_drawing(self) -> bool:
+        """Whether its objects have layers instead of tags."""
+        return self.path.suffix.lower() == ".dxf"
+
     def __post_init__(self) -> None:
         """Refuse a map with too many points or too large coordinates.
 

@@ -17,6 +17,7 @@ from blast_env.importing.ledger import Deed, LedgerEntry
 from blast_env.plan import site_features
 from blast_env.rendering.imported_site import imported_plan
 from blast_env.scenario import RectangleSource, Scenario
+from studies.real_files.__main__ import main
 from tests.importing.maps import Places, charge, outline, rectangle, written
 
 PLACE = charge(-5.0, 2.0)
@@ -588,3 +589,25 @@ def test_every_object_is_on_the_ledger_or_on_the_site(
     read = {each.place for each in site.ledger.of(Deed.READ) if each.kind == "building"}
     assert read == {each.place for each in site.buildings}
     assert not entries(site, Deed.LEFT_OUT, "of no use")
+
+
+def test_a_folder_of_files_has_the_sums_of_their_ledgers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(tmp_path, HOUSE, outline(rectangle(10, 0, 6, 4)), PLACE)
+    (tmp_path / "broken.osm").write_text("<osm")
+    main(tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    assert "imported 1 of 2 files" in lines
+    assert "read: building: 2" in lines
+    assert any(line.startswith("guessed: heights not in the file") for line in lines)
+    assert any(line.startswith("refused: ") for line in lines)
+
+
+@pytest.mark.parametrize("layer", ["1", "-1"])
+def test_layers_of_a_map_are_no_layers_of_a_drawing(layer: str, tmp_path: Path) -> None:
+    """A tag `layer` of OpenStreetMap says what is above what; selectors are still tags."""
+    extract = town()
+    extract.way(3, rectangle(20, 0, 8, 6), building="yes", height="3", layer=layer)
+    site = imported(extract.write(tmp_path), buildings_from=("building",), **HOUSE_1)
+    assert len(site.buildings) == (2 if layer == "1" else 1)
