@@ -120,7 +120,7 @@ class Ledger:
         return record
 
     def settle(self, features: Iterable[MapFeature], used: Mapping[str, str]) -> None:
-        """Complete the ledger, so that it has every object of the file.
+        """Complete the ledger, so that it has every object of the file; no guess about others.
 
         Args:
             features: All objects of the file, also those that could not be read whole.
@@ -140,7 +140,12 @@ class Ledger:
                 self.add(Deed.READ, used[each.place], each.place)
             elif each.place not in fates:
                 self.add(Deed.LEFT_OUT, _UNUSED, each.place)
-        self.entries = [replace(each, position=positions.get(each.place)) for each in self.entries]
+        elsewhere = {each.place for each in self.of(Deed.PASSED)}
+        self.entries = [
+            replace(each, position=positions.get(each.place))
+            for each in self.entries
+            if each.deed is not Deed.GUESSED or each.place not in elsewhere
+        ]
 
     def check_strict(self, path: object) -> None:
         """Refuse an import that guessed something or left something out.

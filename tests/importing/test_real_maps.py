@@ -524,6 +524,15 @@ def test_strict_refuses_guesses_and_omissions(tmp_path: Path) -> None:
     assert "features[2]" in message
 
 
+def test_guesses_about_what_is_not_on_the_site_do_not_count(tmp_path: Path) -> None:
+    street: dict[str, Any] = {"type": "LineString", "coordinates": [[300, 0], [300, 9]]}
+    far = {"type": "Feature", "properties": {"highway": "residential"}, "geometry": street}
+    path = written(tmp_path, HOUSE, far, PLACE)
+    assert imported(path, strict=True, origin=(-10.0, -10.0), size_m=(30.0, 30.0)).buildings
+    near = {**far, "geometry": {**street, "coordinates": [[9, -9], [9, 13]]}}
+    assert "features[1]" in error_of(written(tmp_path, HOUSE, near, PLACE), strict=True)
+
+
 def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
     bare = outline(rectangle(10, 0, 6, 4), name="Bare")
     site = imported(written(tmp_path, HOUSE, bare, PLACE))
