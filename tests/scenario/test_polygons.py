@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.filemanagement import readfile
 
@@ -17,6 +18,7 @@ from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.envs.display import placing_text
 from blast_env.evaluation.governing import Severity
 from blast_env.export import LayoutPlan, export_layout
+from blast_env.export.dxf import clearance_outlines
 from blast_env.geometry import Layout
 from blast_env.physics.scene import Charge
 from blast_env.plan import Kinds, site_features
@@ -216,6 +218,21 @@ def test_pictures_and_drawings_show_the_outline(tmp_path: Path) -> None:
         4,
         6,
     ]
+
+
+def test_drawings_have_the_clearance_around_its_modules_and_in_courtyards() -> None:
+    document = with_polygon(courtyards_m=[[(7.0, 3.6), (8.6, 3.6), (8.6, 4.9), (7.0, 4.9)]])
+    document["build_zone"]["clearance_m"] = 0.3
+    scenario = Scenario.from_document(document, "clear")
+    rings = [
+        shapely.LinearRing([(x, y) for x, y, _ in ring])
+        for ring in clearance_outlines(LayoutPlan(scenario, ()))
+    ]
+    modules = shapely.union_all([shapely.box(*box) for box in scenario.structures[0].boxes_m])
+    assert len(rings) == 2
+    for ring in rings:
+        places = shapely.points(shapely.get_coordinates(ring))
+        assert shapely.distance(places, modules) == pytest.approx(0.3, abs=0.01)
 
 
 def test_a_facade_is_set_once_for_all_walls() -> None:
