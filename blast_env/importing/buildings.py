@@ -135,7 +135,10 @@ def _apart(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> l
     left = list(order)
     for k, thing in enumerate(order):
         shape, cut = thing.geometry, []
+        least_m2 = max(options.least_area_m2, _LEAST_SHARE * shape.area)
         for index in sorted(int(other) for other in tree.query(shape, "intersects")):
+            if cut and shape.area < least_m2:
+                break
             if index < k and _overlap(thing, order[index]):
                 cut.append(order[index])
                 shape = _areas_of(shapely.difference(shape, order[index].geometry))
@@ -143,7 +146,7 @@ def _apart(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> l
         if cut:
             kind = "parts above their building" if cut[0].is_part else "buildings over buildings"
             detail = f"by {', '.join(each.place for each in cut)}"
-            if shape.area < max(options.least_area_m2, _LEAST_SHARE * thing.geometry.area):
+            if shape.area < least_m2:
                 kind, shape = f"{kind}, covered", shapely.Polygon()
             else:
                 kind = f"{kind}, overlap left out"
