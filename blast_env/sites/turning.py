@@ -30,6 +30,8 @@ from blast_env.scenario.sections import (
 
 _Covering = TypeVar("_Covering", FacadePart, Hardening)
 
+_DIGITS: Final = 9
+
 _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
     "west": "south",
     "south": "east",
@@ -71,6 +73,12 @@ def _point(point_m: PointM, height_m: float) -> PointM:
     return height_m - point_m[1], point_m[0]
 
 
+def _vertex(corner_m: PointM, height_m: float) -> PointM:
+    """Return the corner of an outline after the turn, without the rounding of the difference."""
+    x_m, y_m = _point(corner_m, height_m)
+    return round(x_m, _DIGITS), y_m
+
+
 def _corner(rectangle_m: Rectangle, height_m: float) -> PointM:
     """Return the lower left corner after the turn: the upper left one before it."""
     return _point((rectangle_m.left, rectangle_m.top), height_m)
@@ -102,7 +110,7 @@ def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
     changes: dict[str, Any] = {"faces": tuple(_TURNED_WALL[wall] for wall in structure.faces)}
     if isinstance(structure, PolygonSection):
         rings = (structure.outline_m, *structure.courtyards_m)
-        outline, *courtyards = (tuple(_point(each, height_m) for each in ring) for ring in rings)
+        outline, *courtyards = (tuple(_vertex(each, height_m) for each in ring) for ring in rings)
         changes |= {"outline_m": outline, "courtyards_m": tuple(courtyards)}
     else:
         changes["corner_m"] = _corner(structure.rectangle_m, height_m)
