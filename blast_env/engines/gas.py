@@ -82,8 +82,8 @@ _FINAL_CELL_M: Final = 0.25
 _WIDEST_UNIFORM_M: Final = 40.0
 """Side of the cells of final statements, and the widest site on which they do not grow."""
 
-_PEAK_AND_REBOUND: Final = 0.75
-"""Share of a natural period in which a loaded component swings in and rebounds."""
+_PERIODS: Final = 2.0
+"""Natural periods for a loaded component to swing in and rebound; a cracked one is slower."""
 
 
 def response_time_s(scenario: Scenario) -> float:
@@ -96,7 +96,7 @@ def response_time_s(scenario: Scenario) -> float:
         for each in scenario.alternatives
         for bay in (*each.glazing.values(), *each.wall.values())
     )
-    return _PEAK_AND_REBOUND * slowest_period_s([*scenario.bays, *hardened])
+    return _PERIODS * slowest_period_s([*scenario.bays, *hardened])
 
 
 @dataclass(frozen=True)

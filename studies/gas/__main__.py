@@ -1,6 +1,6 @@
 """Tables and figures of docs/engineers/gas.md on the checks of the gas engine."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import combinations
 from math import cbrt, isnan
@@ -19,7 +19,6 @@ from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.settings import CELLS
 from blast_env.physics.scene import Charge
 from blast_env.rendering.figures import save_figure
 from blast_env.runner import run_all
@@ -29,7 +28,7 @@ from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
-from studies.gas.definition import both_loads
+from studies.gas.definition import LONG_RUNS, LongRun, both_loads
 from studies.gas.ending import Ending, ending, layouts, sites
 from studies.gas.growing import OFF_COLUMNS, cell_choice, engine_with
 from studies.gas.judgement import Judgement
@@ -291,40 +290,52 @@ def _ending_row(found: Ending) -> tuple[str, ...]:
 
 @app.command()
 def definition(
-    scenario: str = "visitor_entrance",
-    sizes: Annotated[str, typer.Option(help="Sides of cells in m, or coarse, fine.")] = "0.5,0.25",
-    until: Annotated[float, typer.Option(help="Length of the long runs, s.")] = 0.18,
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Sites; all of the table unless given.")
+    ] = None,
+    until: Annotated[
+        float | None, typer.Option(help="Length of the long runs, s; that of the table's.")
+    ] = None,
 ) -> None:
-    """Print the reductions of walls by the sum of all positive phases and by the load.
+    """Print loads, and reductions of walls, by the sum of all positive phases and by the load.
 
     The load is the peak specific impulse. Charge, rules and random layout are those of seed 0.
     """
-    rows = []
+    rows: list[tuple[str, ...]] = []
     with user_errors():
-        site = load_scenario(scenario)
-        for size in sizes.split(","):
-            engine = GasEngine.with_cells(size if size in CELLS else float(size))
-            bare = both_loads(site, (), engine, until)
-            placed = _rule_layouts(site) | _random_layouts(site, 1)
-            for name, layout in placed.items():
-                if not layout:
-                    continue
-                found = both_loads(site, layout, engine, until)
-                rows.append(
-                    (
-                        size,
-                        name,
-                        f"{100.0 * (1.0 - found.positive_pa_s / bare.positive_pa_s):.1f} %",
-                        f"{100.0 * (1.0 - found.impulse_pa_s / bare.impulse_pa_s):.1f} %",
-                        f"{MS_PER_S * found.reached_s:.0f}",
-                        f"{MS_PER_S * found.last_s:.0f}",
-                        f"{MS_PER_S * found.end_s:.0f}",
-                    )
+        cases = [each for each in LONG_RUNS if not scenario or each.name in scenario]
+        with progress_bar("blasts") as progress:
+            for number, case in enumerate(cases, start=1):
+                rows += _definition_rows(case, case.until_s if until is None else until)
+                progress(number / len(cases))
+        headers = ("site", "cells", "layout", "sum of positive phases", "peak specific impulse")
+        times = ("reached after (ms)", "last face (ms)", "run ends (ms)")
+        print_line(markdown_table((*headers, *times), rows))
+
+
+def _definition_rows(case: LongRun, until_s: float) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of a site: no barrier with loads in Pa s, layouts with reductions."""
+    site, engine = case.site, case.engine
+    placed = {"no barrier": (), **_rule_layouts(site), **_random_layouts(site, 1)}
+    bare = both_loads(site, (), engine, until_s)
+    for name, layout in placed.items() if site.build_zone else [("no barrier", ())]:
+        if layout:
+            found = both_loads(site, layout, engine, until_s)
+            positive, peak = (
+                f"{100.0 * (1.0 - own / without):.1f} %"
+                for own, without in (
+                    (found.positive_pa_s, bare.positive_pa_s),
+                    (found.impulse_pa_s, bare.impulse_pa_s),
                 )
-    headers = ("cells", "layout", "sum of positive phases", "peak specific impulse")
-    print_line(
-        markdown_table((*headers, "reached after (ms)", "last face (ms)", "run ends (ms)"), rows)
-    )
+            )
+        elif name == "no barrier":
+            found = bare
+            positive, peak = f"{bare.positive_pa_s:,.0f} Pa s", f"{bare.impulse_pa_s:,.0f} Pa s"
+        else:
+            continue
+        times_s = (found.reached_s, found.last_s, found.end_s)
+        times = (f"{MS_PER_S * each:,.0f}" for each in times_s)
+        yield case.name, case.cells, name, positive, peak, *times
 
 
 @app.command()

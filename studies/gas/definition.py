@@ -2,15 +2,58 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.benchmark import street
 from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.geometry import Layout
 from blast_env.physics.gas.grid import GasGrid
+from blast_env.physics.gas.settings import CELLS
 from blast_env.physics.gas.solver import Gas, Recorder
-from blast_env.scenario import Scenario
+from blast_env.scenario import Scenario, load_scenario
+
+STREET: Final = "street of 100 m, 500 kg"
+
+
+@dataclass(frozen=True)
+class LongRun:
+    """A site with the cells and the duration of the runs that sum up all positive phases.
+
+    Attributes:
+        name: Bundled name, or `STREET`.
+        cells: Side of the cells in m, or "coarse".
+        until_s: Duration: echoes in a street last for a second.
+    """
+
+    name: str
+    cells: str
+    until_s: float
+
+    @property
+    def site(self) -> Scenario:
+        """The scenario."""
+        return street(100.0) if self.name == STREET else load_scenario(self.name)
+
+    @property
+    def engine(self) -> GasEngine:
+        """The engine, which ends a run when its loads are known."""
+        return GasEngine.with_cells(self.cells if self.cells in CELLS else float(self.cells))
+
+
+LONG_RUNS: Final = (
+    LongRun("visitor_entrance", "0.5", 0.18),
+    LongRun("visitor_entrance", "0.25", 0.18),
+    LongRun("control_room", "0.5", 0.18),
+    LongRun("street_front", "coarse", 1.3),
+    LongRun("campus", "coarse", 1.0),
+    LongRun("car_park", "coarse", 1.0),
+    LongRun("government_forecourt", "coarse", 1.0),
+    LongRun(STREET, "coarse", 1.3),
+)
+"""The rows of the table in docs/engineers/gas.md."""
 
 
 class PositivePhases:

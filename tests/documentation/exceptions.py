@@ -187,12 +187,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.gas peaks": "--distances 2.7 --sizes 2,1,0.5",
     "python -m studies.gas handover": "--radii 3,6 --until 0.05",
     "python -m studies.gas settling": "--until 0.02",
-    "python -m studies.gas definition --scenario visitor_entrance --sizes 0.5,0.25 --until 0.18": (
-        "--sizes 0.5"
-    ),
-    "python -m studies.gas definition --scenario street_front --sizes coarse --until 1.3": (
-        "--scenario visitor_entrance --until 0.05"
-    ),
+    "python -m studies.gas definition": "--scenario control_room --until 0.05",
     "python -m studies.gas ending": "--generated 0 --times 1.1",
     "python -m studies.gas oblique": "--angles 20 --until 0.02",
     "python -m studies.gas air-height": "--heights 9,12 --until 0.05",
@@ -209,11 +204,11 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --scenario visitor_entrance --layout"
     " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
     # docs/researchers/surrogate.md
-    "python -m studies.surrogate blasts --first 79 --sites 337 --layouts 4 --rules 3"
+    "python -m studies.surrogate blasts --side 18 --front --sites 100 --layouts 4 --rules 5"
     " --cache blasts": "--sites 1 --layouts 1 --rules 1",
     "python -m studies.blast_table blasts --sites 420 --out blasts.parquet": "--sites 1",
     "python -m studies.surrogate fit --out surrogate.json": (
-        "--data docs/data/site_blasts.parquet --epochs 1 --no-check"
+        "--data docs/data/close_site_blasts.parquet --epochs 1 --no-check"
     ),
     "python -m studies.surrogate compare surrogate.json --rules": (
         "--cases 2 --threats 1 --changes 0"
@@ -224,7 +219,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/researchers/benchmark.md
     "blast-env judge --method genetic --budget 50 --seeds 10 --out entry": (
-        "--problem visitor_entrance-told_2-v1 --budget 2 --seeds 1 --cell 0.5"
+        "--problem visitor_entrance-told_2-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge entry/submission.json --out entry": "--cell 0.5",
     # docs/paper
@@ -252,8 +247,8 @@ SMALLER: Final[dict[str, str]] = {
     " --set updates=60 --set evaluation_interval=4 --set evaluation_cases=2 --run out/hotel": (
         "--steps 20 --set first_updates=3 --set updates=2"
     ),
-    "python -m studies.surrogate fit --data docs/data/site_blasts.parquet --data out/hotel.parquet"
-    " --no-check --out out/hotel.json": "--epochs 1",
+    "python -m studies.surrogate fit --data docs/data/close_site_blasts.parquet"
+    " --data out/hotel.parquet --no-check --out out/hotel.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
     " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
@@ -335,7 +330,8 @@ SMALLER: Final[dict[str, str]] = {
         "courtyard --layouts 2 --seeds 2 --charges 2 --realisations 1"
     ),
     "python -m studies.difficulty visitor_entrance shopping_street hotel_forecourt"
-    " school_and_clinic control_room --processes 1": "--random 2 --budget 2 --place-budget 1",
+    " school_and_clinic control_room --random 20 --budget 300 --place-budget 60"
+    " --processes 1": "--random 2 --budget 2 --place-budget 1",
 }
 """Options that are appended to studies and trainings of minutes to hours."""
 
@@ -354,8 +350,8 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m studies.pack_agent RUN NAME --league out/league --track known_NAME": (
         "writes into the package; tests/agents has it"
     ),
-    "python -m studies.blast_again docs/data/site_blasts.parquet --layouts 8": (
-        "80 sites; tests/studies/test_blast_again.py"
+    "python -m studies.blast_again docs/data/close_site_blasts.parquet --layouts 4": (
+        "200 sites; tests/studies/test_blast_again.py"
     ),
     "python -m studies.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/studies/test_blast_table.py"
@@ -386,7 +382,7 @@ CODE_NOT_RUN: Final = {
     ("docs/researchers/benchmark.md", 5): "needs SMAC, which the project does not have",
     ("docs/researchers/benchmark.md", 7): "needs Minari and jax, which the project does not have",
     ("docs/howto/cluster.md", 2): "needs Slurm and submitit",
-    ("docs/researchers/libraries.md", 6): (
+    ("docs/researchers/libraries.md", 8): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
 }

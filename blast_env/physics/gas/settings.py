@@ -81,7 +81,7 @@ class GasSettings:
     cell_m: float = 0.5
     margin_m: float = 2.0
     border_m: float = 24.0
-    settled_s: float = 0.06
+    settled_s: float = 0.02
     threads: int = 1
     until: str | float = "structures"
     cells: str = UNIFORM
