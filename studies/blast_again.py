@@ -8,6 +8,7 @@ it runs only the new ones.
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -41,16 +42,19 @@ class SiteBlasts(NamedTuple):
     blasts: tuple[tuple[Layout, Charge], ...]
 
 
-def asked_in(table: pd.DataFrame, layouts: int | None) -> list[SiteBlasts]:
+def asked_in(
+    table: pd.DataFrame, layouts: int | None, sites: int | None = None
+) -> list[SiteBlasts]:
     """Return the blasts of a table by site, each once.
 
     Args:
         table: The table.
+        sites: Maximum number of sites, the first ones of the table; `None` for all.
         layouts: Maximum number of blasts per site, first without a barrier, then drawn at random;
             `None` for all.
     """
     found = []
-    for number, (name, rows) in enumerate(table.groupby("scenario", sort=False)):
+    for number, (name, rows) in enumerate(islice(table.groupby("scenario", sort=False), sites)):
         blasts = list(dict.fromkeys(map(_blast, rows.to_dict("records"))))
         order = np.random.default_rng(number).permutation(len(blasts))
         drawn = sorted((blasts[each] for each in order), key=lambda blast: len(blast[0]) > 0)
@@ -82,6 +86,9 @@ def main(
     layouts: Annotated[
         int | None, typer.Option(min=1, help="Most blasts of a site; all unless given.")
     ] = None,
+    sites: Annotated[
+        int | None, typer.Option(min=1, help="Most sites of a table; all unless given.")
+    ] = None,
     cells: Annotated[str | None, typer.Option(help="uniform, coarse or fine.")] = None,
     processes: Annotated[int, typer.Option(min=1)] = 2,
 ) -> None:
@@ -90,7 +97,7 @@ def main(
         make_folder(out)
         run = partial(run_site, cells=cells, folder=out / "blasts")
         for path in tables:
-            asked = asked_in(read_frame(path, [each.name for each in COLUMNS]), layouts)
+            asked = asked_in(read_frame(path, [each.name for each in COLUMNS]), layouts, sites)
             with progress_bar(path.stem) as progress:
                 rows: Sequence[list[dict[str, object]]] = run_all(run, asked, processes, progress)
             blasts = sum(len(each.blasts) for each in asked)

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 TABLES: Final = (
     "gas_blasts",
-    "site_blasts",
     "many_site_blasts",
     "close_site_blasts",
     "front_site_blasts",

@@ -55,17 +55,17 @@ class Definition:
         site: Bundled name, or `site_SEED` for a generated site with heights and a catalogue.
         family: Knowledge of the charge.
         place: Number of the site's charge in the family `told`, from 1.
-        version: Version, from 1.
+        version: Version; 1 had the sum of positive phases as load.
     """
 
     site: str
     family: Family
     place: int = 1
-    version: int = 1
+    version: int = 2
 
     @property
     def name(self) -> str:
-        """Name, such as `control_room-told-v1`; with another place, `control_room-told_2-v1`."""
+        """Name, such as `control_room-told-v2`; with another place, `control_room-told_2-v2`."""
         place = "" if self.place == 1 else f"_{self.place}"
         return f"{self.site}-{self.family}{place}-v{self.version}"
 
@@ -131,7 +131,7 @@ def _charge(threat: Threat) -> object:
 _STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
 _OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
 _PUBLIC_VEHICLES: Final = (5103,)
-_PUBLIC_SITES: Final = range(6100, 6115)
+_PUBLIC_SITES: Final = range(6100, 6108)
 """Seeds of the family `unseen`; a judge draws further sites with `secret_sites`."""
 
 _FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
@@ -141,7 +141,7 @@ def _definitions() -> tuple[Definition, ...]:
     return (
         *(Definition(site, "told", place) for site in _STREETS for place in (1, 2, 3)),
         *(Definition(site, "told") for site in _OPEN),
-        *(Definition(site, "hidden") for site in (*_STREETS, *_OPEN)),
+        *(Definition(site, "hidden") for site in _STREETS),
         *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
         *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
         *(Definition(f"{_GENERATED}{seed}", "unseen") for seed in _PUBLIC_SITES),
@@ -154,7 +154,7 @@ DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
 )
 """All public problems by name."""
 
-SMALL: Final = ("visitor_entrance-told_2-v1", "control_room-told-v1", "school_and_clinic-told-v1")
+SMALL: Final = ("visitor_entrance-told_2-v2", "control_room-told-v2", "school_and_clinic-told-v2")
 """A few problems with one blast per layout, for a first look and for methods with many seeds."""
 
 

@@ -232,7 +232,7 @@ def make(
     """Return a problem of the benchmark.
 
     Args:
-        problem: Its name, such as `control_room-told-v1`, or its definition.
+        problem: Its name, such as `control_room-told-v2`, or its definition.
         budget: Most gas blasts.
         cell_m: Side of the cells, m; 0.5 unless given.
         engine: Another engine than gas dynamics, for tests.

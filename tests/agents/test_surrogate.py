@@ -710,7 +710,7 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
 
 
 def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
-    table = pq.read_table("docs/data/many_site_blasts.parquet")
+    table = pq.read_table("docs/data/close_site_blasts.parquet")
     names = table["scenario"].unique()[:2]
     pq.write_table(table.filter(pc.is_in(table["scenario"], names)), tmp_path / "few.parquet")
     surrogate = packaged_surrogate().save(tmp_path / "surrogate.json")

@@ -26,7 +26,7 @@ from tests.scenario.test_hardening import glazed_yard
 WALL = [Piece(12, 0, "low_wall", True)]
 
 
-def problem(budget: int = 3, name: str = "control_room-told-v1") -> BenchmarkProblem:
+def problem(budget: int = 3, name: str = "control_room-told-v2") -> BenchmarkProblem:
     return make(name, budget, engine=RowEngine())
 
 
@@ -52,7 +52,7 @@ def test_an_illegal_layout_costs_nothing() -> None:
 
 
 def test_a_hidden_charge_takes_a_blast_a_place_or_fewer() -> None:
-    own = problem(7, "control_room-hidden-v1")
+    own = problem(7, "control_room-hidden-v2")
     own.evaluate(WALL)
     assert own.blasts == 3
     own.evaluate([], threats=1)
@@ -110,12 +110,12 @@ def test_every_version_says_what_it_said() -> None:
 def test_a_problem_that_has_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     changed = Definition("control_room", "told")
     monkeypatch.setitem(vars(changed), "digest", "0" * 16)
-    with pytest.raises(BlastEnvError, match=r"control_room-told-v1: .* never changes"):
+    with pytest.raises(BlastEnvError, match=r"control_room-told-v2: .* never changes"):
         make(changed, engine=RowEngine())
 
 
 def test_a_problem_that_there_is_not_names_the_nearest() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean 'control_room-told-v1'"):
+    with pytest.raises(UnknownNameError, match="did you mean 'control_room-told-v2'"):
         make("control_room-tol-v1")
 
 

@@ -72,7 +72,7 @@ def test_a_vector_of_use_to_nobody_is_refused() -> None:
 
 
 def test_reasons_name_each_piece_that_cannot_stand() -> None:
-    problem = make("control_room-told-v1")
+    problem = make("control_room-told-v2")
     reasons = problem.check(
         [Piece(0, 0, "low_wall", True), Piece(0, 0, "low_wall", True), Piece(99, 0, "low_wall")]
     )

@@ -51,7 +51,7 @@ _MOST_GRADIENT: Final = 1.0
 """Bound on the norm of a gradient, against outliers among the groups."""
 
 _LEAST_SCALE: Final = 1e-3
-_LEAST_CASE: Final = 8
+_LEAST_CASE: Final = 4
 """Least number of layouts of a case for its rank correlation."""
 
 _CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
