@@ -1,0 +1,17 @@
+"""An episode of `BlastBarrier-v0`: random legal places for barriers, then the blast."""
+
+import gymnasium as gym
+
+import blast_env  # noqa: F401  # registers the environments
+
+env = gym.make("BlastBarrier-v0", scenario="courtyard")
+observation, info = env.reset(seed=0)
+env.action_space.seed(0)
+reward, ended = 0.0, False
+while not ended:
+    action = env.action_space.sample(mask=info["action_mask"])  # a free cell, or "finish"
+    observation, reward, terminated, truncated, info = env.step(action)
+    ended = terminated or truncated
+
+print(f"{len(info['layout'])} modules take off {info['reduction']:.1%} of the impulse")
+print(f"{info['impulse_pa_s']:.0f} Pa s on the building, reward {reward:.4f}")

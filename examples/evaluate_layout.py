@@ -1,0 +1,12 @@
+"""What a layout is worth, by gas dynamics, at every place of the charge."""
+
+import blast_env
+
+scenario = blast_env.load_scenario("visitor_entrance")
+walls = [(7, 8, "t_wall_3_6", True), (14, 7, "t_wall_3_6", True)]  # row, column, item, turned
+found = blast_env.evaluate_layout(scenario, walls, seeds=range(3), engine="gas")
+
+low, high = found.ci95
+print(f"reduction {found.mean_reduction:.1%}, 95 % interval {low:.1%} to {high:.1%}")
+print(found.table[["structure", "impulse_pa_s", "unprotected_impulse_pa_s"]].to_string())
+blast_env.write_layout("walls.json", scenario, walls)
