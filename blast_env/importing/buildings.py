@@ -134,7 +134,8 @@ def _apart(things: Sequence[Thing], options: ImportOptions, ledger: Ledger) -> l
     found = [each for each in things if each.carries]
     left = list(order)
     for k, thing in enumerate(order):
-        shape, cut = thing.geometry, []
+        shape = thing.geometry
+        cut: list[Thing] = []
         least_m2 = max(options.least_area_m2, _LEAST_SHARE * shape.area)
         for index in sorted(int(other) for other in tree.query(shape, "intersects")):
             if cut and shape.area < least_m2:
