@@ -1,4 +1,4 @@
-"""What a layout is worth, by gas dynamics, at every place of the charge."""
+"""The load that a layout takes off, by gas dynamics, under charges drawn from the site."""
 
 import blast_env
 
