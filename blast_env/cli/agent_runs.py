@@ -22,6 +22,7 @@ from blast_env.cli.evaluation_report import (
     asked_blasts,
     cache_record,
     cache_text,
+    print_if_all_charges,
     print_means,
     print_record,
     report_layout,
@@ -47,7 +48,6 @@ from blast_env.evaluation import (
     Threat,
     compare,
 )
-from blast_env.evaluation.cases import are_all, fixed_charges
 from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.evaluation.grid_error import final_engine
 from blast_env.export import LayoutPlan, export_layouts
@@ -166,12 +166,9 @@ def _report_cases(
         return
     title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
-    if are_all(cases[0].scenario, [each.charge for each in cases]):
-        print_line(
-            f"note: the site has {len(fixed_charges(cases[0].scenario))} fixed charges, which all "
-            "count here; training may have met them, and the interval is their spread, not an "
-            "uncertainty about others"
-        )
+    print_if_all_charges(
+        cases[0].scenario, [each.charge for each in cases], "training may have met them, and "
+    )
     milliseconds = median(MS_PER_S * each.seconds for each in proposals)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
     print_written(written)

@@ -1,6 +1,6 @@
 """The options of `blast-env evaluate`, and its printed and written output."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
 from pathlib import Path
@@ -46,6 +46,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_against,
 )
+from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.grid_error import GridError, points, with_errors
 from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
@@ -96,14 +97,14 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
     def threats(self, scenario: Scenario, engine: Engine) -> tuple[Threat, ...]:
         """Return the threats drawn by the seeds, with the user's place and mass of the charge.
 
-        Without noise a charge has one realisation: if all threats share their charge, one is left.
+        Fixed charges come in turn, each once before any repeats. Without noise a charge has one
+        realisation: repeated ones are dropped.
         """
-        drawn = draw_threats(scenario, self.seed_range)
+        drawn = in_turn(scenario, draw_threats(scenario, self.seed_range))
         threats = tuple(
             Threat(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
         )
-        is_one = not engine.has_noise and len({threat.charge for threat in threats}) == 1
-        return threats[:1] if is_one else threats
+        return threats if engine.has_noise else one_of_each_charge(threats)
 
     @property
     def seed_range(self) -> range:
@@ -189,6 +190,24 @@ def threats_text(count: int, seeds: range) -> str:
     if count == 1:
         return f"seed {seeds[0]}"
     return f"means over {count} threats (seeds {seeds[0]} to {seeds[-1]})"
+
+
+def print_if_all_charges(
+    scenario: Scenario, charges: Iterable[AnyCharge | None], training: str = ""
+) -> None:
+    """Print a note if charges include all possible ones of a scenario, which are fixed.
+
+    Args:
+        scenario: The scenario.
+        charges: The charges.
+        training: Words on their part in a training.
+    """
+    count = len(fixed_charges(scenario))
+    if count > 1 and are_all(scenario, charges):
+        print_line(
+            f"note: the site has {count} fixed charges, which all count here; {training}the "
+            "interval is their spread, not an uncertainty about others"
+        )
 
 
 _NOT_IN_SHORT: Final = ("scenario", "threats", "modules", "cases")
@@ -305,6 +324,7 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
         )
     result_console().print(table)
     _print_totals(evaluation)
+    print_if_all_charges(evaluation.scenario, [each.charge for each in evaluation.threats])
     for note in evaluation.notes:
         print_line(f"note: {note}")
 

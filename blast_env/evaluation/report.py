@@ -12,7 +12,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.engines import JUDGE, Engine
 from blast_env.engines.contract import BlastLoads, StructureLoad, on_buildings
-from blast_env.evaluation.cases import Case, Threat, draw_threats
+from blast_env.evaluation.cases import Case, Threat, draw_threats, in_turn
 from blast_env.evaluation.comparison import (
     CHARGE_COLUMNS,
     Comparison,
@@ -486,8 +486,9 @@ def evaluate_layout(
 ) -> LayoutEvaluation:
     """Estimate the load reduction of a layout on the protected structures, with its uncertainty.
 
-    Every seed draws a threat from the scenario; the layout and the empty site are under the same
-    threats. Use seeds other than those of the layout's search, on which it is overrated.
+    Every seed draws a threat from the scenario; fixed charges come in turn, each once before any
+    repeats. The layout and the empty site are under the same threats. Use seeds other than those of
+    the layout's search, on which it is overrated.
 
     Args:
         scenario: The scenario, or its bundled name or path; for the particle engines it must name
@@ -519,7 +520,7 @@ def evaluate_layout(
     found = find_scenario(scenario)
     judge = final_engine(engine, [found], cell_m, cells=cells)
     evaluator = BlastEvaluator(found, judge, cache=cache)
-    drawn = draw_threats(found, seeds) if threats is None else tuple(threats)
+    drawn = in_turn(found, draw_threats(found, seeds)) if threats is None else tuple(threats)
     return evaluate_against(
         evaluator,
         layout,

@@ -12,6 +12,8 @@ from blast_env import Charge, load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.evaluation import evaluate_layout
 from blast_env.physics.event.engine import EventRun
+from blast_env.scenario import PointSource
+from tests.envs.small import small_scenario
 
 CELLS = [(9, 0), (10, 0), (11, 0)]
 
@@ -23,7 +25,7 @@ def layout(tmp_path: Path) -> Path:
     return path
 
 
-def evaluate(*arguments: str | Path) -> Result:
+def evaluate(*arguments: str | Path | int) -> Result:
     """Evaluate with blasts of milliseconds, unless the arguments name another engine."""
     words = (str(argument) for argument in arguments)
     return CliRunner().invoke(app, ["evaluate", "--engine", "event", *words])
@@ -162,3 +164,16 @@ def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
     again = runs[0] - before
     evaluate(*options)
     assert again < runs[0] - before - again
+
+
+def test_fixed_charges_count_once_each_and_are_named(tmp_path: Path) -> None:
+    places = ((2.0, 5.0), (2.0, 7.0), (2.0, 9.0))
+    points = tuple(PointSource(kind="point", position_m=each, tnt_kg=100.0) for each in places)
+    save_scenario(small_scenario().model_copy(update={"charge": points}), tmp_path / "points.toml")
+    (tmp_path / "layout.json").write_text("[]")
+    site = ("--scenario", tmp_path / "points.toml", "--layout", tmp_path / "layout.json")
+    result = evaluate(*site, "--seeds", 3, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    met = pd.read_csv(tmp_path / "out" / "threats.csv")[["charge_x_m", "charge_y_m"]]
+    assert {*met.itertuples(index=False, name=None)} == {*places}
+    assert "note: the site has 3 fixed charges" in result.stdout
