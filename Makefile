@@ -24,7 +24,7 @@ suite: lint
 	$(MAKE) check
 
 # What a change of the model most often breaks. Neither types, nor agents, commands and studies.
-QUICK := envs evaluation export physics recording scenario test_golden.py test_simulation.py
+QUICK := envs evaluation io/export layout particles site test_golden.py test_simulation.py
 quick: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/pytest --numprocesses auto --dist worksteal -m "not slow" $(QUICK:%=tests/%)
@@ -52,7 +52,7 @@ $(VENV)/.mutants: $(STAMP)
 
 # The tests of `make quick` with other Pythons, which uv gets, and with the oldest libraries that
 # pyproject.toml allows; torch stays as it is, because each of its versions is gigabytes. Without
-# agents: MATRIX_EXTRAS=app,cluster,report MATRIX_TESTS="tests/physics tests/recording".
+# agents: MATRIX_EXTRAS=app,cluster,report MATRIX_TESTS="tests/particles".
 MATRIX := 3.11 3.12 3.13 lowest
 MATRIX_EXTRAS ?= all
 MATRIX_TESTS ?= $(QUICK:%=tests/%)
@@ -62,7 +62,7 @@ MATRIX_PYTHON = out/matrix/$*/bin/python
 # of torch, Numba's target without FMA, other kernels of the BLAS, glibc's functions without FMA,
 # and other numbers of threads. tests/digests.py says what a digest depends on.
 ROUNDING := default avx2 avx512 generic kernels no-fma one-thread four-threads
-ROUNDING_TESTS ?= $(MATRIX_TESTS) $(addprefix tests/,agents calibration engines response studies test_gas.py)
+ROUNDING_TESTS ?= $(MATRIX_TESTS) $(addprefix tests/,agents design gas response studies test_gas.py)
 matrix: $(MATRIX:%=matrix-%) $(ROUNDING:%=matrix-%)
 
 matrix-default matrix-avx2 matrix-avx512: export ATEN_CPU_CAPABILITY = $(@:matrix-%=%)

@@ -15,46 +15,39 @@ from blast_env.envs import register_environments as _register_environments
 from blast_env.provenance import package_version
 
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers
-    from blast_agents.proposal import propose, search
-
-    from blast_env.engines.contract import Engine
-    from blast_env.engines.gas import GasBlast, GasResult
-    from blast_env.engines.particles import Blast, BlastResult
-    from blast_env.engines.simulate import simulate, simulate_many
+    from blast_env.design.proposal import propose, search
     from blast_env.evaluation.cases import Case, Threat
+    from blast_env.evaluation.engines.contract import Engine
+    from blast_env.evaluation.engines.gas import GasBlast, GasResult
+    from blast_env.evaluation.engines.particles import Blast, BlastResult
+    from blast_env.evaluation.engines.simulate import simulate, simulate_many
     from blast_env.evaluation.report import LayoutEvaluation, evaluate_layout
-    from blast_env.physics.scene import Charge
-    from blast_env.scenario import (
-        Placement,
-        Scenario,
-        load_layout,
-        load_scenario,
-        save_scenario,
-        write_layout,
-    )
+    from blast_env.layout import Placement, load_layout, write_layout
+    from blast_env.site import Scenario, load_scenario, save_scenario
+    from blast_env.site.scene import Charge
 
 _PLACES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "Blast": "blast_env.engines.particles",
-        "BlastResult": "blast_env.engines.particles",
+        "Blast": "blast_env.evaluation.engines.particles",
+        "BlastResult": "blast_env.evaluation.engines.particles",
         "Case": "blast_env.evaluation.cases",
-        "Charge": "blast_env.physics.scene",
-        "Engine": "blast_env.engines.contract",
-        "GasBlast": "blast_env.engines.gas",
-        "GasResult": "blast_env.engines.gas",
+        "Charge": "blast_env.site.scene",
+        "Engine": "blast_env.evaluation.engines.contract",
+        "GasBlast": "blast_env.evaluation.engines.gas",
+        "GasResult": "blast_env.evaluation.engines.gas",
         "LayoutEvaluation": "blast_env.evaluation.report",
-        "Placement": "blast_env.scenario",
-        "Scenario": "blast_env.scenario",
+        "Placement": "blast_env.layout",
+        "Scenario": "blast_env.site",
         "Threat": "blast_env.evaluation.cases",
         "evaluate_layout": "blast_env.evaluation.report",
-        "load_layout": "blast_env.scenario",
-        "load_scenario": "blast_env.scenario",
-        "propose": "blast_agents.proposal",
-        "save_scenario": "blast_env.scenario",
-        "search": "blast_agents.proposal",
-        "simulate": "blast_env.engines.simulate",
-        "simulate_many": "blast_env.engines.simulate",
-        "write_layout": "blast_env.scenario",
+        "load_layout": "blast_env.layout",
+        "load_scenario": "blast_env.site",
+        "propose": "blast_env.design.proposal",
+        "save_scenario": "blast_env.site",
+        "search": "blast_env.design.proposal",
+        "simulate": "blast_env.evaluation.engines.simulate",
+        "simulate_many": "blast_env.evaluation.engines.simulate",
+        "write_layout": "blast_env.layout",
     }
 )
 

@@ -13,17 +13,13 @@ _NO_INFLUENCE: Final = frozenset(
     {
         "__init__.py",
         "__main__.py",
+        "benchmark",
         "cli",
-        "data",
         "envs",
-        "export",
-        "importing",
-        "problems",
-        "recording",
-        "rendering",
-        "reporting",
+        "io",
+        "plots",
+        "report",
         "sites",
-        "studies",
     }
 )
 """Parts of the package that cannot change the loads of a blast."""

@@ -60,16 +60,16 @@ napoleon_use_ivar = True
 PUBLIC: Final = (
     "blast_env",
     "blast_env.evaluation",
-    "blast_env.scenario",
+    "blast_env.site",
     "blast_env.sites",
-    "blast_env.importing",
+    "blast_env.io.importing",
     "blast_env.calibration",
-    "blast_env.export",
-    "blast_env.reporting",
-    "blast_env.problems",
-    "blast_env.data",
+    "blast_env.io.export",
+    "blast_env.report",
+    "blast_env.benchmark",
+    "blast_env.benchmark.data",
     "blast_agents.training",
-    "blast_agents.search",
+    "blast_env.design.search",
     "blast_agents.league",
 )
 """Packages whose `__all__` is documented; a name of several of them, with the first."""

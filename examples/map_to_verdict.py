@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from blast_agents.rules import wall_near_building
-
 import blast_env
-from blast_env.importing import ImportOptions, import_site
+from blast_env.design.rules import wall_near_building
+from blast_env.io.importing import ImportOptions, import_site
 
 MAP = Path(__file__).parents[1] / "docs" / "data" / "pump_house.geojson"
 

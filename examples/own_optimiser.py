@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from blast_env.problems import BenchmarkProblem, make
+from blast_env.benchmark import BenchmarkProblem, make
 
 
 def climb(problem: BenchmarkProblem, seed: int) -> float:

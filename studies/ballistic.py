@@ -18,11 +18,11 @@ from scipy.stats import qmc
 from blast_env.calibration import fit_metrics, fit_power_law, paper_table, shape_rms_percent
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, user_errors
-from blast_env.engines import simulate
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.free_field import FreeFieldStudy, free_field, impulse_by_seed
 from blast_env.files import make_folder, write_atomically
-from blast_env.fitting.free_field import FreeFieldStudy, free_field, impulse_by_seed
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)

@@ -15,17 +15,17 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pandas as pd
 import typer
-from blast_agents.surrogate.fitting import elements
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines import find_engine
+from blast_env.design.surrogate.fitting import elements
 from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation.engines import find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
+from blast_env.particles.parquet import read_frame, write_table
 from blast_env.provenance import versions
-from blast_env.recording.parquet import read_frame, write_table
 from blast_env.runner import run_all
+from blast_env.site.scene import Charge
 from blast_env.tables import table_of
 from studies.blast_table import COLUMNS, load_row, scenario_of
 

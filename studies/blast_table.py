@@ -20,10 +20,10 @@ from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, DiskCache, StructureLoad, draw_threats
 from blast_env.files import make_folder
-from blast_env.physics.scene import OUTWARDS
+from blast_env.particles.parquet import write_table
 from blast_env.provenance import versions
-from blast_env.recording.parquet import write_table
-from blast_env.scenario import Scenario, bundled_scenarios
+from blast_env.site import Scenario, bundled_scenarios
+from blast_env.site.scene import OUTWARDS
 from blast_env.sites import (
     CLOSE_SIDES_M,
     FAMILIES,

@@ -15,8 +15,6 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from blast_agents.rules import random_layout
-from blast_agents.search import LayoutProblem, find_proposer, layouts_by_rule
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,17 +23,20 @@ from matplotlib.lines import Line2D
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines.contract import Engine, find_engine
+from blast_env.design.rules import random_layout
+from blast_env.design.search import LayoutProblem, find_proposer, layouts_by_rule
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
+from blast_env.evaluation.engines.contract import Engine, find_engine
 from blast_env.geometry import Layout
-from blast_env.plan import INK, STANDING, Feature, Kinds, site_features, without
-from blast_env.rendering.figures import save_figure
-from blast_env.rendering.site_plan import draw_plan, legend_of, write_legend
-from blast_env.rendering.style import count_of, unit_interval
+from blast_env.layout import Placement, usable_cells
+from blast_env.plots.figures import save_figure
+from blast_env.plots.plan import INK, STANDING, Feature, Kinds, site_features, without
+from blast_env.plots.site_plan import draw_plan, legend_of, write_legend
+from blast_env.plots.style import count_of, unit_interval
 from blast_env.runner import run_all
-from blast_env.scenario import Placement, Scenario, ScenarioError, SegmentSource, usable_cells
-from blast_env.scenario.zone import distance_m, source_bounds_m
+from blast_env.site import Scenario, ScenarioError, SegmentSource
+from blast_env.site.zone import distance_m, source_bounds_m
 from blast_env.sites import (
     FAMILIES,
     SITES,

@@ -42,14 +42,14 @@ from blast_env.cli.output import (
     result_console,
     user_errors,
 )
-from blast_env.engines import JUDGE
-from blast_env.engines.gas import GasBlast
 from blast_env.errors import BlastEnvError
-from blast_env.export import LayoutPlan, export_layouts
-from blast_env.rendering.figures import save_figure
-from blast_env.rendering.gas import facades
-from blast_env.rendering.pressure_film import write_pressure_film
-from blast_env.rendering.site_picture import site_picture
+from blast_env.evaluation.engines import JUDGE
+from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.io.export import LayoutPlan, export_layouts
+from blast_env.plots.figures import save_figure
+from blast_env.plots.gas import facades
+from blast_env.plots.pressure_film import write_pressure_film
+from blast_env.plots.site_picture import site_picture
 
 HEADERS: Final = (
     "layouts",

@@ -15,10 +15,10 @@ import typer
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines import simulate
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import simulate
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
 from blast_env.statistics import Estimate, mean_estimate
 from blast_env.tables import markdown_table
 

@@ -16,8 +16,8 @@ import typer
 from blast_env.calibration import fit_metrics, fit_power_law, kingery_bulmash, load_calibration
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.evaluation.free_field import FreeFieldStudy, free_field, summarise
 from blast_env.files import make_folder
-from blast_env.fitting.free_field import FreeFieldStudy, free_field, summarise
 from blast_env.runner import share_of
 from blast_env.tables import markdown_table, write_csv
 from blast_env.units import PA_PER_PSI

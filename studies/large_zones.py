@@ -10,13 +10,14 @@ from time import process_time
 from typing import Annotated, Final
 
 import typer
-from blast_agents.proposal import propose
-from blast_agents.search import layouts_by_rule
 
-from blast_env.benchmark import own_memory_mb, street
 from blast_env.bundled import REAL_SIZE
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.scenario import Placement, Scenario, load_scenario
+from blast_env.design.proposal import propose
+from blast_env.design.search import layouts_by_rule
+from blast_env.evaluation.speed import own_memory_mb, street
+from blast_env.layout import Placement
+from blast_env.site import Scenario, load_scenario
 from blast_env.sites import Visibility, visibility_layout
 from blast_env.tables import markdown_table
 

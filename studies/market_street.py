@@ -18,7 +18,7 @@ from ezdxf.enums import TextEntityAlignment
 from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, user_errors
 from blast_env.files import write_atomically
-from blast_env.importing.plane import LocalPlane, rotated
+from blast_env.io.importing.plane import LocalPlane, rotated
 
 PLANE: Final = LocalPlane("EPSG:4326", 7.5, 54.8)
 ROTATION_DEG: Final = 23.0

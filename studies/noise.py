@@ -10,16 +10,17 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from blast_agents.rules import random_layout
 
 from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.design.rules import random_layout
 from blast_env.envs.strategies import DEPOSIT
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Cell, Layout
-from blast_env.scenario import Placement, Scenario, load_scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario, load_scenario
 from blast_env.tables import markdown_table
 
 SCENARIOS: Final = ("courtyard", "perimeter_gate", "street_junction")

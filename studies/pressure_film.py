@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import typer
-from blast_agents.rules import wall_near_building
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines.gas import GasBlast
-from blast_env.rendering.pressure_film import write_pressure_film
-from blast_env.rendering.pressure_frames import VerticalSection
-from blast_env.scenario import Charge, load_scenario
+from blast_env.design.rules import wall_near_building
+from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.plots.pressure_film import write_pressure_film
+from blast_env.plots.pressure_frames import VerticalSection
+from blast_env.site import Charge, load_scenario
 
 SITE: Final = Path(__file__).parents[1] / "docs" / "data" / "depot.toml"
 CHARGE: Final = Charge((4.0, 11.0), 100.0)

@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.consequences import side_on_impulse_pa_s, side_on_peak_pa
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import level_of
 from blast_env.response.facade import (
@@ -35,7 +35,7 @@ from blast_env.response.walls import (
     ReinforcedConcrete,
     panel_responses,
 )
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 

@@ -12,35 +12,36 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from blast_agents.search import LayoutProblem, find_proposer
-from blast_agents.search.advice import MeasureKind, advise
-from blast_agents.search.registry import layouts_by_rule
 
 from blast_env.bundled import REAL_SIZE
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines.contract import Engine, find_engine
+from blast_env.design.search import LayoutProblem, find_proposer
+from blast_env.design.search.advice import MeasureKind, advise
+from blast_env.design.search.registry import layouts_by_rule
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation.engines.contract import Engine, find_engine
 from blast_env.files import make_folder
+from blast_env.gas.settings import UNIFORM
 from blast_env.geometry import Layout, layout_words
-from blast_env.physics.gas.settings import UNIFORM
-from blast_env.plan import INK, PROTECTED, charge_feature, site_features, vehicle_features
-from blast_env.rendering.facade import LEVEL_COLOURS
-from blast_env.rendering.figures import save_figure
-from blast_env.rendering.site_plan import (
+from blast_env.layout import Placement, load_layout
+from blast_env.layout.build_scene import charge_against
+from blast_env.plots.facade import LEVEL_COLOURS
+from blast_env.plots.figures import save_figure
+from blast_env.plots.plan import INK, PROTECTED, charge_feature, site_features, vehicle_features
+from blast_env.plots.site_plan import (
     draw_plan,
     legend_of,
     write_heading,
     write_legend,
     write_names,
 )
-from blast_env.rendering.style import render_extra, unit_interval
+from blast_env.plots.style import render_extra, unit_interval
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from, worst
-from blast_env.scenario import AnyCharge, Placement, Scenario, load_layout, load_scenario
-from blast_env.scenario.build_scene import charge_against
-from blast_env.scenario.models import SCHEMA_VERSION
+from blast_env.site import AnyCharge, Scenario, load_scenario
+from blast_env.site.models import SCHEMA_VERSION
 from blast_env.tables import markdown_table
 
 with render_extra():

@@ -9,11 +9,11 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line
 from blast_env.evaluation import BlastEvaluator, Threat
-from blast_env.physics.scene import Charge
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.glass import glazing_responses
 from blast_env.response.sdof import responses
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.scene import Charge
 from blast_env.units import MS_PER_S
 
 _REPEATS: Final = 5

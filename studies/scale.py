@@ -18,22 +18,22 @@ from typing import Annotated, Final, Protocol
 import joblib
 import numpy as np
 import typer
-from blast_agents.rules import random_layout
 from blast_agents.training import TrainingSettings, load_hyperparameters
 from blast_agents.training.environments import make_environments
 from blast_agents.training.run_folder import RunConfiguration
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.cluster import on_cluster
-from blast_env.engines import find_engine
+from blast_env.design.rules import random_layout
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import import_extra
 from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation.engines import find_engine
 from blast_env.files import FolderStore, make_folder
 from blast_env.geometry import Layout
+from blast_env.layout.build_scene import draw_charge
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario, load_scenario
-from blast_env.scenario.build_scene import draw_charge
+from blast_env.site import Scenario, load_scenario
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.gas.loads import yard

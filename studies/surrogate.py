@@ -15,25 +15,25 @@ import torch
 import typer
 from blast_agents.league import find_tracks
 from blast_agents.league.trained import TrainedRun, check_runs
-from blast_agents.rules import random_layout
-from blast_agents.search import layouts_by_rule
-from blast_agents.search.moves import Moves, random_walls
-from blast_agents.surrogate.fitting import ErrorsOfBoth, Samples, errors, fit, folds
-from blast_agents.surrogate.network import Check, Fit, Surrogate, load_surrogate
-from blast_agents.surrogate.search import Guesses, LearntSearch, improved
 from blast_agents.training import load_agent
 
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines import Engine, find_engine
+from blast_env.design.rules import random_layout
+from blast_env.design.search import layouts_by_rule
+from blast_env.design.search.moves import Moves, random_walls
+from blast_env.design.surrogate.fitting import ErrorsOfBoth, Samples, errors, fit, folds
+from blast_env.design.surrogate.network import Check, Fit, Surrogate, load_surrogate
+from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
+from blast_env.particles.parquet import read_frame
 from blast_env.provenance import command, versions
-from blast_env.recording.parquet import read_frame
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
 from blast_env.sites import HELD_OUT_SITES
 from blast_env.statistics import Estimate, mean_estimate, reductions
 from blast_env.tables import markdown_table

@@ -3,7 +3,7 @@
 from typing import Any
 
 from blast_env.geometry import Layout, Piece
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 WALL: Layout = (Piece(5, 1, "wall", True), Piece(8, 1, "wall", True), Piece(4, 1, "post"))
 """Two walls in line before the building, and a post beside them."""

@@ -7,17 +7,17 @@ may: nothing depends on this but the time.
 from typing import Literal
 
 import numpy as np
-from blast_agents.surrogate.relations import relations
-from blast_agents.surrogate.ways import Ways
 
 from blast_env import load_scenario, simulate
-from blast_env.physics.gas.faces import ground_faces
-from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.probes import FaceLoads, Gauges, GroundMap
-from blast_env.physics.gas.solver import GasSolver, Settling
-from blast_env.physics.gas.source import GasCharge, set_charge
-from blast_env.scenario import Scenario
-from tests.scenario.documents import driven_document
+from blast_env.design.surrogate.relations import relations
+from blast_env.design.surrogate.ways import Ways
+from blast_env.gas.faces import ground_faces
+from blast_env.gas.grid import GasGrid
+from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
+from blast_env.gas.solver import GasSolver, Settling
+from blast_env.gas.source import GasCharge, set_charge
+from blast_env.site import Scenario
+from tests.site.documents import driven_document
 
 
 def event_engine() -> None:

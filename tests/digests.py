@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from blast_env.physics.gas.state import FUSED
+from blast_env.gas.state import FUSED
 
 
 class Condition(NamedTuple):

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from blast_env.engines.gas import GasResult
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines.gas import GasResult
+from blast_env.site import Scenario
 
 WALL = tuple((row, 0) for row in range(6))
 """In front of the building, between it and the charge."""

@@ -65,34 +65,41 @@ def _parts(folder: str, tests: tuple[str, ...], *modules: str) -> list[Part]:
 
 
 _RULES: Final = (
-    *("tests/physics/test_event_rules.py", "tests/physics/test_event_friction.py"),
-    *("tests/physics/test_event_by_hand.py", "tests/physics/test_event_contacts.py"),
-    *("tests/physics/test_event_walls.py", "tests/physics/test_event_conservation.py"),
+    *("tests/particles/test_event_rules.py", "tests/particles/test_event_friction.py"),
+    *("tests/particles/test_event_by_hand.py", "tests/particles/test_event_contacts.py"),
+    *("tests/particles/test_event_walls.py", "tests/particles/test_event_conservation.py"),
 )
 _LAWS: Final = tuple(
-    f"tests/calibration/test_{name}.py" for name in ("laws", "metrics", "references", "friedlander")
+    f"tests/particles/calibration/test_{name}.py"
+    for name in ("laws", "metrics", "references", "friedlander")
 )
 _COMPARISON: Final = (
     *("tests/evaluation/test_statistics.py", "tests/evaluation/test_objective.py"),
-    *("tests/evaluation/test_evaluate.py", "tests/agents/test_evaluation.py"),
+    *("tests/evaluation/test_evaluate.py", "tests/design/test_evaluation.py"),
 )
-_PLACES: Final = tuple(
-    f"tests/scenario/test_{name}.py"
-    for name in (
-        *("placement", "layout", "conditions", "zone_checks", "access_way", "checks"),
-        *("catalogue", "vehicles", "item_scenarios"),
-    )
+_PLACES: Final = (
+    *("tests/layout/test_placement.py", "tests/layout/test_layout.py"),
+    *(
+        f"tests/site/test_{name}.py"
+        for name in (
+            *("conditions", "zone_checks", "access_way", "checks"),
+            *("catalogue", "vehicles", "item_scenarios"),
+        )
+    ),
 )
 
 AREAS: Final[Mapping[str, list[Part]]] = MappingProxyType(
     {
-        "calibration": _parts("calibration", _LAWS, "laws", "metrics", "references"),
+        "calibration": _parts("particles/calibration", _LAWS, "laws", "metrics", "references"),
         "comparison": [
             Part("blast_env/statistics.py", _COMPARISON),
             *_parts("evaluation", _COMPARISON, "comparison"),
         ],
-        "placement": _parts("scenario", _PLACES, "placement", "zone"),
-        "physics rules": _parts("physics/event", _RULES, "contacts"),
+        "placement": [
+            *_parts("layout", _PLACES, "placement"),
+            *_parts("site", _PLACES, "zone"),
+        ],
+        "physics rules": _parts("particles/event", _RULES, "contacts"),
     }
 )
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
 
 
 def _ballistic_courtyard() -> Scenario:

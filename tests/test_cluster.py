@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 from blast_env import cluster
 from blast_env.cli import app
 from blast_env.cluster import on_cluster
-from blast_env.engines.contract import BlastLoads
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, draw_threats
+from blast_env.evaluation.engines.contract import BlastLoads
 from blast_env.runner import as_completed, run_all
 from tests.pieces_of_work import Touch, process, refuse_three, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD

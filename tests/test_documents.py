@@ -21,7 +21,7 @@ from blast_env.documents import (
     parse_toml,
     read_text,
 )
-from tests.scenario.documents import all_documents
+from tests.site.documents import all_documents
 
 DEEP = MAX_DEPTH + 1
 

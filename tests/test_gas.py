@@ -8,15 +8,15 @@ import openpyxl
 import pytest
 
 import blast_env
-from blast_env.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
-from blast_env.engines.gas_tables import FACE_COLUMNS
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import Threat
-from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.engine import scaled_distance
-from blast_env.physics.scene import Charge
-from blast_env.recording.parquet import read_parquet
+from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
+from blast_env.evaluation.engines.gas_tables import FACE_COLUMNS
+from blast_env.gas.engine import scaled_distance
+from blast_env.particles.parquet import read_parquet
+from blast_env.particles.run import EndReason
+from blast_env.site.scene import Charge
 from tests.gas_sites import WALL, hut
 
 HUT = hut()

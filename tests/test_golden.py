@@ -19,9 +19,9 @@ from typing import Final, NamedTuple
 
 import pytest
 
-from blast_env.engines import simulate
-from blast_env.physics.parameters import parameters_digest
-from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+from blast_env.evaluation.engines import simulate
+from blast_env.site import Scenario, bundled_scenarios, load_scenario
+from blast_env.site.parameters import parameters_digest
 from tests.digests import CONDITIONS, Condition, need_the_same_bits
 
 LAYOUT: Final = ((4, 0), (5, 0), (6, 1))
@@ -198,7 +198,7 @@ DATA: Final = {
 
 
 def test_the_stored_calibrations_are_what_they_were() -> None:
-    folder = files("blast_env.calibration")
+    folder = files("blast_env.particles.calibration")
     stored = [*(folder / "stored").iterdir(), *(folder / "data").iterdir()]
     found = {
         entry.name: sha256(entry.read_bytes()).hexdigest()[:32]

@@ -31,7 +31,7 @@ from blast_env.cli import app
 for arguments in json.loads(sys.argv[1]):
     result = CliRunner().invoke(app, arguments)
     print(json.dumps([result.exit_code, " ".join(result.stderr.split())]))
-import blast_env.physics.event.engine, blast_env.physics.gas.engine, agents
+import blast_env.particles.event.engine, blast_env.gas.engine, agents
 print(agents.Agent)
 """
 """Runs commands without their extras, and sees what the engines leave of another's package."""

@@ -5,21 +5,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blast_agents.surrogate import packaged_surrogate, site_of
 
 from blast_env.app.solids import boxes
-from blast_env.engines import simulate
-from blast_env.engines.gas import GasEngine, GasResult
+from blast_env.design.surrogate import packaged_surrogate, site_of
 from blast_env.errors import BlastEnvError
-from blast_env.export import LayoutPlan, export_layout
-from blast_env.importing import ImportOptions, import_site
-from blast_env.physics.scene import Charge
-from blast_env.plan import structure_features
-from blast_env.rendering.oblique import ObliqueView, boxes_of, painted_order
-from blast_env.scenario import Placement, Scenario, load_scenario, save_scenario
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.gas import GasEngine, GasResult
+from blast_env.io.export import LayoutPlan, export_layout
+from blast_env.io.importing import ImportOptions, import_site
+from blast_env.layout import Placement
+from blast_env.plots.oblique import ObliqueView, boxes_of, painted_order
+from blast_env.plots.plan import structure_features
+from blast_env.site import Scenario, load_scenario, save_scenario
+from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
 from tests.gas_sites import site_document
-from tests.importing.maps import charge, outline, rectangle, written
+from tests.io.importing.maps import charge, outline, rectangle, written
 from tests.vehicle_sites import gate_site, vehicle_of
 
 ENGINE = GasEngine(border_m=0.0)

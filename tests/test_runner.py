@@ -3,9 +3,9 @@
 import joblib
 import pytest
 
-from blast_env.engines import Blast, simulate_many
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import EndReason
+from blast_env.evaluation.engines import Blast, simulate_many
+from blast_env.particles.run import EndReason
 from blast_env.runner import run_all
 from tests.pieces_of_work import kill, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD

@@ -12,8 +12,8 @@ import pytest
 import blast_env
 from blast_env import Blast, Charge, Scenario, load_scenario, simulate
 from blast_env.errors import LayoutError, UnknownNameError
-from blast_env.physics.particles import CollisionType
-from blast_env.scenario import ScenarioError
+from blast_env.site import ScenarioError
+from blast_env.site.balls import CollisionType
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 LAYOUT = ((4, 0), (5, 0), (6, 1))

@@ -6,31 +6,32 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from blast_agents.surrogate import packaged_surrogate, site_of
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from blast_env.app.solids import boxes
-from blast_env.engines import simulate
-from blast_env.engines.gas import GasEngine, GasResult
+from blast_env.design.surrogate import packaged_surrogate, site_of
 from blast_env.envs.observations import GridObservation
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.export import LayoutPlan, export_layout
-from blast_env.export.dxf import drawing
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.gas import GasEngine, GasResult
 from blast_env.geometry import Layout, Piece, Rectangle
-from blast_env.importing import ImportOptions, import_site
-from blast_env.physics.scene import Charge
-from blast_env.plan import Kinds, on_levels, site_features
-from blast_env.rendering.oblique import boxes_of, draw_oblique
-from blast_env.scenario import Placement, Scenario, ScenarioError, load_scenario, save_scenario
-from blast_env.scenario.build_scene import build_site, vehicle_drive
-from blast_env.scenario.heights import highest_top_m
+from blast_env.io.export import LayoutPlan, export_layout
+from blast_env.io.export.dxf import drawing
+from blast_env.io.importing import ImportOptions, import_site
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import build_site, vehicle_drive
+from blast_env.plots.oblique import boxes_of, draw_oblique
+from blast_env.plots.plan import Kinds, on_levels, site_features
+from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.site.heights import highest_top_m
+from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
 from tests.catalogue_sites import item
 from tests.gas_sites import column, net_on_modules
-from tests.importing.maps import charge, outline, rectangle, written
-from tests.scenario.test_driving import LORRY
+from tests.io.importing.maps import charge, outline, rectangle, written
+from tests.site.test_driving import LORRY
 from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
 
 ENGINE = GasEngine(border_m=0.0)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from blast_env.scenario import Scenario, VehicleSource
+from blast_env.site import Scenario, VehicleSource
 
 POSTS = tuple((row, 0) for row in (0, 3, 6, 9, 12, 15))
 """Posts across the whole site, a metre apart: too narrow for the vehicle of 2 m."""

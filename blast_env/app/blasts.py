@@ -37,32 +37,32 @@ from blast_env.app.records import (
 from blast_env.app.threats import NamedThreat
 from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask
-from blast_env.calibration.model import CalibrationError
-from blast_env.engines import Blast
-from blast_env.engines.contract import StructureLoad, on_buildings
-from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.consequences import unchecked
+from blast_env.evaluation.engines import Blast
+from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
-from blast_env.provenance import versions
-from blast_env.rendering.canvas import Frame
-from blast_env.rendering.figures import save_figure
-from blast_env.rendering.film import paint_at, plan_film, scale_end
-from blast_env.rendering.frames import FramePainter
-from blast_env.rendering.gas import Quantity, facades, full_load
-from blast_env.rendering.ground_map import ground_map, ground_recorders, map_levels
-from blast_env.rendering.pressure_film import record_planes, scale_end_kpa
-from blast_env.rendering.pressure_frames import (
+from blast_env.layout.build_scene import charge_against
+from blast_env.layout.placement import met_by_blasts
+from blast_env.particles.calibration.model import CalibrationError
+from blast_env.plots.canvas import Frame
+from blast_env.plots.figures import save_figure
+from blast_env.plots.film import paint_at, plan_film, scale_end
+from blast_env.plots.frames import FramePainter
+from blast_env.plots.gas import Quantity, facades, full_load
+from blast_env.plots.ground_map import ground_map, ground_recorders, map_levels
+from blast_env.plots.pressure_film import record_planes, scale_end_kpa
+from blast_env.plots.pressure_frames import (
     PressurePainter,
     PressureShot,
     default_section,
 )
-from blast_env.rendering.style import render_extra
+from blast_env.plots.style import render_extra
+from blast_env.provenance import versions
 from blast_env.runner import Tell, share_of
-from blast_env.scenario import AnyCharge, Scenario, load_scenario
-from blast_env.scenario.build_scene import charge_against
-from blast_env.scenario.placement import met_by_blasts
+from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.statistics import mean_estimate
 from blast_env.units import MS_PER_S, PA_PER_KPA
 

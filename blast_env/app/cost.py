@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Final
 
-from blast_env.engines.gas import GasEngine
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.gas.cost import CostGuess as CostGuess
 from blast_env.geometry import Layout
-from blast_env.physics.gas.cost import CostGuess as CostGuess
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 if TYPE_CHECKING:
-    from blast_env.reporting import StudyOptions
+    from blast_env.report import StudyOptions
 
 _DRAWING_S: Final = 2.5
 
@@ -36,7 +36,7 @@ class ReportCost:
             BlastEnvError: If there are too many threats, or a front cannot be read.
         """
         # Imported here, because reports need an extra.
-        from blast_env.reporting.study import blasts_of, threats_of
+        from blast_env.report.study import blasts_of, threats_of
 
         threats = threats_of(scenario, options)
         parts = blasts_of(scenario, layout, options, threats)

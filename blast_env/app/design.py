@@ -7,7 +7,8 @@ from typing import Any, Final
 from blast_env.app import placing
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.scenario import Placement, Scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario
 
 SLOTS: Final = ("A", "B", "C", "D")
 """Names of the layouts of a design."""

@@ -12,16 +12,16 @@ from typing import Any, Final, NamedTuple
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
 from blast_env.response.facade import STOREY_M
-from blast_env.scenario import (
+from blast_env.site import (
     SCHEMA_VERSION,
     AnySource,
     RectangleSource,
     Scenario,
     VehicleSource,
 )
-from blast_env.scenario.sections import PointM
-from blast_env.scenario.terraces import ground_below_m
-from blast_env.scenario.zone import source_bounds_m
+from blast_env.site.sections import PointM
+from blast_env.site.terraces import ground_below_m
+from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
 Document = dict[str, Any]

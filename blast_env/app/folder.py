@@ -32,7 +32,7 @@ from blast_env.app.records import (
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 _DESIGN: Final = "design.json"
 _OPEN: Final = "open.json"

@@ -3,13 +3,12 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-from blast_agents.search import Need, ProposerKind, RuleProposer, find_proposer, proposers
-from blast_agents.search.registry import proposer_row
-
+from blast_env.design.search import Need, ProposerKind, RuleProposer, find_proposer, proposers
+from blast_env.design.search.registry import proposer_row
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Layout
-from blast_env.scenario import AnyCharge, Scenario
-from blast_env.scenario.vehicles import source_of
+from blast_env.site import AnyCharge, Scenario
+from blast_env.site.vehicles import source_of
 
 PACKAGED: Final = "package"
 """The proposer of `blast-env propose`: weights or a surrogate, or the best rule without either."""

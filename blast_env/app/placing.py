@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle
-from blast_env.physics.scene import WALLS
+from blast_env.layout import Placement
 from blast_env.response.components import catalogue
-from blast_env.scenario import Placement, Scenario
-from blast_env.scenario.catalogue import AnyMeasure, Removable
-from blast_env.scenario.facade import Components
+from blast_env.site import Scenario
+from blast_env.site.catalogue import AnyMeasure, Removable
+from blast_env.site.facade import Components
+from blast_env.site.scene import WALLS
 from blast_env.units import MODULE_SIDE_M
 
 PlainLayout = tuple[tuple[Any, ...], ...]

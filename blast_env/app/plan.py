@@ -13,9 +13,9 @@ from blast_env.app import edits
 from blast_env.app.editor import Ghost
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.geometry import Cell, Layout, Rectangle
-from blast_env.labels import labels_of, settled_labels
-from blast_env.physics.structure import Colour
-from blast_env.plan import (
+from blast_env.layout import Placement
+from blast_env.plots.labels import labels_of, settled_labels
+from blast_env.plots.plan import (
     FAINT,
     FREE_CELL,
     INK,
@@ -33,8 +33,9 @@ from blast_env.plan import (
     vehicle_features,
     without,
 )
-from blast_env.scenario import Placement, Scenario
-from blast_env.scenario.sections import PointM
+from blast_env.site import Scenario
+from blast_env.site.sections import PointM
+from blast_env.site.structure import Colour
 from blast_env.units import MODULE_SIDE_M
 
 _FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, safe for colour-blind readers

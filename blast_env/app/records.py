@@ -13,22 +13,22 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import read_text
-from blast_env.engines import Engine, find_engine
-from blast_env.engines.contract import (
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import Engine, find_engine
+from blast_env.evaluation.engines.contract import (
     CALIBRATED_ENGINES,
     BlastLoads,
     StructureLoad,
     counted_parts,
 )
-from blast_env.engines.gas import GasEngine
-from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.grid_error import convergence_index, points
 from blast_env.files import write_atomically
+from blast_env.gas.settings import UNIFORM
 from blast_env.geometry import Layout
-from blast_env.physics.gas.settings import UNIFORM
-from blast_env.physics.scene import Charge
-from blast_env.scenario import ObjectiveSection, Scenario
-from blast_env.scenario.placement import met_by_blasts
+from blast_env.layout.placement import met_by_blasts
+from blast_env.site import ObjectiveSection, Scenario
+from blast_env.site.scene import Charge
 from blast_env.statistics import reductions
 from blast_env.units import PA_PER_KPA
 

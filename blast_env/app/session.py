@@ -38,8 +38,8 @@ from blast_env.app.work import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Measure
-from blast_env.scenario import AnyCharge, Scenario
-from blast_env.scenario.build_scene import charge_against
+from blast_env.layout.build_scene import charge_against
+from blast_env.site import AnyCharge, Scenario
 
 BARE = "no barrier"
 """Name of the blast without a layout."""

@@ -4,9 +4,17 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from blast_env.geometry import Layout, Rectangle
-from blast_env.physics.structure import Colour
-from blast_env.plan import EXPLOSIVE, STANDING, Feature, Kinds, in_boxes, on_levels, site_features
-from blast_env.scenario import Scenario
+from blast_env.plots.plan import (
+    EXPLOSIVE,
+    STANDING,
+    Feature,
+    Kinds,
+    in_boxes,
+    on_levels,
+    site_features,
+)
+from blast_env.site import Scenario
+from blast_env.site.structure import Colour
 
 _GROUND: Final[Colour] = (223, 228, 234)
 _ZONE: Final[Colour] = (185, 217, 195)

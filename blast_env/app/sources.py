@@ -11,10 +11,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import LayoutFile, Scenario, load_scenario
+from blast_env.layout import LayoutFile
+from blast_env.site import Scenario, load_scenario
 
 if TYPE_CHECKING:
-    from blast_env.importing import ImportedSite, ImportOptions
+    from blast_env.io.importing import ImportedSite, ImportOptions
 
 Made = TypeVar("Made")
 
@@ -49,7 +50,7 @@ def imported_site(path: Path, options: "ImportOptions") -> "ImportedSite":
     Raises:
         BlastEnvError: If it cannot be imported, or a required package is not installed.
     """
-    from blast_env.importing import import_site  # here, because it needs the extra `maps`
+    from blast_env.io.importing import import_site  # here, because it needs the extra `maps`
 
     read = _by_ending(path, dict.fromkeys(MAPS, import_site), "a map")
     own = read(path, replace(options, zone_around_m=None))

@@ -9,9 +9,6 @@ from pathlib import Path
 from time import monotonic, time
 from typing import Final
 
-from blast_agents.proposal import chosen_for
-from blast_agents.search import LayoutProblem, Progress, find_proposer
-
 from blast_env.app import placing
 from blast_env.app.blasts import run_blasts, warm_engines
 from blast_env.app.cost import ReportCost
@@ -27,10 +24,12 @@ from blast_env.app.work import (
     read_task,
     write_status,
 )
-from blast_env.engines import JUDGE
+from blast_env.design.proposal import chosen_for
+from blast_env.design.search import LayoutProblem, Progress, find_proposer
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
+from blast_env.evaluation.engines import JUDGE
 from blast_env.geometry import Layout
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 _LEAST_PAUSE_S: Final = 0.1
 _WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
@@ -177,16 +176,16 @@ def _film(task: FilmTask, teller: Teller) -> None:
     bare, own = (engine.blast(scenario, each, 0, charge) for each in ((), layout))
     write: Callable[..., object]
     if task.engine.is_first_look:
-        from blast_env.rendering.film import write_film as write
+        from blast_env.plots.film import write_film as write
     else:
-        from blast_env.rendering.pressure_film import write_pressure_film as write
+        from blast_env.plots.pressure_film import write_pressure_film as write
     write(own, path, beside=bare if layout else None, progress=teller.share)
     teller.tell(state="done", share=1.0, text=f"wrote {path.name}", file=str(path))
 
 
 def _report(task: ReportTask, teller: Teller) -> None:
     # Reports need an extra, and most work is no report.
-    from blast_env.reporting import run_study, write_report
+    from blast_env.report import run_study, write_report
 
     scenario, page = task.site, Path(task.path)
     layout = placing.layout_from(scenario, task.layout)

@@ -5,8 +5,7 @@ from typing import Final
 
 from blast_env.app.records import Kept
 from blast_env.evaluation.governing import Severity, governing
-from blast_env.physics.scene import Charge
-from blast_env.scenario import (
+from blast_env.site import (
     AnyCharge,
     RectangleSource,
     Scenario,
@@ -14,7 +13,8 @@ from blast_env.scenario import (
     VehicleCharge,
     VehicleSource,
 )
-from blast_env.scenario.sections import PointM
+from blast_env.site.scene import Charge
+from blast_env.site.sections import PointM
 
 _NEAREST: Final = ", as near as it comes"
 

@@ -19,10 +19,10 @@ from blast_env.evaluation.consequences import BuildingResponse, by_building
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import FilledBay, peak_factor, respond
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 
 _BAYS: Final = "bays.npz"
 _DASH: Final = "\N{EN DASH}"
@@ -103,8 +103,8 @@ class FacadeVerdict:
             BlastEnvError: If it cannot be written.
         """
         # Here, because pictures take half a second to import, and tables need none.
-        from blast_env.rendering.facade import facade_picture
-        from blast_env.rendering.figures import save_figure
+        from blast_env.plots.facade import facade_picture
+        from blast_env.plots.figures import save_figure
 
         building = self.buildings()[number]
         (x_m, y_m), tnt_kg = self.charge.position_m, self.charge.tnt_kg

@@ -11,10 +11,10 @@ from blast_env.app.threats import NamedThreat
 from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import AnyCharge, Scenario
+from blast_env.site import AnyCharge, Scenario
 
 if TYPE_CHECKING:
-    from blast_env.reporting import StudyOptions
+    from blast_env.report import StudyOptions
 
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
@@ -124,7 +124,7 @@ class ReportChoice(Kept):
         Raises:
             BlastEnvError: If there are too many charges, or an option is out of bounds.
         """
-        from blast_env.reporting import StudyOptions  # needs an extra
+        from blast_env.report import StudyOptions  # needs an extra
 
         return StudyOptions(
             charges=tuple(charges),

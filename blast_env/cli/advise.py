@@ -5,16 +5,6 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import Final
 
-from blast_agents.search import LayoutProblem
-from blast_agents.search.advice import (
-    Advice,
-    AdviceVerdict,
-    MeasureKind,
-    advise_until,
-    best_of,
-    kinds_for,
-)
-
 from blast_env.cli.command import argument, option
 from blast_env.cli.evaluation_report import impulse_text
 from blast_env.cli.options import (
@@ -28,18 +18,28 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import ResultTable, print_cost, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
-from blast_env.engines.contract import JUDGE, Engine, find_engine
+from blast_env.design.search import LayoutProblem
+from blast_env.design.search.advice import (
+    Advice,
+    AdviceVerdict,
+    MeasureKind,
+    advise_until,
+    best_of,
+    kinds_for,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, consequences, verdict_word
+from blast_env.evaluation.engines.contract import JUDGE, Engine, find_engine
 from blast_env.evaluation.grid_error import GridError, final_engine, grid_error
 from blast_env.geometry import Layout, layout_words
+from blast_env.layout import Placement, write_layout
+from blast_env.layout.placement import met_by_blasts
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import Placement, Scenario, load_scenario, write_layout
-from blast_env.scenario.models import SCHEMA_VERSION
-from blast_env.scenario.placement import met_by_blasts
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.models import SCHEMA_VERSION
 
 _HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks")
 
@@ -138,8 +138,8 @@ class AdviseCommand(ChargeOptions):
         judge: Engine,
     ) -> None:
         # Here, because pictures need the extra `render`.
-        from blast_env.rendering.cost_level import PricedDamage, cost_level_figure
-        from blast_env.rendering.figures import save_figure
+        from blast_env.plots.cost_level import PricedDamage, cost_level_figure
+        from blast_env.plots.figures import save_figure
 
         tried = {
             str(each.kind): [PricedDamage(x.cost, x.damage) for x in each.tried] for each in found

@@ -11,7 +11,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from blast_agents.search import timed_proposal
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
@@ -37,7 +36,7 @@ from blast_env.cli.output import (
     progress_bar,
     result_console,
 )
-from blast_env.engines import JUDGE, Engine
+from blast_env.design.search import timed_proposal
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -49,14 +48,15 @@ from blast_env.evaluation import (
     compare,
 )
 from blast_env.evaluation.comparison import case_table, comparison_record
+from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.grid_error import final_engine
-from blast_env.export import LayoutPlan, export_layouts
 from blast_env.files import write_atomically
+from blast_env.io.export import LayoutPlan, export_layouts
+from blast_env.layout.build_scene import charge_against
+from blast_env.plots.evaluation_figures import comparison_figure
+from blast_env.plots.figures import save_figure
 from blast_env.provenance import command, versions
-from blast_env.rendering.evaluation_figures import comparison_figure
-from blast_env.rendering.figures import save_figure
-from blast_env.scenario import Scenario, save_scenario
-from blast_env.scenario.build_scene import charge_against
+from blast_env.site import Scenario, save_scenario
 from blast_env.sites import FAMILIES
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S

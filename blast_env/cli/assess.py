@@ -26,9 +26,6 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.engines import JUDGE, Engine
-from blast_env.engines.bays import LOADED_BAY_COLUMNS
-from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation import Case, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import (
@@ -42,13 +39,17 @@ from blast_env.evaluation.consequences import (
     piece_table,
     verdict_word,
 )
+from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS
+from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import GridError, convergence_index, final_engine
 from blast_env.geometry import Layout, layout_counts
-from blast_env.physics.scene import Charge
+from blast_env.layout import load_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
-from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
+from blast_env.site import AnyCharge, Scenario, load_scenario
+from blast_env.site.scene import Charge
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_KPA
 
@@ -228,9 +229,9 @@ class AssessCommand(ChargeOptions):
         if self.picture is None and self.view is None and self.diagram is None:
             return
         # Here, because pictures need the extra `render`.
-        from blast_env.rendering.facade import damage_view, facade_picture
-        from blast_env.rendering.figures import save_figure
-        from blast_env.rendering.pressure_impulse import pressure_impulse_diagram
+        from blast_env.plots.facade import damage_view, facade_picture
+        from blast_env.plots.figures import save_figure
+        from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 
         rows = _worst_rows(found)
         charge = rows[0][1].charge
@@ -258,7 +259,7 @@ class AssessCommand(ChargeOptions):
         bays = bay_table(found)
         if path.suffix.lower() == ".csv":
             return write_csv(bays, path)
-        from blast_env.recording.excel import SheetTable, write_tables
+        from blast_env.particles.workbook import SheetTable, write_tables
 
         tables = [SheetTable("Bays", bays, (*CASE_COLUMNS, *LOADED_BAY_COLUMNS))]
         pieces = piece_table(found)

@@ -4,7 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from blast_env.benchmark import (
+from blast_env.cli.command import Command, option
+from blast_env.cli.output import ResultTable, print_line, print_table, progress_bar, result_console
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
+from blast_env.evaluation.speed import (
     BlastCost,
     blast_cost,
     crowd,
@@ -13,12 +17,8 @@ from blast_env.benchmark import (
     site_cost,
     street,
 )
-from blast_env.cli.command import Command, option
-from blast_env.cli.output import ResultTable, print_line, print_table, progress_bar, result_console
-from blast_env.engines import ENGINE_NAMES, find_engine
-from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.settings import CELLS, UNIFORM
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.gas.settings import CELLS, UNIFORM
+from blast_env.site import Scenario, load_scenario
 from blast_env.units import MS_PER_S
 
 _BLAST_HEADERS: Final = (
@@ -128,7 +128,9 @@ class BenchCommand(Command):
                 yield street(length_m)
 
     def _print_sites(self) -> None:
-        from blast_env.engines.gas import GasEngine  # Numba takes half a second to import
+        from blast_env.evaluation.engines.gas import (
+            GasEngine,  # Numba takes half a second to import
+        )
 
         pairs = [
             (scenario, GasEngine(cells=cells))

@@ -4,13 +4,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from blast_env.calibration.laws import LawName, shape_rms_percent
-from blast_env.calibration.model import (
-    Calibration,
-    SimulatedQuantity,
-    save_calibration,
-)
-from blast_env.calibration.references import paper_table
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import ClusterOptions, ProcessOptions, running_on
 from blast_env.cli.output import (
@@ -21,15 +14,22 @@ from blast_env.cli.output import (
     result_console,
     save_pictures,
 )
-from blast_env.engines import CALIBRATED_ENGINES, find_engine
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import CALIBRATED_ENGINES, find_engine
 from blast_env.files import make_folder
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.particles.calibration.laws import LawName, shape_rms_percent
+from blast_env.particles.calibration.model import (
+    Calibration,
+    SimulatedQuantity,
+    save_calibration,
+)
+from blast_env.particles.calibration.references import paper_table
+from blast_env.site import Scenario, load_scenario
 from blast_env.tables import write_csv
 from blast_env.values import plain_number
 
 if TYPE_CHECKING:  # takes a third of a second to import
-    from blast_env.fitting.free_field import CalibrationReport, FreeFieldStudy, Reference
+    from blast_env.evaluation.free_field import CalibrationReport, FreeFieldStudy, Reference
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
 Burst = Literal["hemispherical", "spherical"]
@@ -88,8 +88,8 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
     def __call__(self) -> None:
         """Run the study, write its files and print its tables."""
         # Here, because pandas and SciPy take a third of a second to import.
-        from blast_env.fitting.free_field import FreeFieldStudy
-        from blast_env.fitting.free_field import calibrate as fit_laws
+        from blast_env.evaluation.free_field import FreeFieldStudy
+        from blast_env.evaluation.free_field import calibrate as fit_laws
 
         distances_m = _parse_numbers("--distances", self.distances)
         tnt_range_kg = _parse_range(self.tnt_range)
@@ -141,7 +141,7 @@ def _parse_range(text: str | None) -> tuple[float, float] | None:
 
 
 def _reference(name: ReferenceName, study: "FreeFieldStudy", burst: Burst) -> "Reference":
-    from blast_env.fitting.free_field import kingery_bulmash_reference, paper_reference
+    from blast_env.evaluation.free_field import kingery_bulmash_reference, paper_reference
 
     if name == "paper_ufc":
         return paper_reference(study.distances_m)
@@ -158,8 +158,8 @@ def _write(report: "CalibrationReport", stored: Calibration, stem: str) -> list[
 
 def _save_figure(report: "CalibrationReport", stored: Calibration, path: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
-    from blast_env.fitting.figures import calibration_figure
-    from blast_env.rendering.figures import save_figure
+    from blast_env.plots.calibration_figures import calibration_figure
+    from blast_env.plots.figures import save_figure
 
     return [save_figure(calibration_figure(report, stored.name), path)]
 

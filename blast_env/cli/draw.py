@@ -7,7 +7,8 @@ from blast_env.cli.command import Command, argument, option
 from blast_env.cli.options import SCENARIO_HELP
 from blast_env.cli.output import print_line
 from blast_env.cli.targets import PICTURES
-from blast_env.scenario import Placement, load_layout, load_scenario
+from blast_env.layout import Placement, load_layout
+from blast_env.site import load_scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +39,8 @@ class DrawCommand(Command):
         scenario = load_scenario(self.scenario)
         elements = () if self.layout is None else load_layout(self.layout, scenario)
         # Here, because pictures need the extra `render`.
-        from blast_env.rendering.figures import save_figure
-        from blast_env.rendering.site_picture import site_picture
+        from blast_env.plots.figures import save_figure
+        from blast_env.plots.site_picture import site_picture
 
         for sentence in Placement.of(scenario, elements).explain_vehicles():
             print_line(sentence)

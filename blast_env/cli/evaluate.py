@@ -10,8 +10,9 @@ from blast_env.cli.options import running_on
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.grid_error import final_engine
-from blast_env.export import LayoutPlan
-from blast_env.scenario import LayoutFile, load_layout, load_scenario
+from blast_env.io.export import LayoutPlan
+from blast_env.layout import LayoutFile, load_layout
+from blast_env.site import load_scenario
 from blast_env.statistics import check_cvar_level
 
 _SCENARIO: Final = "courtyard"

@@ -34,8 +34,6 @@ from blast_env.cli.output import (
     save_pictures,
 )
 from blast_env.cli.targets import Target
-from blast_env.engines import JUDGE, Engine
-from blast_env.engines.contract import BlastLoads
 from blast_env.evaluation import (
     BlastEvaluator,
     Case,
@@ -48,11 +46,13 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
 from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.engines.contract import BlastLoads
 from blast_env.evaluation.grid_error import GridError, points, with_errors
-from blast_env.export import LayoutPlan, check_target, export_layouts, is_file
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
-from blast_env.scenario import AnyCharge, ObjectiveSection, Scenario
+from blast_env.io.export import LayoutPlan, check_target, export_layouts, is_file
+from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.statistics import CVAR_LEVEL, Estimate, reductions
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
@@ -293,8 +293,8 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 
 def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
-    from blast_env.rendering.evaluation_figures import evaluation_figure
-    from blast_env.rendering.figures import save_figure
+    from blast_env.plots.evaluation_figures import evaluation_figure
+    from blast_env.plots.figures import save_figure
 
     return [
         save_figure(evaluation_figure(evaluation), out / "evaluation.png"),

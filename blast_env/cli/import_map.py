@@ -17,11 +17,11 @@ from blast_env.cli.output import (
 )
 from blast_env.cli.targets import PICTURES
 from blast_env.files import write_atomically
-from blast_env.importing.options import ImportOptions, plain
-from blast_env.scenario import save_scenario
+from blast_env.io.importing.options import ImportOptions, plain
+from blast_env.site import save_scenario
 
 if TYPE_CHECKING:
-    from blast_env.importing import FittedBuilding, ImportedSite
+    from blast_env.io.importing import FittedBuilding, ImportedSite
 
 _HEADERS = (
     *("building", "protected", "parts", "height (m)", "area (m2)", "modules (m2)"),
@@ -52,7 +52,7 @@ class ImportCommand(ImportOptions, Command):
     def __call__(self) -> None:
         """Convert the file, write the scenario and print its deviations from the file."""
         # Here, because maps need the extra `maps`.
-        from blast_env.importing import import_site
+        from blast_env.io.importing import import_site
 
         imported = import_site(self.file, self)
         save_scenario(imported.scenario, self.out)
@@ -69,8 +69,8 @@ class ImportCommand(ImportOptions, Command):
 def _pictures(imported: "ImportedSite", path: Path | None) -> list[Path]:
     if path is None:
         return []
-    from blast_env.rendering.figures import save_figure
-    from blast_env.rendering.imported_site import imported_plan
+    from blast_env.io.imported_site import imported_plan
+    from blast_env.plots.figures import save_figure
 
     return [save_figure(imported_plan(imported), path)]
 

@@ -6,14 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from blast_env.cli.command import FOLDER, argument, option
-from blast_env.cli.options import CacheOptions, ProcessOptions
-from blast_env.cli.output import print_line, print_table, progress_bar
-from blast_env.engines import JUDGE, find_engine
-from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation import BlastEvaluator
-from blast_env.files import make_folder, write_atomically
-from blast_env.problems import (
+from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
     JUDGE_CELL_M,
@@ -34,9 +27,16 @@ from blast_env.problems import (
     standings_tables,
     stored_references,
 )
-from blast_env.problems.judging import FORMAT as JUDGED
-from blast_env.problems.references import cell_key
-from blast_env.problems.submissions import read_runs
+from blast_env.benchmark.judging import FORMAT as JUDGED
+from blast_env.benchmark.references import cell_key
+from blast_env.benchmark.submissions import read_runs
+from blast_env.cli.command import FOLDER, argument, option
+from blast_env.cli.options import CacheOptions, ProcessOptions
+from blast_env.cli.output import print_line, print_table, progress_bar
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.engines import JUDGE, find_engine
+from blast_env.files import make_folder, write_atomically
 
 _OWN_SITES: Final = 8
 
@@ -110,7 +110,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
     def _played(self, method: str, definitions: Mapping[str, Definition]) -> Submission:
         """Run the method; its submission is written before it is judged."""
         with import_extra("agents", "--method"):
-            from blast_agents.benchmark import find_method
+            from blast_env.benchmark.methods import find_method
         found = find_method(method)
         made = [
             partial(_made, definition=each, cell_m=self.search_cell_m, cache=self.cache)
@@ -139,7 +139,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         """Return the stored references; for secret sites, those of rules and package search."""
         if self.secret is None:
             return stored_references()
-        from blast_agents.benchmark import find_method, reference_of
+        from blast_env.benchmark.methods import find_method, reference_of
 
         found = {}
         engine = find_engine(JUDGE, self.cell_m)

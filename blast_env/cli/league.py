@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blast_agents.search import proposers
-
 from blast_env.cli.command import FOLDER, option
 from blast_env.cli.options import (
     BY_SITE,
@@ -25,15 +23,17 @@ from blast_env.cli.output import (
     print_written,
     progress_bar,
 )
-from blast_env.engines import Engine, default_engine, find_engine
+from blast_env.design.search import proposers
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation.engines import Engine, default_engine, find_engine
 from blast_env.provenance import command
 from blast_env.sites import FAMILIES
 
 if TYPE_CHECKING:
     from blast_agents.league import Contest, ResultStore, Standings, Track
     from blast_agents.league.trained import TrainedRun
-    from blast_agents.surrogate import Surrogate
+
+    from blast_env.design.surrogate import Surrogate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +102,8 @@ class LeagueCommand(ProcessOptions, ClusterOptions):
         # Here, because its figures need the extra `render`, and because it imports pandas.
         from blast_agents.league import ResultStore, find_tracks
         from blast_agents.league.report import write_league
-        from blast_agents.surrogate import load_surrogate
+
+        from blast_env.design.surrogate import load_surrogate
 
         with running_on(self.cluster):
             engine = find_engine(self.engine or self._by_site(), self.cell_m, cells=self.cells)

@@ -12,11 +12,11 @@ import typer
 from blast_env.cli.command import FOLDER, Command, option
 from blast_env.cli.output import message_console, printable
 from blast_env.cluster import on_cluster
-from blast_env.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import AnyCharge, Scenario, VehicleCharge
+from blast_env.site import AnyCharge, Scenario, VehicleCharge
 
 CLUSTER_HELP: Final = (
     "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of "

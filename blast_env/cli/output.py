@@ -22,15 +22,15 @@ from rich.text import Text
 
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.geometry import Element
-from blast_env.scenario import AnyCharge, Scenario
+from blast_env.site import AnyCharge, Scenario
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from blast_env.values import STEERING
 
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
 
-    from blast_env.engines import Engine
-    from blast_env.physics.gas.cost import CostGuess
+    from blast_env.evaluation.engines import Engine
+    from blast_env.gas.cost import CostGuess
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
@@ -158,8 +158,8 @@ def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Pat
         BlastEnvError: If the file cannot be written.
     """
     # Here, because pictures need the extra `render`.
-    from blast_env.rendering.figures import save_figure
-    from blast_env.rendering.site_picture import site_picture
+    from blast_env.plots.figures import save_figure
+    from blast_env.plots.site_picture import site_picture
 
     return save_figure(site_picture(scenario, layout), path)
 

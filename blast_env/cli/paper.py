@@ -28,7 +28,7 @@ class PaperCommand(Command):
     def __call__(self) -> None:
         """Print the tables with their deviations; write them and the figure."""
         # Here, because pandas takes a third of a second to import.
-        from blast_env.fitting.paper import (
+        from blast_env.particles.paper import (
             CONTRADICTIONS,
             PAPER_LAWS,
             TABLE_4_DECIMALS,
@@ -61,8 +61,8 @@ class PaperCommand(Command):
 
 def _save_figure(path: Path) -> Path:
     # Here, because pictures need the extra `render`.
-    from blast_env.fitting.figures import figure_5
-    from blast_env.rendering.figures import save_figure
+    from blast_env.plots.calibration_figures import figure_5
+    from blast_env.plots.figures import save_figure
 
     return save_figure(figure_5(), path)
 
@@ -80,7 +80,7 @@ def rich_table(
 
 def largest_deviation(table: "pd.DataFrame", decimals: tuple[int, int, int]) -> str:
     """Return the largest deviation of the computed cells from the printed ones, in words."""
-    from blast_env.fitting.paper import deviations
+    from blast_env.particles.paper import deviations
 
     largest = abs(deviations(table, decimals)).max()
     return (
@@ -91,7 +91,7 @@ def largest_deviation(table: "pd.DataFrame", decimals: tuple[int, int, int]) -> 
 
 def coefficient_table() -> Table:
     """Return the coefficients of the paper's text and of its columns, with their errors."""
-    from blast_env.fitting.paper import PAPER_LAWS, TABLE_4_DECIMALS, metrics_row
+    from blast_env.particles.paper import PAPER_LAWS, TABLE_4_DECIMALS, metrics_row
 
     headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
     table = ResultTable("Coefficients, and the row of Table 4 that they give", headers, 3)

@@ -9,9 +9,6 @@ from time import perf_counter
 from typing import Final
 
 import numpy as np
-from blast_agents.proposal import Chosen, chosen_for, problem_of
-from blast_agents.rules import expected_charge
-from blast_agents.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
 
 from blast_env.cli.command import argument, option
 from blast_env.cli.evaluation_report import load_text, share_text
@@ -32,15 +29,19 @@ from blast_env.cli.output import (
     save_layout_picture,
     save_pictures,
 )
-from blast_env.engines import JUDGE, find_engine
+from blast_env.design.proposal import Chosen, chosen_for, problem_of
+from blast_env.design.rules import expected_charge
+from blast_env.design.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Comparison
+from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.evaluation.grid_error import final_engine, grid_error
 from blast_env.geometry import Layout, layout_counts
-from blast_env.physics.scene import Charge
+from blast_env.layout import LayoutFile, Placement
 from blast_env.provenance import command, versions
-from blast_env.scenario import LayoutFile, Placement, Scenario, load_scenario
-from blast_env.scenario.zone import source_bounds_m
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.scene import Charge
+from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import Estimate
 from blast_env.units import MS_PER_S
 

@@ -16,14 +16,15 @@ from blast_env.cli.output import (
     progress_bar,
 )
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.physics.gas.settings import CELLS, UNIFORM, Cells
-from blast_env.physics.scene import Charge
+from blast_env.gas.settings import CELLS, UNIFORM, Cells
+from blast_env.layout import check_layout, load_layout
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import Scenario, check_layout, load_layout, load_scenario
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.scene import Charge
 from blast_env.values import plain_number
 
 if TYPE_CHECKING:
-    from blast_env.reporting import StudyOptions
+    from blast_env.report import StudyOptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +74,8 @@ class ReportCommand(ProcessOptions, CacheOptions):
         scenario = load_scenario(self.scenario)
         layout = load_layout(self.layout, scenario)
         # Here, because reports need extras, and Numba half a second.
-        from blast_env.reporting import run_study, write_report
-        from blast_env.reporting.page import check_targets
+        from blast_env.report import run_study, write_report
+        from blast_env.report.page import check_targets
 
         check_targets(self.out, self.pdf)
         options = self._study_options(scenario)
@@ -102,7 +103,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         return kept if self.cache is None else f"{kept}, and draws the threats again"
 
     def _study_options(self, scenario: Scenario) -> "StudyOptions":
-        from blast_env.reporting import Limit, StudyOptions, UnitSystem, final_cells
+        from blast_env.report import Limit, StudyOptions, UnitSystem, final_cells
 
         units = UnitSystem.named(self.units)
         given: dict[str, Any] = {

@@ -8,15 +8,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-from blast_agents.search import (
-    LayoutProblem,
-    Proposer,
-    SearchResult,
-    find_proposer,
-    proposers,
-)
-from blast_agents.search import Progress as SearchProgress
-from blast_agents.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.command import FOLDER, option
@@ -46,7 +37,15 @@ from blast_env.cli.output import (
     save_layout_picture,
     save_pictures,
 )
-from blast_env.engines import JUDGE, Engine, find_engine
+from blast_env.design.search import (
+    LayoutProblem,
+    Proposer,
+    SearchResult,
+    find_proposer,
+    proposers,
+)
+from blast_env.design.search import Progress as SearchProgress
+from blast_env.design.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError
@@ -60,15 +59,17 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
+from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
+from blast_env.layout import load_layout, write_layout
 from blast_env.provenance import command, versions
-from blast_env.scenario import Scenario, load_layout, load_scenario, write_layout
+from blast_env.site import Scenario, load_scenario
 from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
 
 if TYPE_CHECKING:
-    from blast_agents.surrogate import Surrogate
+    from blast_env.design.surrogate import Surrogate
 
 ThreatName = Literal["visible", "hidden"]
 
@@ -162,13 +163,13 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
         if guessing is None or initial:
             return find_proposer(self.method, initial), None
         # Here, because it takes half a second to import.
-        from blast_agents.surrogate import search_by
+        from blast_env.design.surrogate import search_by
 
         return search_by(guessing), guessing.digest
 
     def _surrogate(self) -> "Surrogate":
         # Here, because it takes half a second to import.
-        from blast_agents.surrogate import load_surrogate, packaged_surrogate
+        from blast_env.design.surrogate import load_surrogate, packaged_surrogate
 
         return packaged_surrogate() if self.surrogate is None else load_surrogate(self.surrogate)
 
@@ -319,9 +320,8 @@ def write_search(
 
 def _save_figure(run: SearchRun, out: Path) -> list[Path]:
     # Here, because pictures need the extra `render`.
-    from blast_agents.search.figure import search_figure
-
-    from blast_env.rendering.figures import save_figure
+    from blast_env.design.search.figure import search_figure
+    from blast_env.plots.figures import save_figure
 
     return [save_figure(search_figure(run.result, run.problem), out / "search.png")]
 

@@ -31,16 +31,17 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.engines import Blast, BlastResult, Engine, default_engine, find_engine
-from blast_env.engines.contract import load_plugin
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
+from blast_env.evaluation.engines import Blast, BlastResult, Engine, default_engine, find_engine
+from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout, layout_counts
-from blast_env.physics.scene import Charge
-from blast_env.physics.structure import ModularObstacle
+from blast_env.layout import load_layout
+from blast_env.layout.build_scene import draw_threat
 from blast_env.runner import Tell, share_of
-from blast_env.scenario import AnyCharge, Scenario, load_layout, load_scenario
-from blast_env.scenario.build_scene import draw_threat
-from blast_env.scenario.sections import buildings_of
+from blast_env.site import AnyCharge, Scenario, load_scenario
+from blast_env.site.scene import Charge
+from blast_env.site.sections import buildings_of
+from blast_env.site.structure import ModularObstacle
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from blast_env.values import plain_number
@@ -48,9 +49,9 @@ from blast_env.values import plain_number
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
     import pandas as pd
 
-    from blast_env.engines.gas import GasBlast, GasResult
-    from blast_env.physics.gas.engine import Recorders
-    from blast_env.rendering.pressure_frames import VerticalSection
+    from blast_env.evaluation.engines.gas import GasBlast, GasResult
+    from blast_env.gas.engine import Recorders
+    from blast_env.plots.pressure_frames import VerticalSection
 
 _GAS_PANEL: Final = "Gas dynamics only"
 _PARTICLES_PANEL: Final = "Particles only"
@@ -276,7 +277,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
     ) -> tuple[BlastResult | None, BlastResult]:
         """Write the film of the blast, and of the other beside it; return their results."""
         # Here, because films need the extra `render`.
-        from blast_env.rendering.film import write_film
+        from blast_env.plots.film import write_film
 
         results = write_film(self.blast, path, beside=bare, progress=progress)
         return (None if bare is None else results[0]), results[-1]
@@ -287,7 +288,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
         if not any((asked.heat_map, asked.history, asked.scheme, asked.velocities)):
             return []
         # Here, because pictures need the extra `render`.
-        from blast_env.rendering import figures
+        from blast_env.plots import figures
 
         results = [result] if bare is None else [result, bare]
         heat_map = partial(figures.heat_map, scale=figures.common_scale(results))
@@ -384,7 +385,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
                 raise BlastEnvError(f"{flag} is for --film: no film is to be written")
         if asked.heat_map is not None:
             with import_extra("render", "pictures and films"):
-                from blast_env.rendering.gas import kind_of
+                from blast_env.plots.gas import kind_of
             kind_of(asked.quantity or "impulse")
         _section(asked.film_section)
         self._check_gauge([each.name for each in self.blast.site.gauges])
@@ -413,7 +414,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         asked = self.command
         if not any((asked.impulse_map, asked.peak_map, asked.risk_map)):
             return lambda _: ()
-        from blast_env.rendering.ground_map import ground_recorders
+        from blast_env.plots.ground_map import ground_recorders
 
         return ground_recorders
 
@@ -422,7 +423,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
     ) -> "tuple[GasResult | None, GasResult]":
         """Write the film of the blast, and of the other beside it; return their results."""
         # Here, because films need the extra `render`.
-        from blast_env.rendering.pressure_film import PLAN_HEIGHT_M, write_pressure_film
+        from blast_env.plots.pressure_film import PLAN_HEIGHT_M, write_pressure_film
 
         height_m = self.command.film_height_m
         results = write_pressure_film(
@@ -443,9 +444,9 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         if not any((asked.heat_map, asked.history, *maps)):
             return []
         # Here, because pictures need the extra `render`.
-        from blast_env.rendering import gas
-        from blast_env.rendering.figures import save_figure
-        from blast_env.rendering.ground_map import ground_map, threshold_map
+        from blast_env.plots import gas
+        from blast_env.plots.figures import save_figure
+        from blast_env.plots.ground_map import ground_map, threshold_map
 
         kind = gas.kind_of(asked.quantity or "impulse")
         gauge = asked.gauge or next((each.name for each in self.blast.site.gauges), "")
@@ -500,7 +501,7 @@ def _section(text: str | None) -> "VerticalSection | None":
     if text is None:
         return None
     with import_extra("render", "pictures and films"):
-        from blast_env.rendering.pressure_frames import VerticalSection
+        from blast_env.plots.pressure_frames import VerticalSection
 
     axis, _, number = text.partition("=")
     with suppress(BlastEnvError):

@@ -22,11 +22,11 @@ from blast_env.cli.output import (
     progress_bar,
     save_layout_picture,
 )
-from blast_env.engines import default_engine
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines import default_engine
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 
 if TYPE_CHECKING:
     from blast_agents.training.run_folder import RunFolder

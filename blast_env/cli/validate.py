@@ -7,7 +7,7 @@ import typer
 from blast_env.cli.command import Command, argument
 from blast_env.cli.output import print_line
 from blast_env.evaluation.suitability import suitability
-from blast_env.scenario import find_problems
+from blast_env.site import find_problems
 
 
 @dataclass(frozen=True, kw_only=True)

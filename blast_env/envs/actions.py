@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, IntArray
 from blast_env.geometry import Element
-from blast_env.scenario import Catalogue
+from blast_env.site import Catalogue
 from blast_env.values import whole_number
 
 

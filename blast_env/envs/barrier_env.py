@@ -10,7 +10,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.engines import Engine, find_engine
 from blast_env.envs.actions import ACTIONS, Actions, NumberedActions
 from blast_env.envs.arguments import (
     PlainSpec,
@@ -39,10 +38,12 @@ from blast_env.envs.strategies import (
     scenario_source,
 )
 from blast_env.errors import BlastEnvError, value_text
+from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Element
-from blast_env.scenario import AnyScenario, Placement
+from blast_env.layout import Placement
+from blast_env.site import AnyScenario
 from blast_env.statistics import CVAR_LEVEL, Risk
 from blast_env.values import real_number, whole_number
 

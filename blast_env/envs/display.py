@@ -8,19 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.engines.contract import load_plugin
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Rectangle
-from blast_env.scenario import AnySource, Placement, PointSource, Scenario
-from blast_env.scenario.zone import distances_m
+from blast_env.layout import Placement
+from blast_env.site import AnySource, PointSource, Scenario
+from blast_env.site.zone import distances_m
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:
-    from blast_env.rendering.placing import BlastScreening, PlacingPainter
-    from blast_env.rendering.pressure_film import PressureScreening
-    from blast_env.rendering.window import Window
+    from blast_env.plots.placing import BlastScreening, PlacingPainter
+    from blast_env.plots.pressure_film import PressureScreening
+    from blast_env.plots.window import Window
 
 _LEGEND: Final = {
     "P": "protected structure",
@@ -181,7 +182,7 @@ class Display:
 
     def _placing_painter(self, episode: Episode) -> "PlacingPainter":
         """Return the painter of the episode; a new one with a new episode."""
-        from blast_env.rendering.placing import PlacingPainter
+        from blast_env.plots.placing import PlacingPainter
 
         if self._painter is None or self._episode is not episode:
             if self._episode is not episode:
@@ -192,7 +193,7 @@ class Display:
         return self._painter
 
     def _show(self, frame: Frame) -> None:
-        from blast_env.rendering.window import Window
+        from blast_env.plots.window import Window
 
         if self._window is None:
             self._window = Window("blast-env", self._frames_per_s)

@@ -8,7 +8,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.engines import Engine
 from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observations import (
@@ -30,10 +29,12 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
 from blast_env.evaluation.comparison import Assessment, Objective
+from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.geometry import Layout
-from blast_env.scenario import AnyCharge, Placement, Scenario
-from blast_env.scenario.placement import met_by_blasts
+from blast_env.layout import Placement
+from blast_env.layout.placement import met_by_blasts
+from blast_env.site import AnyCharge, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
 

@@ -15,21 +15,21 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout, Rectangle
-from blast_env.scenario import (
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import vehicle_reach, worst_places
+from blast_env.site import (
     AnySource,
     BuildZone,
     Catalogue,
-    Placement,
     RectangleSource,
     Scenario,
     Site,
     VehicleSource,
 )
-from blast_env.scenario.build_scene import vehicle_reach, worst_places
-from blast_env.scenario.reach import squares_of
-from blast_env.scenario.sections import PointM
-from blast_env.scenario.terraces import is_open_below
-from blast_env.scenario.zone import source_bounds_m
+from blast_env.site.reach import squares_of
+from blast_env.site.sections import PointM
+from blast_env.site.terraces import is_open_below
+from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
 
 Array = NDArray[Any]

@@ -9,8 +9,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from blast_env.engines import Blast, BlastResult, Engine, find_engine
-from blast_env.engines.contract import load_plugin
 from blast_env.envs.arguments import (
     PlainSpec,
     ResetOptions,
@@ -19,21 +17,24 @@ from blast_env.envs.arguments import (
     checked_options,
 )
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import Blast, BlastResult, Engine, find_engine
+from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Element
-from blast_env.physics.engine import BlastRun, EndReason
-from blast_env.physics.particles import CollisionType, lattice_capacity
-from blast_env.physics.scene import BlastSite
-from blast_env.physics.structure import BARRIER_NAME
-from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
-from blast_env.scenario.build_scene import draw_threat
+from blast_env.layout import check_layout
+from blast_env.layout.build_scene import draw_threat
+from blast_env.particles.run import BlastRun, EndReason
+from blast_env.site import AnyScenario, Scenario, find_scenario
+from blast_env.site.balls import CollisionType, lattice_capacity
+from blast_env.site.scene import BlastSite
+from blast_env.site.structure import BARRIER_NAME
 from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import
-    from blast_env.engines.gas import GasBlast, GasEngine, GasResult
-    from blast_env.physics.gas.engine import GasRun
-    from blast_env.rendering.frames import FramePainter
-    from blast_env.rendering.pressure_film import PressureNow
-    from blast_env.rendering.window import Window
+    from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+    from blast_env.gas.engine import GasRun
+    from blast_env.plots.frames import FramePainter
+    from blast_env.plots.pressure_film import PressureNow
+    from blast_env.plots.window import Window
 
 Observation = dict[str, Any]
 """Arrays by name."""
@@ -153,7 +154,7 @@ class UnfoldingParticles(Unfolding):
         self.run.advance(until_s)
         collisions: tuple[dict[Any, Any], ...] = ()
         if len(self.run.log) > recorded:
-            from blast_env.recording.tables import collision_table  # pandas takes long to import
+            from blast_env.particles.tables import collision_table  # pandas takes long to import
 
             table = collision_table(self.run.log.to_array(recorded), self.run.obstacles)
             collisions = tuple(table.to_dict("records"))
@@ -180,7 +181,7 @@ class UnfoldingParticles(Unfolding):
 
     def frame(self) -> NDArray[np.uint8]:
         """Return a picture of the balls."""
-        from blast_env.rendering.frames import FramePainter
+        from blast_env.plots.frames import FramePainter
 
         if self._painter is None:
             self._painter = FramePainter(self.blast)
@@ -223,7 +224,7 @@ class UnfoldingGas(Unfolding):
 
     def __init__(self, blast: "GasBlast") -> None:
         self.blast = blast
-        from blast_env.engines.oblique_walls import ObliqueLoads
+        from blast_env.evaluation.engines.oblique_walls import ObliqueLoads
 
         self.run = blast.engine.start_on(blast.site)
         self._oblique = ObliqueLoads.begin(self.run, blast.scenario.structures_with(blast.layout))
@@ -276,7 +277,7 @@ class UnfoldingGas(Unfolding):
 
     def frame(self) -> NDArray[np.uint8]:
         """Return the overpressure in plan and in a section."""
-        from blast_env.rendering.pressure_film import PressureNow
+        from blast_env.plots.pressure_film import PressureNow
 
         if self._painter is None:
             self._painter = PressureNow(self.blast, self.run)
@@ -284,7 +285,7 @@ class UnfoldingGas(Unfolding):
 
     def _so_far(self) -> "GasResult":
         """Return the loads so far, as a result."""
-        from blast_env.engines.gas import GasResult
+        from blast_env.evaluation.engines.gas import GasResult
 
         return GasResult(self.blast, self.run, oblique=self._oblique)
 
@@ -371,7 +372,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
 
     ## Episode end
     Terminated when the run has ended (`info["end_reason"]` has the reason); never truncated. `step`
-    returns `collisions` (keys of `blast_env.recording.tables.COLLISION_COLUMNS`) and `impulse_sim`,
+    returns `collisions` (keys of `blast_env.particles.tables.COLLISION_COLUMNS`) and `impulse_sim`,
     or with gas `impulse_pa_s`; at the end also `digest`.
 
     ## Arguments
@@ -506,7 +507,7 @@ class BlastSimulatorEnv(PlainSpec, gym.Env[Observation, np.int64]):
         frame = self._blast.frame()
         if self.render_mode == "rgb_array":
             return frame
-        from blast_env.rendering.window import Window
+        from blast_env.plots.window import Window
 
         if self._window is None:
             self._window = Window("blast-env", self.metadata["render_fps"])

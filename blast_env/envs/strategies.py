@@ -11,8 +11,8 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import Objective
 from blast_env.geometry import Layout
-from blast_env.scenario import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
-from blast_env.scenario.vehicles import source_of
+from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
+from blast_env.site.vehicles import source_of
 from blast_env.sites import FAMILIES, training_sites
 
 

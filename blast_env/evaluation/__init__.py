@@ -1,6 +1,5 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,
@@ -8,6 +7,7 @@ from blast_env.evaluation.comparison import (
     Objective,
     compare,
 )
+from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.evaluator import BlastEvaluator, BlastMeter, BudgetError, Evaluators
 from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.report import (

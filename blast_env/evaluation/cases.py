@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.geometry import Element
-from blast_env.physics.scene import Charge
-from blast_env.scenario import (
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import charge_against, draw_threat
+from blast_env.site import (
     AnyCharge,
     AnyScenario,
-    Placement,
     PointSource,
     ScenarioField,
     VehicleCharge,
     find_scenario,
 )
-from blast_env.scenario.build_scene import charge_against, draw_threat
-from blast_env.scenario.vehicles import ranked
+from blast_env.site.scene import Charge
+from blast_env.site.vehicles import ranked
 from blast_env.statistics import MeanRisk, Risk
 from blast_env.values import checked_seed, generator
 

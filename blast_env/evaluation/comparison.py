@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.engines.contract import BlastLoads, Engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, check_distinct
+from blast_env.evaluation.engines.contract import BlastLoads, Engine
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.evaluation.grid_error import GridError, grid_error
 from blast_env.geometry import Element, Layout
-from blast_env.physics.scene import Charge
+from blast_env.layout import check_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import share_of
-from blast_env.scenario import check_layout
+from blast_env.site.scene import Charge
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,

@@ -27,16 +27,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
-from blast_env.engines.contract import BlastLoads, Engine
-from blast_env.engines.gas_tables import means_by_wall
-from blast_env.engines.oblique_walls import STEPPED, stepped_buildings
-from blast_env.engines.pieces import PIECE_COLUMNS
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
+from blast_env.evaluation.engines.contract import BlastLoads, Engine
+from blast_env.evaluation.engines.gas_tables import means_by_wall
+from blast_env.evaluation.engines.oblique_walls import STEPPED, stepped_buildings
+from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
+from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element, Layout
-from blast_env.physics.gas.settings import CHECKED_SCALED_DISTANCE
-from blast_env.physics.scene import WALLS, Charge
+from blast_env.layout.build_scene import charge_against
 from blast_env.response.buildings import (
     BuildingDamage,
     LevelOfProtection,
@@ -46,16 +46,16 @@ from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import worst
 from blast_env.response.facade import FacadeResponse, peak_factor, respond, sharpened
 from blast_env.response.sdof import impulses
-from blast_env.scenario import AnyCharge, AnyScenario, Scenario, find_scenario
-from blast_env.scenario.build_scene import charge_against
-from blast_env.scenario.facade import with_glass
-from blast_env.scenario.sections import buildings_of
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site.facade import with_glass
+from blast_env.site.scene import WALLS, Charge
+from blast_env.site.sections import buildings_of
 from blast_env.tables import Column, table_of
 
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
 
-    from blast_env.engines.gas import GasResult
+    from blast_env.evaluation.engines.gas import GasResult
 
 _CLIPPED: Final = (
     "it passes with the peaks of the cells, which are clipped, but fails with Kingery and"
@@ -140,7 +140,7 @@ class BarrierResponse:
 
     Attributes:
         charge: The charge at its place.
-        pieces: One row per piece; see `blast_env.engines.pieces.PIECE_COLUMNS`.
+        pieces: One row per piece; see `blast_env.evaluation.engines.pieces.PIECE_COLUMNS`.
         taken_away: Pieces that overturned during an earlier run of the blast and were removed.
     """
 
@@ -465,7 +465,7 @@ def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, st
 
     The loads are outside the validated range of the engine or the response, or not known.
     """
-    from blast_env.physics.gas.engine import scaled_distance  # the run has imported it
+    from blast_env.gas.engine import scaled_distance  # the run has imported it
 
     reasons: dict[str, dict[str, None]] = {}
     for outline in result.run.site.structures:

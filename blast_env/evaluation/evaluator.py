@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from blast_env.calibration.model import Calibration
-from blast_env.engines import BlastLoads, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.engines import BlastLoads, Engine, find_engine
 from blast_env.evaluation.store import (
     BlastCache,
     BlastKey,
@@ -19,11 +18,13 @@ from blast_env.evaluation.store import (
     find_cache,
 )
 from blast_env.geometry import Element, Layout
-from blast_env.physics.scene import Charge
+from blast_env.layout import check_layout
+from blast_env.layout.placement import met_by_blasts
+from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.scenario import AnyCharge, AnyScenario, Scenario, check_layout, find_scenario
-from blast_env.scenario.placement import met_by_blasts
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site.scene import Charge
 
 
 class BlastEvaluator:

@@ -11,12 +11,12 @@ from typing import Final, TypeVar
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.calibration.references import CURVES_SCALED_M, burst_of, kingery_bulmash
-from blast_env.engines.contract import BlastLoads
-from blast_env.physics.scene import OUTWARDS, BlastSite, Charge, StructureOutline
-from blast_env.physics.sight import in_sight
-from blast_env.scenario import ObjectiveSection, Scenario
-from blast_env.scenario.build_scene import build_site
+from blast_env.evaluation.engines.contract import BlastLoads
+from blast_env.layout.build_scene import build_site
+from blast_env.particles.calibration.references import CURVES_SCALED_M, burst_of, kingery_bulmash
+from blast_env.site import ObjectiveSection, Scenario
+from blast_env.site.scene import OUTWARDS, BlastSite, Charge, StructureOutline
+from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
 
 _STEP_M: Final = 1.0

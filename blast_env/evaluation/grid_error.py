@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Final, TypeAlias
 
-from blast_env.engines.contract import BlastLoads, Engine, find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, Threat
+from blast_env.evaluation.engines.contract import BlastLoads, Engine, find_engine
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Layout
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.statistics import reductions
 
 ORDER: Final = 2.0

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines import JUDGE, Engine
-from blast_env.engines.contract import BlastLoads, StructureLoad, on_buildings
 from blast_env.evaluation.cases import Case, Threat, draw_threats, in_turn
 from blast_env.evaluation.comparison import (
     CHARGE_COLUMNS,
@@ -21,16 +19,19 @@ from blast_env.evaluation.comparison import (
     grid_error_record,
     loads_of_both,
 )
+from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad, on_buildings
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.grid_error import GridError, LoadOf, final_engine, grid_error
 from blast_env.evaluation.store import BlastCache
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
-from blast_env.physics.scene import Charge
+from blast_env.layout import check_layout
+from blast_env.layout.build_scene import build_site
 from blast_env.provenance import versions
-from blast_env.scenario import AnyScenario, Scenario, check_layout, find_scenario
-from blast_env.scenario.build_scene import build_site
-from blast_env.scenario.worst_places import stand_off_m
+from blast_env.site import AnyScenario, Scenario, find_scenario
+from blast_env.site.scene import Charge
+from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,
@@ -384,7 +385,7 @@ class LayoutEvaluation:
     @cached_property
     def module_table(self) -> "pd.DataFrame":
         """One row per module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
-        from blast_env.recording.tables import module_table
+        from blast_env.particles.tables import module_table
 
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)

@@ -14,13 +14,13 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 from pydantic import TypeAdapter
 
-from blast_env.calibration.model import Calibration
-from blast_env.engines import BlastLoads, Engine, StructureLoad
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
+from blast_env.particles.calibration.model import Calibration
 from blast_env.response.damage import BayDamage
+from blast_env.site.scene import Charge
 
 
 class BlastKey(NamedTuple):

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from blast_env.calibration.model import scenario_calibration
-from blast_env.engines import CALIBRATED_ENGINES, JUDGE
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import AnyScenario, PointSource, Scenario, find_scenario
+from blast_env.evaluation.engines import CALIBRATED_ENGINES, JUDGE
+from blast_env.particles.calibration.model import scenario_calibration
+from blast_env.site import AnyScenario, PointSource, Scenario, find_scenario
 
 _PLACING: Final = "search, train, evaluate, league, play and BlastBarrier-v0"
 _PRESETS_NOT_FOR_DESIGN: Final = {

@@ -13,20 +13,19 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Element, Layout, Rectangle
-from blast_env.scenario import (
+from blast_env.layout import Placement, usable_cells
+from blast_env.site import (
     AnyScenario,
     AnySource,
     BuildZone,
     Catalogue,
-    Placement,
     PointSource,
     RectangleSource,
     Scenario,
     find_scenario,
-    usable_cells,
 )
-from blast_env.scenario.sections import PointM
-from blast_env.scenario.terraces import is_open_below
+from blast_env.site.sections import PointM
+from blast_env.site.terraces import is_open_below
 from blast_env.units import MODULE_SIDE_M
 
 DIRECTIONS: Final = 360

@@ -9,7 +9,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.scenario import (
+from blast_env.site import (
     SCHEMA_VERSION,
     AccessWay,
     AnySource,

@@ -7,8 +7,8 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.parameters import preset
-from blast_env.scenario import SCHEMA_VERSION, Scenario
+from blast_env.site import SCHEMA_VERSION, Scenario
+from blast_env.site.parameters import preset
 from blast_env.sites.ranges import (
     MARGIN_M,
     Apart,

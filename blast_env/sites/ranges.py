@@ -9,8 +9,8 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.physics.parameters import preset
-from blast_env.scenario.boxes import box_distances_m
+from blast_env.site.boxes import box_distances_m
+from blast_env.site.parameters import preset
 from blast_env.units import MODULE_SIDE_M
 
 Span = tuple[float, float]

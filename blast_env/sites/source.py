@@ -10,7 +10,7 @@ import numpy as np
 
 from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.sites.criterion import SiteCriterion
 from blast_env.sites.generate import MOST_SEED, RANGES, AnyRanges, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final, TypeVar
 
 from blast_env.geometry import Rectangle
-from blast_env.physics.scene import WallName
-from blast_env.scenario import (
+from blast_env.site import (
     AccessWay,
     AnyScenario,
     AnySource,
@@ -18,8 +17,9 @@ from blast_env.scenario import (
     VehicleSource,
     find_scenario,
 )
-from blast_env.scenario.catalogue import Hardening
-from blast_env.scenario.sections import (
+from blast_env.site.catalogue import Hardening
+from blast_env.site.scene import WallName
+from blast_env.site.sections import (
     Entry,
     FacadePart,
     Ground,

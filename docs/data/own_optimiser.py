@@ -1,9 +1,8 @@
 """An optimiser for `blast-env league --method own_optimiser:Descent`: plain Python."""
 
-from blast_agents.rules import random_layout
-from blast_agents.search import LayoutProblem, Report, SearchResult
-from blast_agents.search.moves import Moves
-
+from blast_env.design.rules import random_layout
+from blast_env.design.search import LayoutProblem, Report, SearchResult
+from blast_env.design.search.moves import Moves
 from blast_env.values import generator
 
 

@@ -6,15 +6,9 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from blast_agents.benchmark import find_method, reference_of
 from pydantic import TypeAdapter
 
-from blast_env.cli.output import print_line, user_errors
-from blast_env.engines import JUDGE, find_engine
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator
-from blast_env.files import make_folder, write_atomically
-from blast_env.problems import (
+from blast_env.benchmark import (
     DEFINITIONS,
     SMALL,
     Asked,
@@ -24,14 +18,20 @@ from blast_env.problems import (
     make,
     play,
 )
-from blast_env.problems.references import cell_key, engine_key, stored_references
+from blast_env.benchmark.methods import find_method, reference_of
+from blast_env.benchmark.references import cell_key, engine_key, stored_references
+from blast_env.cli.output import print_line, user_errors
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.engines import JUDGE, find_engine
+from blast_env.files import make_folder, write_atomically
 from blast_env.statistics import mean_estimate
 from blast_env.tables import markdown_table
 from studies.benchmark.methods import OUTSIDE
 from studies.benchmark.references import known_layouts, published_before, submitted_layouts
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
-_STORED = Path("blast_env/problems/data/references.json")
+_STORED = Path("blast_env/benchmark/data/references.json")
 _CELL = cell_key(0.5)
 _REFERENCES = TypeAdapter(dict[str, ScoreReference])
 

@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
+from blast_env.benchmark import BenchmarkProblem, Method
+from blast_env.benchmark.adapters import mcbo_task
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError
 from blast_env.geometry import Layout
-from blast_env.problems import BenchmarkProblem, Method
-from blast_env.problems.adapters import mcbo_task
 
 _REPEATS: Final = 200
 """Evaluations in a row without a new blast after which a method ends."""

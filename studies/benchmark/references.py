@@ -5,13 +5,13 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from blast_agents.benchmark import find_method
-
-from blast_env.data import PublishedBlasts
+from blast_env.benchmark import Definition, Submission, make
+from blast_env.benchmark.data import PublishedBlasts
+from blast_env.benchmark.methods import find_method
 from blast_env.evaluation import DiskCache
 from blast_env.geometry import Layout
-from blast_env.problems import Definition, Submission, make
-from blast_env.scenario import Charge, Placement, VehicleCharge, load_layout
+from blast_env.layout import Placement, load_layout
+from blast_env.site import Charge, VehicleCharge
 
 DATA = Path("docs/data")
 

@@ -21,8 +21,8 @@ from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import ResultTable, print_line, progress_bar, result_console, user_errors
 from blast_env.evaluation import evaluate_against
 from blast_env.files import make_folder, write_atomically
-from blast_env.rendering.figures import save_figure
-from blast_env.scenario import Scenario, bundled_scenarios
+from blast_env.plots.figures import save_figure
+from blast_env.site import Scenario, bundled_scenarios
 from blast_env.tables import markdown_table
 from studies.difficulty.figure import difficulty_figure, items_figure
 from studies.difficulty.items import ItemEffort, ItemResult, ItemStudy, cost_of, pieces_text

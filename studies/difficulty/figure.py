@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 
 from blast_env.evaluation import LayoutEvaluation
-from blast_env.physics.scene import Scene
-from blast_env.plan import (
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import build_scene
+from blast_env.plots.plan import (
     BARRIER,
     EXPLOSIVE,
     INK,
@@ -26,7 +27,7 @@ from blast_env.plan import (
     vehicle_features,
     without,
 )
-from blast_env.rendering.site_plan import (
+from blast_env.plots.site_plan import (
     draw_features,
     draw_loads,
     draw_outlines,
@@ -38,21 +39,15 @@ from blast_env.rendering.site_plan import (
     write_heading,
     write_names,
 )
-from blast_env.rendering.style import (
+from blast_env.plots.style import (
     count_of,
     nice_ceiling,
     number_on_axis,
     render_extra,
     unit_interval,
 )
-from blast_env.scenario import (
-    AnySource,
-    BuildZone,
-    Placement,
-    RectangleSource,
-    Scenario,
-)
-from blast_env.scenario.build_scene import build_scene
+from blast_env.site import AnySource, BuildZone, RectangleSource, Scenario
+from blast_env.site.scene import Scene
 from studies.difficulty.items import ItemResult, Purchase, cost_of, pieces_text
 
 with render_extra():

@@ -16,26 +16,20 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
-from blast_agents.rules import expected_charge, random_layout
-from blast_agents.search import LayoutProblem, ProposerKind, find_proposer, proposers
-from blast_agents.search.registry import Rule
 
 from blast_env.arrays import FloatArray
-from blast_env.engines import Engine
-from blast_env.engines.contract import load_plugin
+from blast_env.design.rules import expected_charge, random_layout
+from blast_env.design.search import LayoutProblem, ProposerKind, find_proposer, proposers
+from blast_env.design.search.registry import Rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.evaluation.comparison import check_something_arrives
+from blast_env.evaluation.engines import Engine
+from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout, Piece
-from blast_env.physics.scene import Charge
-from blast_env.scenario import (
-    AnyCharge,
-    Placement,
-    PointSource,
-    Scenario,
-    VehicleCharge,
-    VehicleSource,
-)
+from blast_env.layout import Placement
+from blast_env.site import AnyCharge, PointSource, Scenario, VehicleCharge, VehicleSource
+from blast_env.site.scene import Charge
 from studies.difficulty.study import TaskResult, WayOutcome
 
 METHOD: Final = "population_annealing"

@@ -13,16 +13,16 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from blast_agents.rules import expected_charge, random_layout
-from blast_agents.search import ProposerKind, proposers
-from blast_agents.search.registry import Rule
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.contract import load_plugin
+from blast_env.design.rules import expected_charge, random_layout
+from blast_env.design.search import ProposerKind, proposers
+from blast_env.design.search.registry import Rule
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import check_something_arrives
+from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout
-from blast_env.scenario import AnyCharge, Scenario
+from blast_env.site import AnyCharge, Scenario
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,

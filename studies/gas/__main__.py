@@ -9,21 +9,21 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from blast_agents.rules import random_layout, wall_near_building, wall_near_charge
 
 from blast_env.arrays import FloatArray
-from blast_env.benchmark import street
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.design.rules import random_layout, wall_near_building, wall_near_charge
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.speed import street
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
-from blast_env.physics.engine import EndReason
-from blast_env.physics.scene import Charge
-from blast_env.rendering.figures import save_figure
+from blast_env.layout.build_scene import draw_charge
+from blast_env.particles.run import EndReason
+from blast_env.plots.figures import save_figure
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario, load_scenario
-from blast_env.scenario.build_scene import draw_charge
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.scene import Charge
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference

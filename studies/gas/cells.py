@@ -9,11 +9,11 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
 from blast_env.runner import run_all
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 from blast_env.statistics import reductions
 from studies.gas.loads import impulse_until, protected_impulse_pa_s
 

@@ -15,9 +15,9 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M
 from studies.gas.loads import with_heights
 from studies.gas.reference import free_field_gauges

@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.benchmark import street
-from blast_env.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.speed import street
+from blast_env.gas.grid import GasGrid
+from blast_env.gas.settings import CELLS
+from blast_env.gas.solver import Gas, Recorder
 from blast_env.geometry import Layout
-from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.settings import CELLS
-from blast_env.physics.gas.solver import Gas, Recorder
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
 
 STREET: Final = "street of 100 m, 500 kg"
 

@@ -6,15 +6,15 @@ from time import process_time
 from typing import Final
 
 import numpy as np
-from blast_agents.rules import random_layout
 
 from blast_env.arrays import FloatArray
-from blast_env.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.design.rules import random_layout
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.geometry import Layout
-from blast_env.physics.engine import EndReason
+from blast_env.particles.run import EndReason
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import respond
-from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.sites import FAMILIES, generate_site
 
 _LARGE_M: Final = 50.0

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.gas.settings import CELLS
 from blast_env.geometry import Layout
-from blast_env.physics.gas.settings import CELLS
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from studies.gas.loads import protected_impulse_pa_s
 
 OFF_COLUMNS: Final = ("impulse_pa_s", "peak_pa")

@@ -13,8 +13,8 @@ from scipy.stats import spearmanr
 from blast_env.arrays import FloatArray
 from blast_env.evaluation import BlastEvaluator, SeedRange, Threat
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 from blast_env.statistics import Estimate, mean_estimate, reductions
 
 PRESETS: Final[Mapping[str, str]] = MappingProxyType(

@@ -6,11 +6,11 @@ heights, or are a small yard.
 
 from typing import Any, Final
 
-from blast_env.engines.gas import GasBlast, GasResult
 from blast_env.errors import BlastEnvError
-from blast_env.physics.gas.solver import GasSolver
-from blast_env.physics.gas.source import set_charge
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines.gas import GasBlast, GasResult
+from blast_env.gas.solver import GasSolver
+from blast_env.gas.source import set_charge
+from blast_env.site import Scenario
 
 
 def protected_impulse_pa_s(result: GasResult) -> float:

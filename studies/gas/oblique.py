@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.engines.bays import bay_patches
-from blast_env.engines.gas import GasBlast, GasEngine
-from blast_env.physics.gas.engine import GasRun
+from blast_env.evaluation.engines.bays import bay_patches
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.gas.engine import GasRun
 from blast_env.response.sdof import Resistance, System, responses
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M
 
 FACADE_M: Final = 12.0

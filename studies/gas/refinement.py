@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.engines.gas import GasEngine
-from blast_env.physics.gas.engine import GasRun
-from blast_env.scenario import Scenario
-from blast_env.scenario.build_scene import build_site
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.gas.engine import GasRun
+from blast_env.layout.build_scene import build_site
+from blast_env.site import Scenario
 
 BLOCK: Final = 4
 """Number of cells along the side of a block."""

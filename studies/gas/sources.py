@@ -10,8 +10,8 @@ from math import cbrt
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.physics.gas.source import TNT, Explosive
-from blast_env.rendering.style import render_extra
+from blast_env.gas.source import TNT, Explosive
+from blast_env.plots.style import render_extra
 from studies.gas.reference import Ratio, free_field, wide_wall
 
 with render_extra():

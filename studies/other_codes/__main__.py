@@ -8,7 +8,7 @@ import typer
 
 from blast_env.cli.output import print_line, user_errors
 from blast_env.files import make_folder
-from blast_env.rendering.figures import save_figure
+from blast_env.plots.figures import save_figure
 from blast_env.tables import markdown_table
 from studies.other_codes import openfoam, pyclaw
 from studies.other_codes.histories import Histories, histories_figure

@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
-from blast_env.physics.gas.grid import GasGrid
-from blast_env.physics.gas.probes import Gauges
-from blast_env.physics.gas.solver import AIR_PRESSURE_PA, GasSolver
-from blast_env.physics.gas.source import Explosive, GasCharge, set_charge
-from blast_env.physics.gas.state import GAMMA
+from blast_env.gas.grid import GasGrid
+from blast_env.gas.probes import Gauges
+from blast_env.gas.solver import AIR_PRESSURE_PA, GasSolver
+from blast_env.gas.source import Explosive, GasCharge, set_charge
+from blast_env.gas.state import GAMMA
 from studies.other_codes.histories import Histories
 
 PROGRAMS: Final = ("blockMesh", "topoSet", "subsetMesh", "rhoCentralFoam")

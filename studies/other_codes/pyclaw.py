@@ -17,10 +17,10 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
-from blast_env.physics.gas.grid import FaceKind, GasGrid
-from blast_env.physics.gas.probes import Gauges
-from blast_env.physics.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, GasSolver
-from blast_env.physics.gas.state import GAMMA
+from blast_env.gas.grid import FaceKind, GasGrid
+from blast_env.gas.probes import Gauges
+from blast_env.gas.solver import AIR_DENSITY_KG_M3, AIR_PRESSURE_PA, GasSolver
+from blast_env.gas.state import GAMMA
 from studies.other_codes.histories import Histories
 
 GAUGES_M: Final = MappingProxyType(

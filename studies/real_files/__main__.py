@@ -11,7 +11,7 @@ import typer
 
 from blast_env.cli.output import print_line, user_errors
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.importing.ledger import Deed
+from blast_env.io.importing.ledger import Deed
 from studies.real_files.survey import files_of, survey
 
 _WORDS = 100

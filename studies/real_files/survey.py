@@ -9,12 +9,12 @@ from typing import Final
 import shapely
 
 from blast_env.errors import BlastEnvError
-from blast_env.importing import ImportOptions, import_site
-from blast_env.importing.convert import read_map, selectors_of
-from blast_env.importing.ledger import Deed, Ledger
-from blast_env.importing.roles import things_of
-from blast_env.importing.site_map import DrawingCoordinates, SiteMap
-from blast_env.importing.things import Role, Thing
+from blast_env.io.importing import ImportOptions, import_site
+from blast_env.io.importing.convert import read_map, selectors_of
+from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.roles import things_of
+from blast_env.io.importing.site_map import DrawingCoordinates, SiteMap
+from blast_env.io.importing.things import Role, Thing
 from blast_env.reading import ReadingError, ReadingLimits, read_apart
 
 SUFFIXES: Final = (".geojson", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf", ".dxf")

@@ -7,11 +7,11 @@ import numpy as np
 from blast_agents.league.entries import NO_TRAINING, LeagueEntry, NoBarrier, Training
 from blast_agents.league.standings import Result, Standings
 from blast_agents.league.tracks import Track, known_track
-from blast_agents.rules import line_of_sight_wall
-from blast_agents.search import LayoutProblem, Proposal, ProposerKind, Report, SearchResult
 
-from blast_env.scenario import AnyCharge, Scenario, SegmentSource
-from tests.agents.search_cases import small_scenario
+from blast_env.design.rules import line_of_sight_wall
+from blast_env.design.search import LayoutProblem, Proposal, ProposerKind, Report, SearchResult
+from blast_env.site import AnyCharge, Scenario, SegmentSource
+from tests.design.search_cases import small_scenario
 
 ROAD = SegmentSource(kind="segment", start_m=(5.0, 15.0), end_m=(5.0, 25.0), tnt_kg=100.0)
 TRAINING = Training(blasts=5000, seconds=60.0)

@@ -28,7 +28,7 @@ from blast_env import load_scenario
 from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import bundled_scenarios
+from blast_env.site import bundled_scenarios
 
 WITHOUT_SECTION = WITHOUT_BUILD_ZONE | FOR_GAS
 SCENARIOS = ("sites", *(name for name in bundled_scenarios() if name not in WITHOUT_SECTION))

@@ -12,11 +12,12 @@ from blast_agents.training.agent import logits_of
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
 from blast_env.geometry import Piece
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, save_scenario
-from tests.agents.search_cases import CALIBRATION
+from blast_env.layout import Placement
+from blast_env.site import save_scenario
+from blast_env.site.scene import Charge
 from tests.agents.training_runs import hyperparameters, settings
 from tests.catalogue_sites import ITEMS, yard
+from tests.design.search_cases import CALIBRATION
 
 CHARGE = Charge((2.0, 6.0), 5.0)
 

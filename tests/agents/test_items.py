@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
-from blast_agents.rules import (
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.design.rules import (
     line_of_sight_wall,
     random_layout,
     ring_around_building,
@@ -10,7 +13,7 @@ from blast_agents.rules import (
     wall_near_building,
     wall_near_charge,
 )
-from blast_agents.search import (
+from blast_env.design.search import (
     Layout,
     LayoutProblem,
     ProposerKind,
@@ -18,20 +21,18 @@ from blast_agents.search import (
     layouts_by_rule,
     proposers,
 )
-from blast_agents.search.moves import Moves, random_part, random_walls
-from blast_agents.search.operators import cut, individual, layout_of, mixed, repaired
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
+from blast_env.design.search.moves import Moves, random_part, random_walls
+from blast_env.design.search.operators import cut, individual, layout_of, mixed, repaired
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Piece
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 from blast_env.sites import Visibility, visibility_layout
-from tests.agents.search_cases import CALIBRATION, every_layout
 from tests.agents.sites import site
 from tests.catalogue_sites import ITEMS, item, yard
+from tests.design.search_cases import CALIBRATION, every_layout
 
 CHARGE = Charge((2.0, 6.0), 5.0)
 

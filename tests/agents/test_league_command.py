@@ -13,15 +13,15 @@ from typer.testing import CliRunner, Result
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.scenario import load_scenario, save_scenario
+from blast_env.site import load_scenario, save_scenario
 from blast_env.sites import SiteSource
-from tests.agents.test_surrogate import by_hand as surrogate_by_hand
 from tests.agents.training_runs import (
     hyperparameters,
     scenario_file,
     settings,
     small_scenario,
 )
+from tests.design.test_surrogate import by_hand as surrogate_by_hand
 from tests.gas_sites import hut
 
 SMALL = ("--cases", 2, "--seeds", 2, "--budgets", "4,8", "--methods", "random,genetic")

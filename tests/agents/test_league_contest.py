@@ -22,8 +22,10 @@ from blast_agents.league import (
 )
 from blast_agents.league.store import search_key
 from blast_agents.league.tracks import practice_of
-from blast_agents.rules import wall_near_charge
-from blast_agents.search import (
+
+from blast_env import load_scenario
+from blast_env.design.rules import wall_near_charge
+from blast_env.design.search import (
     LayoutProblem,
     ProposerKind,
     RandomSearch,
@@ -31,17 +33,15 @@ from blast_agents.search import (
     SearchResult,
     find_proposer,
 )
-
-from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, evaluate_against
 from blast_env.evaluation.cases import visible_case
 from blast_env.files import FolderStore
-from blast_env.physics.scene import Charge
-from blast_env.scenario import PointSource
+from blast_env.site import PointSource
+from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
 from tests.agents.league_cases import TRAINING, WallAgent, road_scenario
-from tests.agents.search_cases import every_layout
+from tests.design.search_cases import every_layout
 
 SCENARIO = road_scenario()
 TRACK = known_track(SCENARIO, 3, 2)

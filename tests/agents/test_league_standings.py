@@ -19,8 +19,8 @@ from blast_agents.league.tracks import HIDDEN_SEEDS
 from matplotlib.figure import Figure
 
 from blast_env.errors import BlastEnvError
-from blast_env.physics.scene import Charge
-from blast_env.scenario import ObjectiveSection
+from blast_env.site import ObjectiveSection
+from blast_env.site.scene import Charge
 from blast_env.statistics import Estimate, reduction_estimate
 from tests.agents.league_cases import TRAINING, result, road_scenario, standings
 

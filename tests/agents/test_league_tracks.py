@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
-from blast_env.physics.scene import Charge
-from blast_env.scenario import PointSource, VehicleCharge, save_scenario
+from blast_env.site import PointSource, VehicleCharge, save_scenario
+from blast_env.site.scene import Charge
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SiteSource
 from tests.agents.league_cases import ROAD, road_scenario
 from tests.vehicle_sites import gate_site

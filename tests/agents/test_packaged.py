@@ -6,18 +6,19 @@ from typing import Any
 import pandas as pd
 import pytest
 import torch
-from blast_agents.surrogate import LearntSearch, packaged_surrogate, site_of
-from blast_agents.surrogate.fitting import elements
 from blast_agents.training import load_agent, packaged, train
 from blast_agents.training.packaged import LeagueResult, pack, packaged_agent, records
 from scipy.stats import spearmanr
 from typer.testing import CliRunner, Result
 
 from blast_env.cli import app
+from blast_env.design.surrogate import LearntSearch, packaged_surrogate, site_of
+from blast_env.design.surrogate.fitting import elements
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
-from blast_env.physics.scene import Charge
-from blast_env.scenario import LayoutFile, Placement, Scenario, load_scenario, save_scenario
+from blast_env.layout import LayoutFile, Placement
+from blast_env.site import Scenario, load_scenario, save_scenario
+from blast_env.site.scene import Charge
 from blast_env.sites import FAMILIES, generate_site
 from tests.agents.test_self_labelling import own, run_settings, wide_yard
 from tests.catalogue_sites import yard as yard_with_a_point

@@ -23,7 +23,8 @@ from blast_env.bundled import REAL_SIZE
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import OBSERVATIONS, GridObservation
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Placement, Scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, generate_site
 from tests.catalogue_sites import yard_document
 

@@ -14,7 +14,7 @@ from blast_agents.training.checkpoint import Checkpoint
 
 from blast_env.errors import BlastEnvError
 from blast_env.files import is_temporary
-from blast_env.scenario import save_scenario
+from blast_env.site import save_scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 

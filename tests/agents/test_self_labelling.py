@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 from blast_agents.league.trained import TrainedRun
-from blast_agents.search.registry import layouts_by_rule
 from blast_agents.training import load_agent, load_hyperparameters, resume, train
 from blast_agents.training.agent import (
     Policy,
@@ -37,12 +36,14 @@ from blast_agents.training.self_labelling import (
     race,
 )
 
+from blast_env.design.search.registry import layouts_by_rule
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Evaluators
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario, VehicleCharge, save_scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario, VehicleCharge, save_scenario
+from blast_env.site.scene import Charge
 from tests.agents.training_runs import (
     hyperparameters,
     scenario_file,

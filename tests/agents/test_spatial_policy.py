@@ -14,15 +14,16 @@ from blast_agents.policies.features import (
     ZoneView,
 )
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy
-from blast_agents.rules import wall_near_charge
 from blast_agents.training.agent import logits_of
 
 import blast_env  # noqa: F401
 from blast_env import load_scenario
+from blast_env.design.rules import wall_near_charge
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation, Observable
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, Scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 from blast_env.sites import Visibility, generate_site
 from blast_env.sites.turning import turned
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from blast_agents.policies.spatial import SpatialPolicy
-from blast_agents.search import LayoutAgent
 from blast_agents.training import TrainedAgent, load_agent, load_archive, train
 from blast_agents.training.agent import logits_of, make_model, policy_for
 from blast_agents.training.checkpoint import Checkpoint
@@ -20,11 +19,13 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from sb3_contrib import MaskablePPO
 
 from blast_env import load_scenario
+from blast_env.design.search import LayoutAgent
 from blast_env.envs.observations import GridWithLoadObservation, Observable
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement, PointSource, Scenario
+from blast_env.layout import Placement
+from blast_env.site import PointSource, Scenario
+from blast_env.site.scene import Charge
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 CHARGES = (Charge((2.0, 5.5), 100.0), Charge((2.0, 8.5), 100.0), None)

@@ -18,7 +18,7 @@ from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolde
 from blast_agents.training.train import TrainingResult
 
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import load_scenario
+from blast_env.site import load_scenario
 from tests.agents.training_runs import (
     ROLLOUT,
     STEPS,

@@ -8,7 +8,7 @@ from typing import Any
 from blast_agents.training import TrainingSettings, load_hyperparameters
 from blast_agents.training.hyperparameters import AnyHyperparameters
 
-from blast_env.scenario import Scenario, save_scenario
+from blast_env.site import Scenario, save_scenario
 
 SMALL: dict[str, Any] = {
     "n_envs": 1,

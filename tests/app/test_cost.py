@@ -12,9 +12,9 @@ from blast_env.app.records import RECORD, EngineRecord
 from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
-from blast_env.engines.gas import GasBlast, GasEngine
-from blast_env.reporting import StudyOptions
-from blast_env.scenario import load_scenario
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.report import StudyOptions
+from blast_env.site import load_scenario
 from tests.app.here import Here
 from tests.gas_sites import WALL, hut
 from tests.vehicle_sites import gate_site

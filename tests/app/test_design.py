@@ -14,8 +14,8 @@ from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.sources import imported_site
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.importing import ImportOptions
-from blast_env.scenario import load_scenario
+from blast_env.io.importing import ImportOptions
+from blast_env.site import load_scenario
 from tests.gas_sites import WALL, hut
 
 COURTYARD = load_scenario("courtyard")

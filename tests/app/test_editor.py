@@ -14,8 +14,8 @@ from blast_env.app.plan import PixelView, overlay_svg, plan_svg
 from blast_env.app.session import Session
 from blast_env.app.solids import boxes
 from blast_env.geometry import Piece
-from blast_env.plan import STRUCTURE
-from blast_env.scenario import load_scenario
+from blast_env.plots.plan import STRUCTURE
+from blast_env.site import load_scenario
 from tests.gas_sites import WALL, column, hut, site_document
 from tests.vehicle_sites import POSTS, gate_site
 

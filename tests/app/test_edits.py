@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from blast_env.app import edits
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario, ScenarioError, load_scenario
+from blast_env.site import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import hut
 from tests.test_terraces import HALL, TERRACE, terraced
 

@@ -12,11 +12,11 @@ from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session, Sessions
-from blast_env.engines import find_engine
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Layout, Measure, Piece
-from blast_env.scenario import Scenario, ScenarioError
+from blast_env.site import Scenario, ScenarioError
 from tests.app.here import Here
 from tests.app.test_page import opened, play
 from tests.gas_sites import glazed_hut, hut

@@ -30,11 +30,11 @@ from blast_env.app.session import Sessions
 from blast_env.app.work import read_status, write_status
 from blast_env.errors import BlastEnvError
 from blast_env.reading import Reading
-from blast_env.scenario import Scenario, load_scenario, save_scenario
+from blast_env.site import Scenario, load_scenario, save_scenario
 from tests.app.here import Here
 from tests.app.test_work import CELLS
 from tests.gas_sites import WALL, hut
-from tests.importing.maps import BLOCK
+from tests.io.importing.maps import BLOCK
 from tests.scenarios import BALLISTIC_COURTYARD
 from tests.test_terraces import TERRACE, solid, terraced
 

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from blast_env import reporting
+from blast_env import report
 from blast_env.app import blasts, offers
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
@@ -31,16 +31,16 @@ from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import NamedThreat, threats_of
 from blast_env.app.verdicts import verdict_rows
 from blast_env.app.work import ReportChoice, Status, read_status, write_status
-from blast_env.engines import find_engine
-from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Threat, evaluate_layout
 from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.reporting import StudyOptions
+from blast_env.report import StudyOptions
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.scene import Charge
 from tests.app.here import Here
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.scenarios import BALLISTIC_COURTYARD
@@ -560,8 +560,8 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     def write(_: object, page: Path, pdf: Path | None) -> list[Path]:
         return [page] if pdf is None else [page, pdf]
 
-    monkeypatch.setattr(reporting, "run_study", study)
-    monkeypatch.setattr(reporting, "write_report", write)
+    monkeypatch.setattr(report, "run_study", study)
+    monkeypatch.setattr(report, "write_report", write)
     session = session_on(tmp_path, hut())
     with pytest.raises(BlastEnvError, match="layout A is empty"):
         session.report(tmp_path / "r.html")
@@ -609,7 +609,7 @@ WARM_CODE = """
 import sys
 from numba.core.dispatcher import Dispatcher
 from blast_env.app.tasks import warm_up
-from blast_env.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from tests.gas_sites import glazed_hut
 
 def loaded():

@@ -27,22 +27,23 @@ from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
 from blast_env.app.threats import NamedThreat
 from blast_env.app.work import ReportTask, read_task, write_task
-from blast_env.calibration.model import load_calibration, save_calibration
 from blast_env.cluster import address_of
-from blast_env.engines import simulate
-from blast_env.engines.contract import BlastLoads, StructureLoad
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
+from blast_env.evaluation.free_field import FreeFieldRun
 from blast_env.evaluation.store import BlastKey, DiskCache
-from blast_env.fitting.free_field import FreeFieldRun
-from blast_env.importing import ImportOptions, import_site
+from blast_env.io.importing import ImportOptions, import_site
 from blast_env.journal import Journal
-from blast_env.physics.scene import Charge
-from blast_env.recording.parquet import read_parquet
-from blast_env.reporting.study import front_layouts
-from blast_env.scenario import LayoutFile, Scenario, load_scenario, save_scenario, write_layout
+from blast_env.layout import LayoutFile, write_layout
+from blast_env.particles.calibration.model import load_calibration, save_calibration
+from blast_env.particles.parquet import read_parquet
+from blast_env.report.study import front_layouts
+from blast_env.site import Scenario, load_scenario, save_scenario
+from blast_env.site.scene import Charge
 from studies.pack_agent import league_result
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
-from tests.importing.maps import Places, charge, outline, rectangle, written
-from tests.scenario.documents import full_document
+from tests.io.importing.maps import Places, charge, outline, rectangle, written
+from tests.site.documents import full_document
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,11 @@ from blast_env.app.jobs import jobs_of
 from blast_env.app.session import Sessions
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.free_field import FreeFieldRun, FreeFieldStudy
 from blast_env.files import FolderStore, is_temporary
-from blast_env.fitting.free_field import FreeFieldRun, FreeFieldStudy
 from blast_env.journal import Journal
-from blast_env.scenario import load_scenario, save_scenario, write_layout
+from blast_env.layout import write_layout
+from blast_env.site import load_scenario, save_scenario
 from tests.agents.league_cases import road_scenario
 from tests.agents.training_runs import (
     hyperparameters,
@@ -39,7 +40,7 @@ from tests.agents.training_runs import (
     small_scenario,
 )
 from tests.app.here import Here
-from tests.reporting.sites import LAYOUT, small_hut
+from tests.report.sites import LAYOUT, small_hut
 
 _STEPS: Final = ("os.rename", "os.mkdir", "os.remove", "open")
 _WRITING: Final = os.O_WRONLY | os.O_RDWR

@@ -12,8 +12,9 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.importing import ImportOptions, import_site
-from blast_env.scenario import LayoutFile, load_scenario
+from blast_env.io.importing import ImportOptions, import_site
+from blast_env.layout import LayoutFile
+from blast_env.site import load_scenario
 
 _REPAIR: Final = ImportOptions(repair=True)
 _DRAWING: Final = ImportOptions(units="m", buildings_from=("B",), charges_from=("S",))

@@ -13,11 +13,11 @@ import blast_env
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import fit_power_law, kingery_bulmash, load_calibration
 from blast_env.cli import app
-from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import evaluate_layout
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import write_atomically
-from blast_env.scenario import Scenario, ScenarioError, save_scenario
+from blast_env.site import Scenario, ScenarioError, save_scenario
 from tests.scenarios import BALLISTIC_COURTYARD
 
 ENORMOUS = 10**400

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.free_field import FreeFieldRun
 from blast_env.files import FolderStore, is_temporary, write_atomically
-from blast_env.fitting.free_field import FreeFieldRun
 from blast_env.journal import Journal
 from tests.attack.disks import file_size_limit
 from tests.attack.writers import WRITERS
@@ -41,7 +41,7 @@ def test_what_was_there_outlives_a_full_device(
     # Drawings and reports say when they were made, in as many bytes as the moment needs.
     monkeypatch.setattr("ezdxf.options.write_fixed_meta_data_for_testing", True)
     then = SimpleNamespace(now=lambda zone: datetime(2026, 1, 1, tzinfo=zone))
-    monkeypatch.setattr("blast_env.reporting.page.datetime", then)
+    monkeypatch.setattr("blast_env.report.page.datetime", then)
     path = tmp_path / name
     WRITERS[name](path)
     size = path.stat().st_size

@@ -29,8 +29,8 @@ from blast_env.app.guard import HEADERS, MOST_BYTES, Entrance
 from blast_env.app.plan import PixelView, plan_svg
 from blast_env.app.server import MOST_PAGES
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario, load_scenario
-from tests.scenario.documents import full_document
+from blast_env.site import Scenario, load_scenario
+from tests.site.documents import full_document
 
 Attempt = tuple[str, Callable[[], str]]
 """What is tried, and the function that tries it."""

@@ -12,18 +12,19 @@ from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.run_folder import RunConfiguration
 from matplotlib.figure import Figure
 
-from blast_env.calibration.model import load_calibration, save_calibration
-from blast_env.engines import Blast, BlastResult
 from blast_env.evaluation import LayoutEvaluation, evaluate_layout
-from blast_env.export import LayoutPlan, export_layout
+from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.files import scratch_folder
-from blast_env.rendering.figures import save_figure
-from blast_env.rendering.film import write_film
-from blast_env.reporting.page import write_report
-from blast_env.scenario import save_scenario, write_layout
+from blast_env.io.export import LayoutPlan, export_layout
+from blast_env.layout import write_layout
+from blast_env.particles.calibration.model import load_calibration, save_calibration
+from blast_env.plots.figures import save_figure
+from blast_env.plots.film import write_film
+from blast_env.report.page import write_report
+from blast_env.site import save_scenario
 from blast_env.tables import write_csv
 from tests.agents.training_runs import hyperparameters, settings
-from tests.rendering.scenes import LAYOUT, small_blast
+from tests.plots.scenes import LAYOUT, small_blast
 
 Writer = Callable[[Path], Any]
 
@@ -74,7 +75,7 @@ def _checkpoint(path: Path) -> None:
 
 def _report(html: Path, pdf: Path | None = None, words: int = 600) -> None:
     """Write a page that says little: what it says costs blasts."""
-    with patch("blast_env.reporting.page.report_html", lambda *_: "<p>" + "words " * words):
+    with patch("blast_env.report.page.report_html", lambda *_: "<p>" + "words " * words):
         write_report(Mock(), html, pdf, [])
 
 

@@ -4,8 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blast_agents.search import LayoutProblem
-from blast_agents.search.advice import (
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.cli import app
+from blast_env.design.search import LayoutProblem
+from blast_env.design.search.advice import (
     AdviceVerdict,
     MeasureKind,
     advise,
@@ -14,19 +19,14 @@ from blast_agents.search.advice import (
     kinds_for,
     only,
 )
-from matplotlib.figure import Figure
-from typer.testing import CliRunner
-
-import blast_env
-from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case
 from blast_env.geometry import Layout, Measure, standing
-from blast_env.physics.scene import Charge
-from blast_env.rendering.cost_level import PricedDamage, cheapest
-from blast_env.scenario import Placement, load_layout
+from blast_env.layout import Placement, load_layout
+from blast_env.plots.cost_level import PricedDamage, cheapest
+from blast_env.site.scene import Charge
 from tests.evaluation.test_response_objective import THREAT
-from tests.scenario.test_hardening import glazed_yard
+from tests.site.test_hardening import glazed_yard
 
 
 def run(*words: str | Path) -> str:
@@ -112,7 +112,7 @@ def test_rings_are_the_points_of_their_layouts_where_both_have_the_same_cells(
         shown.append(arguments[1])
         return Figure()
 
-    monkeypatch.setattr("blast_env.rendering.cost_level.cost_level_figure", keep)
+    monkeypatch.setattr("blast_env.plots.cost_level.cost_level_figure", keep)
     for measure in ("damage", "glazing"):
         site = tmp_path / f"{measure}.toml"
         blast_env.save_scenario(glazed_yard(charges="mean", measure=measure), site)
@@ -140,7 +140,7 @@ def test_what_a_judge_fails_is_searched_for_again_with_a_margin(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The judge is stricter than the search: it wants more glass, or a wall, than would do."""
-    monkeypatch.setattr("blast_agents.search.advice._MARGIN", 0.05)
+    monkeypatch.setattr("blast_env.design.search.advice._MARGIN", 0.05)
     scenario = glazed_yard(target="medium")
     problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
     once = advise(problem, MeasureKind.TOGETHER, 12)

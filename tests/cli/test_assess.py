@@ -10,7 +10,7 @@ import blast_env
 from blast_env.cli import app
 from blast_env.cli.options import wanted_level
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from tests.gas_sites import WALL, glazed_hut
 
 

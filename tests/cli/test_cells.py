@@ -9,8 +9,8 @@ from blast_agents.training.run_folder import RunFolder
 from typer.testing import CliRunner, Result
 
 from blast_env.cli import app
-from blast_env.engines.gas import GasEngine
-from blast_env.scenario import save_scenario
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.site import save_scenario
 from tests.gas_sites import glazed_hut, hut
 
 COARSE = 0.5

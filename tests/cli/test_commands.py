@@ -14,10 +14,10 @@ from typer.testing import CliRunner, Result
 
 import blast_env
 from blast_env import load_scenario, save_scenario, simulate
-from blast_env.calibration.model import load_calibration
 from blast_env.cli import app
-from blast_env.physics.pymunk.engine import PymunkRun
-from blast_env.rendering import film
+from blast_env.particles.calibration.model import load_calibration
+from blast_env.particles.pymunk.engine import PymunkRun
+from blast_env.plots import film
 from tests.scenarios import BALLISTIC_COURTYARD
 
 COMMANDS = (

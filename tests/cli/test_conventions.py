@@ -18,13 +18,13 @@ from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.cli.command import LazyCommand
 from blast_env.cli.output import ResultTable
-from blast_env.engines import ENGINE_NAMES, find_engine
-from blast_env.physics.event.engine import EventRun
-from blast_env.physics.pymunk.engine import PymunkRun
-from blast_env.scenario import LayoutFile, load_layout
+from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
+from blast_env.layout import LayoutFile, load_layout
+from blast_env.particles.event.engine import EventRun
+from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.sites import Visibility, visibility_layout
-from tests.agents.search_cases import small_scenario
 from tests.agents.training_runs import scenario_file
+from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut
 
 NARROW = 80

@@ -11,8 +11,8 @@ from typer.testing import CliRunner, Result
 from blast_env import Charge, load_scenario, save_scenario
 from blast_env.cli import app
 from blast_env.evaluation import evaluate_layout
-from blast_env.physics.event.engine import EventRun
-from blast_env.scenario import PointSource
+from blast_env.particles.event.engine import EventRun
+from blast_env.site import PointSource
 from tests.envs.small import small_scenario
 
 CELLS = [(9, 0), (10, 0), (11, 0)]

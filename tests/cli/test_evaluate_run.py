@@ -13,14 +13,9 @@ from typer.testing import CliRunner, Result
 from blast_env import load_scenario
 from blast_env.cli import app
 from blast_env.evaluation import SeedRange, draw_threats, evaluate_layout
-from blast_env.export import SUFFIXES
-from blast_env.scenario import (
-    LayoutFile,
-    PointSource,
-    load_layout,
-    save_scenario,
-    write_layout,
-)
+from blast_env.io.export import SUFFIXES
+from blast_env.layout import LayoutFile, load_layout, write_layout
+from blast_env.site import PointSource, save_scenario
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 CELLS = ((1, 0), (2, 0))

@@ -10,8 +10,9 @@ from typer.testing import CliRunner, Result
 
 import blast_env
 from blast_env.cli import app
-from blast_env.rendering import pressure_film
-from blast_env.scenario import Scenario, save_scenario, write_layout
+from blast_env.layout import write_layout
+from blast_env.plots import pressure_film
+from blast_env.site import Scenario, save_scenario
 from tests.gas_sites import WALL, hut
 
 

@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from blast_env.cli import app
-from blast_env.scenario import load_scenario
-from tests.importing.maps import BLOCK
+from blast_env.site import load_scenario
+from tests.io.importing.maps import BLOCK
 
 
 def run(*arguments: str | Path) -> tuple[int, str, str]:

@@ -7,7 +7,7 @@ from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, write_layout
 from blast_env.cli import app
-from blast_env.scenario import load_layout
+from blast_env.layout import load_layout
 
 CELLS = [(9, 0), (10, 0), (11, 0)]
 

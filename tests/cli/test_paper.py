@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from blast_env.cli import app
-from blast_env.fitting.paper import LINEAR, comparison_table
+from blast_env.particles.paper import LINEAR, comparison_table
 
 
 def run(*arguments: str) -> Result:

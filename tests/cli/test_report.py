@@ -6,8 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from blast_env.cli import app
-from blast_env.scenario import save_scenario, write_layout
-from tests.reporting.sites import LAYOUT, small_hut
+from blast_env.layout import write_layout
+from blast_env.site import save_scenario
+from tests.report.sites import LAYOUT, small_hut
 
 
 @pytest.fixture

@@ -7,19 +7,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from blast_agents.search import LayoutProblem, find_proposer
-from blast_agents.surrogate import packaged_surrogate, search_by
 from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
+from blast_env.design.search import LayoutProblem, find_proposer
+from blast_env.design.surrogate import packaged_surrogate, search_by
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import practice_hidden, practice_visible
-from blast_env.physics.event.engine import EventRun
-from blast_env.physics.scene import Charge
-from blast_env.scenario import LayoutFile, SegmentSource, load_layout
-from tests.agents.search_cases import small_scenario
+from blast_env.layout import LayoutFile, load_layout
+from blast_env.particles.event.engine import EventRun
+from blast_env.site import SegmentSource
+from blast_env.site.scene import Charge
 from tests.agents.test_self_labelling import wide_yard
+from tests.design.search_cases import small_scenario
 
 CHARGE = Charge((5.0, 20.5), 100.0)
 
@@ -177,7 +178,7 @@ def test_bad_input_is_one_clear_message(
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "blast_agents.search.operators", raising=False)
+    monkeypatch.delitem(sys.modules, "blast_env.design.search.operators", raising=False)
     monkeypatch.setitem(sys.modules, "pymoo.algorithms.soo.nonconvex.ga", None)
     result = search("--budget", 4)
     assert result.exit_code == 2

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from blast_env import save_scenario
-from tests.reporting.sites import small_hut
+from tests.report.sites import small_hut
 
 SLOW = ("matplotlib", "numba", "pandas", "pyarrow", "pymunk", "scipy", "torch", "xlsxwriter")
 """What takes a tenth of a second or more to import."""

@@ -364,7 +364,7 @@ NOT_RUN: Final[dict[str, str]] = {
     " --stochastic": "needs RL Zoo",
     "python -m studies.benchmark play": "needs Optuna, Nevergrad and BoTorch",
     "blast-env judge --method my_module:climb --secret 'a text that the judge keeps' --sites 8"
-    " --out entry": "my_module is a placeholder; tests/problems runs such a method",
+    " --out entry": "my_module is a placeholder; tests/benchmark runs such a method",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
 }
 """Commands that are parsed only, and why."""

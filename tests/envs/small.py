@@ -7,13 +7,13 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils.env_checker import data_equivalence
 
-from blast_env.engines.particles import EventEngine, ParticleEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ScenarioSource
-from blast_env.physics.engine import BlastRun
-from blast_env.physics.particles import Balls, CollisionType
-from blast_env.physics.scene import Scene
-from blast_env.scenario import Scenario, load_scenario
+from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
+from blast_env.particles.run import BlastRun
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.balls import Balls, CollisionType
+from blast_env.site.scene import Scene
 
 # Whatever the bundled scenarios use: other parameters would have no calibration.
 _MODEL = load_scenario("courtyard")

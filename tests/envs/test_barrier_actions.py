@@ -14,10 +14,11 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout
-from blast_env.scenario import Placement, Scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario
 from tests.catalogue_sites import WALL, yard
 from tests.envs.small import make, play, same, small_scenario
-from tests.scenario.test_hardening import glazed_yard
+from tests.site.test_hardening import glazed_yard
 
 BY_CHOICE = ["item_then_place", "item_then_block"]
 KEEP_OUT = {"corner_m": (7.0, 6.0), "reason": "hydrant"}

@@ -8,7 +8,7 @@ import pytest
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
-from blast_env.scenario import ScenarioError
+from blast_env.site import ScenarioError
 from tests.envs.small import ThinEngine, make, small_scenario
 
 

@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_agents
 
 from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_env, barrier_id
-from blast_env.scenario import bundled_scenarios, load_scenario
+from blast_env.site import bundled_scenarios, load_scenario
 from tests.envs.small import make
 from tests.gas_sites import hut
 

@@ -11,7 +11,8 @@ from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.scenario import Placement, Scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario
 from blast_env.units import PA_PER_PSI
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 

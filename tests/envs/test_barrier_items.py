@@ -12,7 +12,7 @@ from blast_env.envs.observations import FeaturesObservation, GridObservation, Ob
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
-from blast_env.scenario import Placement
+from blast_env.layout import Placement
 from tests.catalogue_sites import ITEMS, WALL, item, yard
 
 

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from blast_env.errors import LayoutError
-from blast_env.scenario import (
-    BuildZone,
-    Placement,
-    Scenario,
-    bundled_scenarios,
-    check_layout,
-    load_scenario,
-)
+from blast_env.layout import Placement, check_layout
+from blast_env.site import BuildZone, Scenario, bundled_scenarios, load_scenario
 from tests.envs.small import make, restricted_scenario, small_scenario
 
 SCENARIOS = {

@@ -144,7 +144,7 @@ def test_the_map_of_a_hidden_charge_does_not_depend_on_the_charges_drawn() -> No
 
 
 def test_the_window_shows_placing_and_the_blast(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blast_env.rendering.window.pygame.time.Clock", _HurriedClock)
+    monkeypatch.setattr("blast_env.plots.window.pygame.time.Clock", _HurriedClock)
     env = make(render_mode="human")
     env.reset(seed=1)
     screen = pygame.display.get_surface()

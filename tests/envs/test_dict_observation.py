@@ -10,7 +10,7 @@ from stable_baselines3 import PPO
 
 from blast_env.envs.observations import FeaturesObservation, ImageObservation
 from blast_env.errors import UnknownNameError
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from tests.catalogue_sites import yard
 from tests.envs.small import make, play, same, small_scenario
 from tests.vehicle_sites import gate_site

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.envs.observations import FeaturesObservation
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from tests.envs.small import make, restricted_scenario, small_document, small_scenario
 
 CELLS = 40

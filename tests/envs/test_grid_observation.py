@@ -9,7 +9,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation, GridWithLoadObservation
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from tests.envs import small
 from tests.envs.small import ThinEngine, restricted_scenario, small_document, small_scenario
 

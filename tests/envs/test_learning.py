@@ -9,13 +9,13 @@ import torch
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
-from blast_env.engines import BlastLoads, StructureLoad
 from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.evaluation.engines import BlastLoads, StructureLoad
 from blast_env.geometry import Element
-from blast_env.scenario import AnyCharge, Scenario
-from blast_env.scenario.build_scene import charge_against
-from tests.engines.shade import ShadeEngine
+from blast_env.layout.build_scene import charge_against
+from blast_env.site import AnyCharge, Scenario
 from tests.envs.small import small_document
+from tests.evaluation.engines.shade import ShadeEngine
 
 STEPS = 2 * 2048
 HELD_OUT = range(10_000, 10_048)

@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from tests.envs.small import ThinEngine, make, play, same, small_document, small_scenario
 
 FINISH = 40

@@ -15,7 +15,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from tests.envs.small import make
 from tests.gas_sites import WALL, hut
-from tests.rendering.test_side_by_side import frames_of
+from tests.plots.test_side_by_side import frames_of
 
 pytestmark = pytest.mark.slow
 

@@ -13,11 +13,11 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_agents
 
 import blast_env
-from blast_env.engines import BlastResult
 from blast_env.envs import FOR_GAS
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.scenario import Scenario, ScenarioError
+from blast_env.evaluation.engines import BlastResult
+from blast_env.site import Scenario, ScenarioError
 from tests.envs.spawned import digest_in_process, watch
 from tests.scenarios import BALLISTIC_COURTYARD
 

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 import blast_env
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import ScenarioError
+from blast_env.site import ScenarioError
 from tests.gas_sites import WALL, hut
 
 HUT = hut()

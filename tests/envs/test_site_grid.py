@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from blast_env.envs.observations import SiteGrid
 from blast_env.geometry import Rectangle
-from blast_env.scenario import AnySource, PointSource, RectangleSource, SegmentSource, Site
+from blast_env.site import AnySource, PointSource, RectangleSource, SegmentSource, Site
 
 GRID = SiteGrid.of(Site(width_m=10.0, height_m=6.0))
 across = st.floats(0.5, 9.5)

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.simulator_env import BlastSimulatorEnv
-from blast_env.scenario import Scenario, save_scenario
+from blast_env.site import Scenario, save_scenario
 from blast_env.sites import SiteSource
 from tests.envs.small import ThinEngine, play, same, small_scenario
 from tests.libraries.ids import IDS, arguments

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from blast_env import Charge
-from blast_env.calibration.model import scenario_calibration
-from blast_env.engines.particles import EventEngine, ParticleEngine, PymunkEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads
+from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine, PymunkEngine
 from blast_env.evaluation.store import (
     BlastKey,
     LoadsCache,
     calibration_digest,
     engine_text,
 )
-from blast_env.physics.engine import BlastRun
-from blast_env.physics.scene import Scene
+from blast_env.particles.calibration.model import scenario_calibration
+from blast_env.particles.run import BlastRun
+from blast_env.site.scene import Scene
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
 
 

@@ -11,7 +11,7 @@ from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, practice_hidden
-from blast_env.scenario import PointSource, Scenario
+from blast_env.site import PointSource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk
 from tests.evaluation.cases import COURTYARD, SEEDS
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from blast_env.engines.gas import NOT_KNOWN, GasBlast, GasEngine
 from blast_env.evaluation.consequences import Consequences, bay_table, consequences
-from blast_env.physics.scene import Charge
-from blast_env.reporting.loads import measure, targets_of
+from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine
+from blast_env.report.loads import measure, targets_of
+from blast_env.site.scene import Charge
 from tests.gas_sites import glazed_hut, hut
 
 CUT, WHOLE = GasEngine(border_m=0.0, until=0.012), GasEngine(border_m=0.0, until="walls")

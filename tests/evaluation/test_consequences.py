@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.engines import simulate
-from blast_env.engines.gas import GasEngine
 from blast_env.evaluation.consequences import (
     BuildingResponse,
     Consequences,
@@ -18,11 +16,13 @@ from blast_env.evaluation.consequences import (
     side_on_impulse_pa_s,
     side_on_peak_pa,
 )
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.facade import peak_factor, respond, sharpened
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 from tests.catalogue_sites import ITEMS, WALL, yard_document
 
 FACADE = {"storey_m": 2.5, "bay_m": 1.5, "glazing": "window_laminated_6", "wall": "concrete_200"}

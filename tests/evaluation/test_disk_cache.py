@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from blast_env import Charge
-from blast_env.engines import find_engine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -25,6 +24,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_layout,
 )
+from blast_env.evaluation.engines import find_engine
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
 from tests.gas_sites import hut
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from blast_env import Charge, simulate
-from blast_env.engines.particles import PARTICLES_OVERRATE
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -17,7 +16,8 @@ from blast_env.evaluation import (
     evaluate_against,
     evaluate_layout,
 )
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines.particles import PARTICLES_OVERRATE
+from blast_env.site import Scenario
 from tests.evaluation.cases import (
     BEHIND_SHADOW,
     COURTYARD,

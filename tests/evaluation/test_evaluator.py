@@ -10,13 +10,13 @@ import pytest
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import CalibrationError
 from blast_env.calibration import model as stored_module
-from blast_env.engines.particles import EventEngine, ParticleEngine
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
+from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
 from blast_env.geometry import Cell
-from blast_env.physics.engine import BlastRun
-from blast_env.physics.scene import Scene
-from blast_env.scenario import Scenario, ScenarioError
+from blast_env.particles.run import BlastRun
+from blast_env.site import Scenario, ScenarioError
+from blast_env.site.scene import Scene
 from tests.evaluation.cases import COURTYARD, FEW, THREATS, WALL
 from tests.scenarios import BALLISTIC_COURTYARD
 

@@ -5,8 +5,8 @@ import pytest
 
 from blast_env.evaluation.consequences import BuildingResponse
 from blast_env.evaluation.governing import Severity, governing
-from blast_env.physics.scene import Charge
 from blast_env.response.facade import respond
+from blast_env.site.scene import Charge
 from tests.gas_sites import glazed_hut, hut
 
 

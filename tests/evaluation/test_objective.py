@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from blast_agents.search import LayoutProblem
 
 from blast_env.cli.evaluation_report import print_means
+from blast_env.design.search import LayoutProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats, evaluate_against
-from blast_env.physics.scene import Charge
-from blast_env.scenario import ObjectiveSection, Scenario, ScenarioError
+from blast_env.site import ObjectiveSection, Scenario, ScenarioError
+from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, WorstRisk
 from blast_env.units import PA_PER_PSI
 from tests.gas_sites import WALL, hut, site_document

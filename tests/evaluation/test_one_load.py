@@ -12,12 +12,12 @@ import pytest
 
 from blast_env.app.blasts import building_loads, gas_loads
 from blast_env.app.records import BlastRecord, EngineRecord, LoadJudge
-from blast_env.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.engines.oblique_walls import stepped_buildings
 from blast_env.evaluation import BlastEvaluator, Threat, evaluate_layout
-from blast_env.physics.scene import Charge
-from blast_env.reporting.loads import measure, targets_of
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.engines.oblique_walls import stepped_buildings
+from blast_env.report.loads import measure, targets_of
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
 from tests.gas_sites import site_document
 
 CHARGE = Charge((2.0, 4.0), 5.0)

@@ -5,20 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from blast_agents.search import LayoutProblem, find_proposer
-from blast_agents.surrogate.engine import SurrogateEngine
 
-from blast_env.engines import find_engine
+from blast_env.design.search import LayoutProblem, find_proposer
+from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat, evaluate_against
+from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Measure
-from blast_env.physics.scene import Charge
+from blast_env.layout import Placement
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import peak_factor, respond, sharpened
-from blast_env.scenario import Placement
+from blast_env.site.scene import Charge
 from tests.catalogue_sites import WALL
-from tests.scenario.test_hardening import TAKEN, glazed_yard
+from tests.site.test_hardening import TAKEN, glazed_yard
 
 THREAT = Threat(Charge((2.0, 6.0), 5.0), 0)
 DAMAGE = glazed_yard(charges="mean")

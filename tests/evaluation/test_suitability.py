@@ -5,7 +5,7 @@ import pytest
 from blast_env import load_scenario
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.suitability import suitability
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from tests.gas_sites import hut
 from tests.vehicle_sites import gate_site
 

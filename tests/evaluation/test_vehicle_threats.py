@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from blast_env.engines import simulate
-from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -17,9 +15,11 @@ from blast_env.evaluation import (
     evaluate_layout,
 )
 from blast_env.evaluation.cases import practice_hidden
-from blast_env.physics.scene import Charge
-from blast_env.scenario import VehicleCharge
-from blast_env.scenario.build_scene import build_site, worst_places
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.layout.build_scene import build_site, worst_places
+from blast_env.site import VehicleCharge
+from blast_env.site.scene import Charge
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of
 
 SITE = gate_site(vehicle_document(places=2), calibration="ballistic_kb_100kg")

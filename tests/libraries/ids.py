@@ -8,8 +8,8 @@ import gymnasium as gym
 
 import blast_env  # noqa: F401  # registers the environments
 from blast_env.bundled import REAL_SIZE
-from blast_env.engines.gas import GasEngine
 from blast_env.envs import FOR_GAS, barrier_id
+from blast_env.evaluation.engines.gas import GasEngine
 from tests.envs.small import ThinEngine
 from tests.gas_sites import hut
 

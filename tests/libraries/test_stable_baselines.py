@@ -5,14 +5,14 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from blast_agents.surrogate import SurrogateEngine
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import obs_as_tensor
 
-from blast_env.scenario import Scenario
-from tests.agents.test_surrogate import by_hand
+from blast_env.design.surrogate import SurrogateEngine
+from blast_env.site import Scenario
 from tests.catalogue_sites import ITEMS
+from tests.design.test_surrogate import by_hand
 from tests.libraries.ids import BARRIER_IDS, IDS, OTHERS, arguments
 from tests.office_park import office_park
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 ROWS, COLUMNS = 8, 6
 

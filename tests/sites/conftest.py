@@ -2,7 +2,7 @@
 
 import pytest
 
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.sites import generate_site
 
 

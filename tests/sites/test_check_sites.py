@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from blast_agents.rules import random_layout
 
-from blast_env.scenario import Placement, Scenario
+from blast_env.design.rules import random_layout
+from blast_env.layout import Placement
+from blast_env.site import Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
 from studies.check_sites import (
     MeasuredSite,

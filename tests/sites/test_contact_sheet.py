@@ -7,8 +7,8 @@ import pytest
 from matplotlib.patches import FancyArrowPatch, PathPatch
 
 from blast_env.errors import BlastEnvError
-from blast_env.rendering.figures import save_figure
-from blast_env.scenario import RectangleSource, Scenario, load_scenario
+from blast_env.plots.figures import save_figure
+from blast_env.site import RectangleSource, Scenario, load_scenario
 from studies.check_sites import contact_sheet
 
 

@@ -17,8 +17,9 @@ from blast_env.calibration import load_calibration
 from blast_env.envs.observations import FeaturesObservation, GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.scenario import Placement, Scenario, SegmentSource
-from blast_env.scenario.zone import distance_m, source_bounds_m
+from blast_env.layout import Placement
+from blast_env.site import Scenario, SegmentSource
+from blast_env.site.zone import distance_m, source_bounds_m
 from blast_env.sites import Objection, SiteRanges, VisibilityCriterion, draw_site, generate_site
 
 RANGES = SiteRanges()

@@ -12,8 +12,9 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.geometry import Piece, Rectangle
-from blast_env.scenario import Placement, Scenario
-from blast_env.scenario.build_scene import worst_places
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import worst_places
+from blast_env.site import Scenario
 from blast_env.sites import (
     FAMILIES,
     HELD_OUT_SITES,

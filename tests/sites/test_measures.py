@@ -5,9 +5,10 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from blast_env.scenario import Placement, Scenario, usable_cells
+from blast_env.layout import Placement, usable_cells
+from blast_env.site import Scenario
 from blast_env.sites import SiteMeasures, Visibility, visibility_layout
-from tests.scenario.test_removable import fenced
+from tests.site.test_removable import fenced
 from tests.sites.cases import yard
 
 SMALL = {"corner_m": (9.0, 9.0), "rows": 3, "columns": 2}

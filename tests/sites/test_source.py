@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.sites import HELD_OUT_SITES, SiteRanges, SiteSource, generate_site
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from blast_env.scenario import Scenario, bundled_scenarios, load_scenario, usable_cells
+from blast_env.layout import usable_cells
+from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.sites import Visibility, generate_site, turned
-from tests.scenario.documents import full_document, tall_document
+from tests.site.documents import full_document, tall_document
 
 WITH_ZONE = ("courtyard", "perimeter_gate", "street_junction")
 

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Placement, Scenario, load_scenario
+from blast_env.layout import Placement
+from blast_env.site import Scenario, load_scenario
 from blast_env.sites import Visibility, visibility_layout
 from tests.sites.cases import COLUMNS, ROWS, block, yard, yard_document
 

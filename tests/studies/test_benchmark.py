@@ -2,7 +2,7 @@
 
 from typer.testing import CliRunner
 
-from blast_env.problems import DEFINITIONS
+from blast_env.benchmark import DEFINITIONS
 from studies.benchmark.__main__ import app
 
 

@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from blast_env import load_scenario
-from blast_env.engines.gas import GasBlast
-from blast_env.physics.scene import Charge
-from blast_env.recording.parquet import read_frame, write_table
+from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.particles.parquet import read_frame, write_table
+from blast_env.site.scene import Charge
 from studies import blast_again
 from studies.blast_table import COLUMNS
 

@@ -9,10 +9,10 @@ import typer
 from blast_agents.training import train
 from typer.testing import CliRunner
 
-from blast_env.engines.gas import GasEngine
 from blast_env.evaluation import BlastEvaluator, DiskCache, draw_threats
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece
-from blast_env.scenario import save_scenario
+from blast_env.site import save_scenario
 from studies import blast_table
 from tests.agents.test_self_labelling import own, run_settings
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 from blast_agents.league.entries import RandomLayout
-from blast_agents.search import ProposerKind, proposers
 
+from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import SeedRange
-from blast_env.export import SUFFIXES
-from blast_env.scenario import Placement, save_scenario
+from blast_env.io.export import SUFFIXES
+from blast_env.layout import Placement
+from blast_env.site import save_scenario
 from studies.demo import AGENT, AgentComparison, DemoSettings, clear, demonstrate
 from tests.agents.league_cases import TRAINING, result, standings
 from tests.agents.test_self_labelling import SMALL, wide_yard

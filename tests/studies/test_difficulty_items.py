@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario
-from blast_env.engines.gas import GasEngine
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Placement, Scenario, VehicleCharge
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.layout import Placement
+from blast_env.site import Scenario, VehicleCharge
 from studies.difficulty.__main__ import elsewhere_text, item_rows, joint_rows, with_items
 from studies.difficulty.figure import items_figure
 from studies.difficulty.items import (

@@ -5,12 +5,12 @@ from math import cbrt
 import numpy as np
 import pytest
 
-from blast_env.engines.gas import GasBlast, GasEngine
 from blast_env.errors import BlastEnvError
-from blast_env.physics.engine import EndReason
-from blast_env.physics.gas.source import TNT
-from blast_env.scenario import Scenario, load_scenario
-from blast_env.scenario.build_scene import draw_charge
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.gas.source import TNT
+from blast_env.layout.build_scene import draw_charge
+from blast_env.particles.run import EndReason
+from blast_env.site import Scenario, load_scenario
 from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending, sites

@@ -3,8 +3,8 @@
 import pandas as pd
 import pytest
 
-from blast_env.fitting.free_field import free_field
-from blast_env.scenario import load_scenario
+from blast_env.evaluation.free_field import free_field
+from blast_env.site import load_scenario
 from studies.hopkinson_cranz import HEADERS, law_rows
 
 

@@ -6,9 +6,10 @@ And the test of a beam that the response is held against.
 import pytest
 
 from blast_env.bundled import REAL_SIZE
-from blast_env.engines import find_engine
+from blast_env.evaluation.engines import find_engine
+from blast_env.layout import Placement, load_layout
 from blast_env.response.walls import DamageLevel
-from blast_env.scenario import Placement, load_layout, load_scenario
+from blast_env.site import load_scenario
 from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_response
 from studies.response_sites import FOUND, OLDER, SITES, glazed, reaches, site_charges
 

@@ -23,7 +23,7 @@ from studies.difficulty.__main__ import (
 from studies.difficulty.figure import difficulty_figure
 from studies.difficulty.study import RULES, DifficultyStudy, Effort, TaskResult, WayOutcome
 from studies.difficulty.verdict import difficulty_criteria
-from tests.agents.search_cases import ballistic
+from tests.design.search_cases import ballistic
 
 REPOSITORY = Path(__file__).parents[2]
 SMALL = Effort(

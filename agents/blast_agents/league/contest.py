@@ -12,13 +12,13 @@ from blast_agents.league.entries import NO_BARRIER, LeagueEntry
 from blast_agents.league.standings import Result, Standings
 from blast_agents.league.store import ResultStore, evaluation_key, search_key
 from blast_agents.league.tracks import Track, practice_of
-from blast_agents.search import LayoutProblem, Proposal, SearchResult, timed_proposal
-from blast_env.engines import Engine, find_engine
+from blast_env.design.search import LayoutProblem, Proposal, SearchResult, timed_proposal
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, BlastMeter, BudgetError, Case, Objective
+from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.geometry import Layout
+from blast_env.layout import check_layout
 from blast_env.runner import as_completed, check_workers
-from blast_env.scenario import check_layout
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from blast_agents.rules import random_layout
-from blast_agents.search import (
+from blast_env.design.rules import random_layout
+from blast_env.design.search import (
     LayoutProblem,
     Proposer,
     ProposerKind,
@@ -13,10 +13,10 @@ from blast_agents.search import (
     SearchResult,
     find_proposer,
 )
-from blast_agents.search.registry import proposers
-from blast_env.engines.contract import load_plugin
+from blast_env.design.search.registry import proposers
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario
+from blast_env.evaluation.engines.contract import load_plugin
+from blast_env.site import Scenario
 from blast_env.values import generator
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from blast_agents.league.entries import NO_TRAINING
 from blast_agents.league.standings import Result, Standings
-from blast_env.plan import INK, QUIET_INK
-from blast_env.rendering.site_plan import write_heading
-from blast_env.rendering.style import count_of, render_extra, unit_interval
+from blast_env.plots.plan import INK, QUIET_INK
+from blast_env.plots.site_plan import write_heading
+from blast_env.plots.style import count_of, render_extra, unit_interval
 
 with render_extra():
     from matplotlib.axes import Axes

@@ -10,15 +10,15 @@ import pandas as pd
 
 from blast_agents.league.figure import league_figure
 from blast_agents.league.standings import Result, Standings, verdicts
-from blast_agents.search import Proposal
 from blast_env.arrays import FloatArray
+from blast_env.design.search import Proposal
 from blast_env.evaluation import Case
 from blast_env.files import write_atomically
 from blast_env.geometry import layout_text
+from blast_env.layout.build_scene import charge_against
+from blast_env.plots.figures import save_figure
+from blast_env.plots.style import count_of
 from blast_env.provenance import package_version
-from blast_env.rendering.figures import save_figure
-from blast_env.rendering.style import count_of
-from blast_env.scenario.build_scene import charge_against
 from blast_env.statistics import reductions
 from blast_env.tables import markdown_table, write_csv
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from blast_agents.league.entries import LeagueEntry, search_name
 from blast_agents.league.tracks import Track
-from blast_agents.search import Proposal, ProposerKind
 from blast_env.arrays import FloatArray
+from blast_env.design.search import Proposal, ProposerKind
 from blast_env.evaluation.comparison import Comparison, check_something_arrives
 from blast_env.statistics import CVAR_LEVEL, Estimate, conditional_value_at_risk, reductions
 

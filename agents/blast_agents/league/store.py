@@ -13,18 +13,19 @@ from typing import Annotated, Final
 
 from pydantic import Field, TypeAdapter
 
-import blast_agents
 from blast_agents.league.entries import LeagueEntry
 from blast_agents.league.tracks import practice_of
-from blast_agents.search import Proposal
+from blast_env import design
+from blast_env.design.search import Proposal
 from blast_env.documents import checked_as, parse_json
-from blast_env.engines import Engine, find_engine
 from blast_env.evaluation import Case, Threat
+from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.store import calibration_digest, engine_text
 from blast_env.files import FolderStore
 from blast_env.geometry import Layout
+from blast_env.layout import check_layout
 from blast_env.provenance import code_version, versions
-from blast_env.scenario import AnyCharge, AnyScenario, VehicleCharge, check_layout
+from blast_env.site import AnyCharge, AnyScenario, VehicleCharge
 
 _PACKAGES: Final = ("numpy", "pymoo")
 """Packages of the random numbers of searches."""
@@ -153,9 +154,9 @@ def _search_code(own: Path) -> str:
     """Return a digest of the code of a search, with versions.
 
     Args:
-        own: The folder of its method, for methods outside `blast_agents.search`.
+        own: The folder of its method, for methods outside `blast_env.design.search`.
     """
-    folder = Path(blast_agents.__file__).parent
+    folder = Path(design.__file__).parent
     paths = sorted((folder / "search").glob("*.py"))
     if own != folder / "search":
         paths += sorted(own.glob("*.py"))

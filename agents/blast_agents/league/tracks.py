@@ -19,14 +19,14 @@ from blast_env.evaluation.cases import (
     practice_visible,
     visible_case,
 )
-from blast_env.scenario import (
+from blast_env.layout.build_scene import draw_threat
+from blast_env.site import (
     AnyScenario,
     Scenario,
     bundled_scenarios,
     find_scenario,
     load_scenario,
 )
-from blast_env.scenario.build_scene import draw_threat
 from blast_env.sites import FAMILIES, ITEM_SITES, LARGE_SITES, SITES, SiteSource
 from blast_env.values import whole_number
 

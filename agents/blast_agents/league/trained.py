@@ -6,12 +6,12 @@ from pathlib import Path
 
 from blast_agents.league.entries import LeagueEntry, Training
 from blast_agents.league.tracks import Track
-from blast_agents.search import ProposerKind
-from blast_agents.surrogate import LearntSearch, Surrogate, search_by
 from blast_agents.training import TrainedAgent, load_agent
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
+from blast_env.design.search import ProposerKind
+from blast_env.design.surrogate import LearntSearch, Surrogate, search_by
 from blast_env.errors import BlastEnvError
 from blast_env.sites import FAMILIES
 

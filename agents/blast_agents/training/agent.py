@@ -26,7 +26,6 @@ from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy, 
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import CommonHyperparameters, schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
-from blast_env.engines import Engine
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import (
     OBSERVATIONS,
@@ -41,16 +40,12 @@ from blast_env.envs.observations import (
 )
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
-from blast_env.scenario import (
-    AnyCharge,
-    AnyScenario,
-    Placement,
-    Scenario,
-    find_scenario,
-)
-from blast_env.scenario.vehicles import source_of
+from blast_env.layout import Placement
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site.vehicles import source_of
 
 Model = PPO | MaskablePPO
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy

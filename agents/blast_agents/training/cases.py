@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blast_agents.search import LayoutAgent
 from blast_agents.training.run_folder import TrainingSettings
+from blast_env.design.search import LayoutAgent
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, Evaluators, SeedRange, Threat, compare, draw_threats
 from blast_env.evaluation.cases import in_turn
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
 from blast_env.sites.generate import AnyRanges
 from blast_env.statistics import Estimate

@@ -14,14 +14,14 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration
-from blast_env.engines import Engine
 from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.observations import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators
+from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.store import BlastCache, LoadsCache
 from blast_env.runner import workers_told
-from blast_env.scenario import bundled_scenarios
+from blast_env.site import bundled_scenarios
 from blast_env.sites import FAMILIES
 from blast_env.values import checked_seed, whole_number
 

@@ -16,7 +16,7 @@ from blast_env.documents import checked_as, parse_json, read_text
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, training_sites
 
 WEIGHTS: Final = Path(__file__).parents[1] / "weights"

@@ -12,15 +12,15 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
 
-from blast_agents.surrogate.engine import is_surrogate
 from blast_agents.training.agent import Model, TrainedAgent
 from blast_agents.training.cases import Selection
 from blast_agents.training.checkpoint import Checkpoint, Counters
 from blast_agents.training.hyperparameters import ALGORITHM_NAMES
 from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunConfiguration, RunFolder
-from blast_env.rendering.site_plan import write_heading
-from blast_env.rendering.style import number_on_axis, render_extra
-from blast_env.scenario import Scenario
+from blast_env.design.surrogate.engine import is_surrogate
+from blast_env.plots.site_plan import write_heading
+from blast_env.plots.style import number_on_axis, render_extra
+from blast_env.site import Scenario
 
 with render_extra():
     from matplotlib.axes import Axes

@@ -12,7 +12,6 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from blast_agents.surrogate.engine import engine_to_train_on, is_surrogate
 from blast_agents.training.hyperparameters import (
     ALGORITHMS,
     SELF_LABELLING,
@@ -20,6 +19,7 @@ from blast_agents.training.hyperparameters import (
     Hyperparameters,
     SelfLabellingHyperparameters,
 )
+from blast_env.design.surrogate.engine import engine_to_train_on, is_surrogate
 from blast_env.documents import (
     DocumentError,
     checked_as,
@@ -28,13 +28,13 @@ from blast_env.documents import (
     parse_json,
     read_text,
 )
-from blast_env.engines import JUDGE, Engine, find_engine
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import SINGLE_ARRAYS
 from blast_env.errors import BlastEnvError, value_text
+from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.files import is_temporary, make_folder, sync, write_atomically
 from blast_env.provenance import versions
-from blast_env.scenario import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.tables import cell_text
 
 CONFIGURATION_FORMAT: Final = 1

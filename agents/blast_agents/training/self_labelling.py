@@ -26,23 +26,23 @@ from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.utils import set_random_seed
 from torch import Tensor
 
-from blast_agents.search import layouts_by_rule
-from blast_agents.search.moves import Moves, legal_part
 from blast_agents.training.agent import Policy, TrainedAgent, as_tensor, policy_for
 from blast_agents.training.cases import Selection, training_cases
 from blast_agents.training.checkpoint import CaseLabel, Checkpoint
 from blast_agents.training.hyperparameters import schedule
 from blast_agents.training.recorder import evaluate
 from blast_agents.training.run_folder import RolloutRow, RunConfiguration, RunFolder
+from blast_env.design.search import layouts_by_rule
+from blast_env.design.search.moves import Moves, legal_part
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import BlastAsked
 from blast_env.evaluation.store import DiskCache, LoadsCache
 from blast_env.geometry import Layout
-from blast_env.physics.scene import Charge
-from blast_env.scenario import Placement
-from blast_env.scenario.vehicles import source_of
+from blast_env.layout import Placement
+from blast_env.site.scene import Charge
+from blast_env.site.vehicles import source_of
 from blast_env.statistics import reductions
 
 

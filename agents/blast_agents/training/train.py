@@ -25,8 +25,8 @@ from blast_agents.training.self_labelling import SelfLabelling
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
-from blast_env.rendering.figures import save_figure
-from blast_env.scenario import Scenario
+from blast_env.plots.figures import save_figure
+from blast_env.site import Scenario
 from blast_env.sites import FAMILIES
 
 

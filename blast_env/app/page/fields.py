@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 from blast_env.app.edits import Document, SiteThing, ThingKind, section_of
-from blast_env.physics.scene import WALLS
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
+from blast_env.site.scene import WALLS
 
 Form = Literal["number", "integer", "text", "switch", "walls", "side", "glazing", "wall"]
 

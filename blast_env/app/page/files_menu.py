@@ -13,12 +13,12 @@ from blast_env.app.session import Session
 from blast_env.app.sources import layout_of_file
 from blast_env.app.work import ReportChoice
 from blast_env.errors import BlastEnvError
-from blast_env.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.files import scratch_folder
-from blast_env.physics.gas.settings import Cells
+from blast_env.gas.settings import Cells
+from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 _CELLS: Final[dict[tuple[Cells, Cells], str]] = {
     (0.5, 0.25): "0.5 and 0.25 m: with the error of the cells",
@@ -149,7 +149,7 @@ class ReportDialog:
             ui.label(f"Report on layout {SLOTS[session.design.active]}: {kind}").style(
                 "font-weight: 600"
             )
-            from blast_env.reporting import final_cells  # needs an extra
+            from blast_env.report import final_cells  # needs an extra
 
             cells = final_cells(session.scenario)
             self._cells = ui.select(_CELLS, value=cells, label="cells of gas dynamics")

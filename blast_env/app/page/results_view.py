@@ -16,7 +16,7 @@ from blast_env.app.records import (
 )
 from blast_env.app.session import BARE, Session, Shown
 from blast_env.app.threats import NamedThreat
-from blast_env.scenario import ObjectiveSection
+from blast_env.site import ObjectiveSection
 
 _FILM: Final = "film"
 _GAUGES: Final = "gauges"

@@ -8,7 +8,7 @@ from blast_env.app.page.numbers import NumberField
 from blast_env.app.page.uploads import complain, site_upload
 from blast_env.app.session import Sessions
 from blast_env.errors import BlastEnvError
-from blast_env.scenario import Scenario, bundled_scenarios, load_scenario
+from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.sites import generate_site
 
 _MOST_SHOWN = 30

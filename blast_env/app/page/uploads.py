@@ -14,10 +14,10 @@ from blast_env.app.page.numbers import NumberField
 from blast_env.app.sources import MAPS, SITES, imported_site, is_map, site_of_file
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
-from blast_env.importing.convert import ImportedSite
-from blast_env.importing.options import ImportOptions
+from blast_env.io.importing.convert import ImportedSite
+from blast_env.io.importing.options import ImportOptions
 from blast_env.reading import Reading
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 from blast_env.values import plain_number
 
 Read = TypeVar("Read")

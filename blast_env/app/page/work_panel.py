@@ -22,7 +22,7 @@ from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.scenario import Scenario
+from blast_env.site import Scenario
 
 _ENGINES: Final = {
     "gas 0.25": (

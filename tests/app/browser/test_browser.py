@@ -28,7 +28,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from blast_env.app.plan import PixelView
-from blast_env.scenario import Scenario, load_scenario, save_scenario
+from blast_env.site import Scenario, load_scenario, save_scenario
 from tests.office_park import office_park
 
 WIDTH, HEIGHT = 1280, 800

@@ -1,0 +1,50 @@
+"""A fixed, versioned set of problems: `make`, `evaluate`, `play`, `judge`, and the standings."""
+
+from blast_env.benchmark.definitions import (
+    BUDGETS,
+    DEFINITIONS,
+    SEEDS,
+    SMALL,
+    Definition,
+    secret_sites,
+)
+from blast_env.benchmark.judging import (
+    JUDGE_CELL_M,
+    JudgedRun,
+    JudgedSubmission,
+    judge,
+    shipped_standings,
+)
+from blast_env.benchmark.problem import BenchmarkProblem, Evaluated, make
+from blast_env.benchmark.references import KnownLayout, ScoreReference, stored_references
+from blast_env.benchmark.space import LayoutSpace
+from blast_env.benchmark.standings import standings_page, standings_tables
+from blast_env.benchmark.submissions import Asked, Method, Run, Submission, play
+
+__all__ = [
+    "BUDGETS",
+    "DEFINITIONS",
+    "JUDGE_CELL_M",
+    "SEEDS",
+    "SMALL",
+    "Asked",
+    "BenchmarkProblem",
+    "Definition",
+    "Evaluated",
+    "JudgedRun",
+    "JudgedSubmission",
+    "KnownLayout",
+    "LayoutSpace",
+    "Method",
+    "Run",
+    "ScoreReference",
+    "Submission",
+    "judge",
+    "make",
+    "play",
+    "secret_sites",
+    "shipped_standings",
+    "standings_page",
+    "standings_tables",
+    "stored_references",
+]

@@ -1,0 +1,192 @@
+"""The benchmark problems by name and version."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from hashlib import sha256
+from types import MappingProxyType
+from typing import Final, Literal
+
+from blast_env.bundled import ITEM_SITES
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import (
+    one_of_each_charge,
+    practice_hidden,
+    practice_visible,
+    visible_case,
+)
+from blast_env.layout.build_scene import draw_threat
+from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
+from blast_env.sites import FAMILIES, generate_site
+
+Family = Literal["told", "hidden", "vehicle", "unseen", "response"]
+
+BUDGETS: Final = (0, 50, 200, 1000)
+"""Gas blasts that a method may spend on a problem."""
+
+SEEDS: Final = 10
+"""Runs of a stochastic method, seeds 0 to 9."""
+
+_PRACTICE_CHARGES: Final = 4
+"""Places of a hidden charge in `evaluate`, unless the site has fewer."""
+
+_JUDGED_CHARGES: Final = 4
+"""Further places of a hidden charge, for the judge."""
+
+_JUDGED_UNSEEN: Final = 2
+"""The same per unseen site: additional sites carry more information than additional places."""
+
+_DRAWS: Final = 16
+"""Draws that find every place where the site has only a few."""
+
+_GENERATED: Final = "site_"
+"""Prefix of the names of generated sites, before the seed."""
+
+_SECRET_BITS: Final = 62
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Definition of a problem. It never changes; a changed problem is a new version.
+
+    Attributes:
+        site: Bundled name, or `site_SEED` for a generated site with heights and a catalogue.
+        family: Knowledge of the charge.
+        place: Number of the site's charge in the family `told`, from 1.
+        version: Version; 1 had the sum of positive phases as load.
+    """
+
+    site: str
+    family: Family
+    place: int = 1
+    version: int = 2
+
+    @property
+    def name(self) -> str:
+        """Name, such as `control_room-told-v2`; with another place, `control_room-told_2-v2`."""
+        place = "" if self.place == 1 else f"_{self.place}"
+        return f"{self.site}-{self.family}{place}-v{self.version}"
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The site."""
+        if self.site.startswith(_GENERATED):
+            return generate_site(int(self.site.removeprefix(_GENERATED)), FAMILIES[ITEM_SITES])
+        return load_scenario(self.site)
+
+    @cached_property
+    def case(self) -> Case:
+        """The case of the judge; its `practice` is the case of `evaluate`.
+
+        Both have the same charge in the family `told`. Otherwise each draws a few charges, at
+        different places unless the site has only a few places.
+        """
+        case = self._told() if self.family == "told" else self._hidden()
+        return replace(case, name=self.name)
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of site, charges and budgets, 16 hexadecimal digits."""
+        practice = self.case.practice
+        assert practice is not None
+        says = {
+            "name": self.name,
+            "scenario": self.scenario.content_hash,
+            "budgets": BUDGETS,
+            "judged": [_charge(each) for each in self.case.threats],
+            "practice": [_charge(each) for each in practice.threats],
+        }
+        return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
+
+    def _told(self) -> Case:
+        scenario, seed = self.scenario, SeedRange.JUDGEMENT.seeds(0, 1)[0]
+        source = scenario.charge[self.place - 1]
+        alone = scenario.model_copy(update={"charge": (source,)})
+        charge = draw_threat(alone, seed)
+        judged = visible_case(scenario, charge, [seed])
+        return replace(judged, practice=practice_visible(scenario, charge, 1, 0))
+
+    def _hidden(self) -> Case:
+        scenario = self.scenario
+        few = all(isinstance(each, PointSource) for each in scenario.charge) or bool(
+            scenario.vehicles
+        )
+        own = _JUDGED_UNSEEN if self.family == "unseen" else _JUDGED_CHARGES
+        judged, met = (_DRAWS, _DRAWS) if few else (own, _PRACTICE_CHARGES)
+        threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, judged))
+        practice = practice_hidden(scenario, met, 1, 0)
+        practice = replace(practice, threats=one_of_each_charge(practice.threats))
+        return Case(scenario, one_of_each_charge(threats), practice=practice)
+
+
+def _charge(threat: Threat) -> object:
+    charge = threat.charge
+    if isinstance(charge, VehicleCharge):
+        return charge.source.model_dump(mode="json"), charge.rank
+    return charge._asdict()
+
+
+_STREETS: Final = ("control_room", "school_and_clinic", "visitor_entrance")
+_OPEN: Final = ("courtyard", "perimeter_gate", "street_junction")
+_PUBLIC_VEHICLES: Final = (5103,)
+_PUBLIC_SITES: Final = range(6100, 6108)
+"""Seeds of the family `unseen`; a judge draws further sites with `secret_sites`."""
+
+_FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
+
+
+def _definitions() -> tuple[Definition, ...]:
+    return (
+        *(Definition(site, "told", place) for site in _STREETS for place in (1, 2, 3)),
+        *(Definition(site, "told") for site in _OPEN),
+        *(Definition(site, "hidden") for site in _STREETS),
+        *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
+        *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
+        *(Definition(f"{_GENERATED}{seed}", "unseen") for seed in _PUBLIC_SITES),
+        *(Definition(site, "response") for site in _FACADES),
+    )
+
+
+DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
+    {each.name: each for each in _definitions()}
+)
+"""All public problems by name."""
+
+SMALL: Final = ("visitor_entrance-told_2-v2", "control_room-told-v2", "school_and_clinic-told-v2")
+"""A few problems with one blast per layout, for a first look and for methods with many seeds."""
+
+
+def find_definition(name: str) -> Definition:
+    """Return a problem's definition.
+
+    Raises:
+        UnknownNameError: If there is no such problem; the message names the nearest one.
+    """
+    if name not in DEFINITIONS:
+        raise UnknownNameError("problem", name, DEFINITIONS)
+    return DEFINITIONS[name]
+
+
+@cache
+def secret_sites(secret: str, count: int) -> tuple[Definition, ...]:
+    """Return problems on generated sites that cannot be drawn without the secret.
+
+    Args:
+        secret: A text that the judge keeps; the same text gives the same sites.
+        count: Number of sites, at least 1.
+
+    Raises:
+        BlastEnvError: If the secret is shorter than 8 characters, or the count is below 1.
+    """
+    if len(secret) < 8:
+        raise BlastEnvError(f"secret has {len(secret)} characters, must have at least 8")
+    if count < 1:
+        raise BlastEnvError(f"sites is {count}, must be at least 1")
+    seeds = []
+    for index in range(count):
+        drawn = sha256(f"{secret}/{index}".encode()).digest()
+        # Beyond the seeds of training and of the public problems.
+        seeds.append(2**_SECRET_BITS + int.from_bytes(drawn, "big") % 2**_SECRET_BITS)
+    return tuple(Definition(f"{_GENERATED}{seed}", "unseen") for seed in seeds)

@@ -1,0 +1,247 @@
+"""Replay of submissions by gas dynamics, and scores from the best rule to the best known layout."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, ClassVar, Final, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
+from blast_env.benchmark.problem import shares_of
+from blast_env.benchmark.references import (
+    ScoreReference,
+    Share,
+    cell_key,
+    engine_key,
+    stored_references,
+)
+from blast_env.benchmark.submissions import MOST_RUNS, Run, Submission, read_runs, write_runs
+from blast_env.documents import checked_as, parse_json
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastCache, BlastEvaluator
+from blast_env.evaluation.engines import JUDGE, Engine, find_engine
+from blast_env.statistics import Estimate, stratified_estimate
+
+JUDGE_CELL_M: Final = 0.25
+"""Side of the judge's cells, m."""
+
+FORMAT: Final = "blast-env judged 1"
+
+_SAME: Final = 1e-9
+"""Tolerance within which shares are equal."""
+
+
+@dataclass(frozen=True)
+class JudgedRun(Run):
+    """A replayed run; further attributes as in `Run`.
+
+    Attributes:
+        share: Share of the load without a barrier that remains.
+        rule: The same for the best rule: score 0.
+        best: The same for the best known layout: score 1.
+    """
+
+    share: Share
+    rule: Share
+    best: Share
+
+    @property
+    def score(self) -> float:
+        """Score: 0 for the best rule or worse, 1 for the best known layout, above 1 if better."""
+        gain = self.rule - self.share
+        if self.rule - self.best < _SAME:
+            return 1.0 if gain > -_SAME else 0.0
+        return max(gain / (self.rule - self.best), 0.0)
+
+
+@dataclass(frozen=True)
+class JudgedSubmission:
+    """A replayed submission; the table of standings is made from files of these.
+
+    Attributes:
+        method: Name in the table.
+        cell_m: Side of the judge's cells, m.
+        engine: Version of the judge's engine.
+        runs: The submitted runs with the shares of the load that remain.
+        note: As submitted.
+        format: Format of the file.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    method: str
+    cell_m: Annotated[float, Field(gt=0.0)]
+    engine: str
+    runs: Annotated[tuple[JudgedRun, ...], Field(min_length=1, max_length=MOST_RUNS)]
+    note: str = ""
+    format: Literal["blast-env judged 1"] = FORMAT
+
+    @classmethod
+    def load(cls, path: str | Path) -> "JudgedSubmission":
+        """Read a file.
+
+        Raises:
+            BlastEnvError: If it cannot be read or has another format.
+        """
+        try:
+            return checked_as(cls, read_runs(path))
+        except BlastEnvError as error:
+            raise BlastEnvError(f"{path}: {error}") from error
+
+    def save(self, path: str | Path) -> Path:
+        """Write the file, one run per line.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        return write_runs(path, self)
+
+    @property
+    def submission(self) -> Submission:
+        """The submission without its shares, for another judgement."""
+        runs = (
+            Run(each.problem, each.budget, each.seed, each.blasts, each.layout)
+            for each in self.runs
+        )
+        return Submission(self.method, tuple(runs), self.note)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """The problems of the submission."""
+        return tuple(dict.fromkeys(run.problem for run in self.runs))
+
+    def score(self, budget: int) -> Estimate:
+        """Return the mean score with a budget over the problems of the submission.
+
+        Each problem uses its largest submitted budget up to this one, and scores 0 if there is
+        none. The 95 % interval covers the variation of the mean over the seeds of the runs.
+        """
+        return self._mean({budget: 1.0})
+
+    def area(self) -> Estimate:
+        """Return the area under the score over the logarithm of the blasts."""
+        return self._mean(BUDGET_WEIGHTS)
+
+    def _mean(self, of_budgets: Mapping[int, float]) -> Estimate:
+        """Return the mean score over budgets with weights."""
+        groups = []
+        for name in self.problems:
+            weights: dict[int, float] = defaultdict(float)
+            for budget, weight in of_budgets.items():
+                weights[self._spent(name, budget)] += weight
+            for budget, weight in weights.items():
+                groups.append((weight / len(self.problems), self._scores(name, budget) or [0.0]))
+        return stratified_estimate(groups)
+
+    def _spent(self, problem: str, budget: int) -> int:
+        """Return the largest submitted budget up to this one; -1 if there is none."""
+        entered = {run.budget for run in self.runs if run.problem == problem}
+        return max((each for each in entered if each <= budget), default=-1)
+
+    def _scores(self, problem: str, budget: int) -> list[float]:
+        spent = self._spent(problem, budget)
+        return [run.score for run in self.runs if run.problem == problem and run.budget == spent]
+
+
+def _budget_weights() -> dict[int, float]:
+    """Return the weight of each budget: trapezoids over the logarithm of 1 + blasts."""
+    places = np.log1p(np.array(BUDGETS, dtype=np.float64))
+    widths = np.diff(places)
+    weights = 0.5 * (np.append(widths, 0.0) + np.append(0.0, widths)) / places[-1]
+    return {budget: float(weight) for budget, weight in zip(BUDGETS, weights, strict=True)}
+
+
+BUDGET_WEIGHTS: Final[Mapping[int, float]] = _budget_weights()
+"""Weights of the budgets in the area; their sum is 1."""
+
+
+def judge(
+    submission: Submission,
+    cell_m: float | None = JUDGE_CELL_M,
+    processes: int = 1,
+    cache: str | Path | BlastCache | None = None,
+    engine: str | Engine = JUDGE,
+    definitions: Mapping[str, Definition] = DEFINITIONS,
+    references: Mapping[str, ScoreReference] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> JudgedSubmission:
+    """Replay a submission by gas dynamics.
+
+    Equal layouts run once. The best rule and the best known layout run with the same cells, unless
+    their shares with these cells and this version of the engine are stored.
+
+    Args:
+        submission: The layouts.
+        cell_m: Side of the cells, m; `None` for the engine's default.
+        processes: Number of worker processes; it has no effect on the result.
+        cache: Folder or cache in which blasts are kept for the next call.
+        engine: Another engine than gas dynamics, for tests.
+        definitions: The problems by name.
+        references: References of the scores by problem; the stored ones unless given.
+        progress: Called with the completed share, 0 to 1.
+
+    Raises:
+        BlastEnvError: As `Submission.check`, or if a problem has no reference.
+    """
+    submission.check(definitions)
+    known = stored_references() if references is None else references
+    found = find_engine(engine, cell_m)
+    by_problem: dict[str, list[Run]] = defaultdict(list)
+    for run in submission.runs:
+        by_problem[run.problem].append(run)
+    judged: list[JudgedRun] = []
+    for index, (name, runs) in enumerate(by_problem.items()):
+        if name not in known:
+            raise BlastEnvError(
+                f"{name}: has no best rule and no best known layout to compare with"
+            )
+        evaluator = BlastEvaluator(definitions[name].scenario, found, cache=cache)
+        judged += _judged(definitions[name], runs, known[name], evaluator, cell_m, processes)
+        if progress is not None:
+            progress((index + 1) / len(by_problem))
+    return JudgedSubmission(
+        submission.method,
+        0.5 if cell_m is None else cell_m,
+        found.version,
+        tuple(judged),
+        submission.note,
+    )
+
+
+def _judged(
+    definition: Definition,
+    runs: Sequence[Run],
+    reference: ScoreReference,
+    evaluator: BlastEvaluator,
+    cell_m: float | None,
+    processes: int,
+) -> Iterator[JudgedRun]:
+    cell = "" if cell_m is None else cell_key(cell_m)
+    stored = {
+        each.layout: each.shares[cell]
+        for each in (reference.rule, reference.best)
+        if cell in each.shares and engine_key(evaluator.engine) == reference.engine
+    }
+    wanted = (reference.rule.layout, reference.best.layout, *(run.layout for run in runs))
+    layouts = [each for each in dict.fromkeys(wanted) if each not in stored]
+    found = shares_of(definition.case, layouts, evaluator, processes)
+    shares = dict(zip(layouts, found, strict=True)) | stored
+    rule, best = (shares[each.layout] for each in (reference.rule, reference.best))
+    for run in runs:
+        yield JudgedRun(**vars(run), share=shares[run.layout], rule=rule, best=best)
+
+
+def shipped_standings() -> tuple[JudgedSubmission, ...]:
+    """Return the bundled judged submissions."""
+    folder = files("blast_env.benchmark").joinpath("data/standings")
+    if not folder.is_dir():
+        return ()
+    found = (each for each in folder.iterdir() if each.name.endswith(".json"))
+    return tuple(
+        checked_as(JudgedSubmission, parse_json(each.read_text("utf-8")))
+        for each in sorted(found, key=lambda each: each.name)
+    )

@@ -1,0 +1,72 @@
+"""The methods of the package on the problems of the benchmark."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from blast_env.benchmark import BenchmarkProblem, Definition, KnownLayout, Method, ScoreReference
+from blast_env.benchmark.problem import shares_of
+from blast_env.benchmark.references import engine_key
+from blast_env.design.search import LayoutProblem, Proposer, find_proposer, layouts_by_rule
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.engines.contract import load_plugin
+from blast_env.geometry import Layout
+
+
+def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
+    """Return the layout of a proposer, within the budget of a problem."""
+    asked = LayoutProblem(problem.evaluator, problem.case, meter=problem.meter)
+    result = proposer.propose(asked, problem.budget, seed)
+    if result.interrupted:
+        raise KeyboardInterrupt
+    return result.layout
+
+
+def method_of(proposer: Proposer) -> Method:
+    """Return a proposer as a method for benchmark problems."""
+    return partial(_proposed, proposer)
+
+
+def find_method(name: str) -> Method:
+    """Return a method by the name of a proposer, or by `module:object`.
+
+    Raises:
+        UnknownNameError: If the proposer is unknown.
+        BlastEnvError: If the module or object does not exist or is not callable.
+    """
+    if ":" not in name:
+        return method_of(find_proposer(name))
+    try:
+        found = load_plugin(name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise BlastEnvError(f"method is {name!r}: {error}") from error
+    if not callable(found):
+        raise BlastEnvError(f"method is {name!r}, must be something to call")
+    method: Callable[[BenchmarkProblem, int], Layout] = found
+    return method
+
+
+def reference_of(
+    definition: Definition, evaluator: BlastEvaluator, more: Mapping[str, Layout], cell: str
+) -> ScoreReference:
+    """Return the reference layouts of a problem's score: the best rule and the best known layout.
+
+    Args:
+        definition: The problem.
+        evaluator: Runs the blasts of the comparison.
+        more: Further known layouts, by the name of their source.
+        cell: Side of the evaluator's cells; see `cell_key`.
+    """
+    rules = layouts_by_rule(definition.scenario, definition.case.charge)
+    rules = {name: tuple(sorted(layout)) for name, layout in rules.items()}
+    names = [*rules, *more]
+    layouts = [*rules.values(), *more.values()]
+    shares = dict(zip(names, shares_of(definition.case, layouts, evaluator), strict=True))
+    rule, best = min(rules, key=shares.__getitem__), min(shares, key=shares.__getitem__)
+    known = dict(zip(names, layouts, strict=True))
+    return ScoreReference(
+        definition.digest,
+        engine_key(evaluator.engine),
+        {name: shares[name] for name in rules},
+        *(KnownLayout(each, known[each], {cell: shares[each]}) for each in (rule, best)),
+    )

@@ -1,0 +1,254 @@
+"""The interface of a problem for optimisers: layouts as vectors or lists, blasts counted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from blast_env.benchmark.definitions import BUDGETS, SEEDS, Definition, find_definition
+from blast_env.benchmark.references import ScoreReference, stored_references
+from blast_env.benchmark.space import LayoutSpace
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import (
+    BlastCache,
+    BlastEvaluator,
+    BlastMeter,
+    BudgetError,
+    Case,
+    Threat,
+)
+from blast_env.evaluation.engines import JUDGE, Engine, find_engine
+from blast_env.geometry import Element, Layout
+from blast_env.layout import check_layout
+from blast_env.site import Scenario
+from blast_env.values import whole_number
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """An evaluated layout.
+
+    Attributes:
+        layout: Its cells or pieces, sorted.
+        share: Share of the load without a barrier that remains; less is better.
+        threats: Number of threats, counted from the first.
+        blasts: Blasts spent up to and including this evaluation.
+    """
+
+    layout: Layout
+    share: float
+    threats: int
+    blasts: int
+
+
+@dataclass(eq=False)
+class BenchmarkProblem:
+    """A problem of the benchmark with a budget of gas blasts; see `make`.
+
+    Attributes:
+        definition: Definition of the problem.
+        budget: Most blasts of `evaluate`.
+        engine: Engine of the blasts.
+        cache: Folder or cache of blasts; a cached blast takes no time, but counts all the same.
+        meter: Counts the blasts: distinct pairs of layout and threat.
+        history: Every evaluated layout, in order.
+
+    Raises:
+        BlastEnvError: If the budget is no whole number from 0 to the largest of `BUDGETS`.
+    """
+
+    definition: Definition
+    budget: int
+    engine: Engine
+    cache: str | Path | BlastCache | None = None
+    meter: BlastMeter = field(init=False)
+    history: list[Evaluated] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        whole_number("budget", self.budget, 0, BUDGETS[-1])
+        self.meter = BlastMeter(self.budget)
+
+    @property
+    def name(self) -> str:
+        """Name with family and version."""
+        return self.definition.name
+
+    @property
+    def family(self) -> str:
+        """The family: `told`, `hidden`, `vehicle`, `unseen` or `response`."""
+        return self.definition.family
+
+    @property
+    def budgets(self) -> tuple[int, ...]:
+        """The budgets that count for the score."""
+        return BUDGETS
+
+    @property
+    def seeds(self) -> range:
+        """The seeds of the runs of a stochastic method."""
+        return range(SEEDS)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The site."""
+        return self.definition.scenario
+
+    @property
+    def case(self) -> Case:
+        """The case of `evaluate`; methods may use all of it, including the charges."""
+        practice = self.definition.case.practice
+        assert practice is not None
+        return practice
+
+    @property
+    def reference(self) -> ScoreReference | None:
+        """The best rule and the best known layout; `None` for a site of `secret_sites`."""
+        return stored_references().get(self.name)
+
+    @cached_property
+    def space(self) -> LayoutSpace:
+        """The layouts as vectors."""
+        return LayoutSpace(self.scenario)
+
+    @cached_property
+    def evaluator(self) -> BlastEvaluator:
+        """The evaluator, which runs and caches the blasts."""
+        most = self.budget + len(self.case.threats)
+        return BlastEvaluator(self.scenario, self.engine, cache_size=most, cache=self.cache)
+
+    @property
+    def blasts(self) -> int:
+        """Blasts spent."""
+        return self.meter.blasts
+
+    @property
+    def blasts_left(self) -> int:
+        """Blasts that remain in the budget."""
+        return self.budget - self.meter.blasts
+
+    @property
+    def best(self) -> Evaluated | None:
+        """The best of the layouts evaluated with most threats; `None` before the first."""
+        return min(self.history, key=lambda each: (-each.threats, each.share), default=None)
+
+    def check(self, layout: Sequence[Element]) -> tuple[str, ...]:
+        """Return the reasons why a layout is illegal, one sentence each; none if it is legal.
+
+        Raises:
+            LayoutError: If it is not a list of cells or pieces.
+        """
+        return self.space.reasons_against(layout)
+
+    def evaluate(self, layout: Sequence[Element], threats: int | None = None) -> float:
+        """Return the share of the load without a barrier that remains with a layout.
+
+        It spends one blast per threat, except for pairs of layout and threat that were evaluated
+        before. Blasts without a barrier are free. Where the response of facades counts, the share
+        is that of the response; measures that harden a facade take no further blast.
+
+        Args:
+            layout: (row, column) of each module, or pieces (row, column, item, turned).
+            threats: Number of the problem's threats, from the first; they are ordered far from
+                each other, so that a few represent all. All of them unless given.
+
+        Returns:
+            The objective, to be minimised; 1 without a barrier.
+
+        Raises:
+            BudgetError: If the blasts exceed the budget.
+            LayoutError: If the layout is not legal; no blast is counted then.
+            BlastEnvError: If `threats` is not 1 to the number of threats.
+        """
+        most = len(self.case.threats)
+        count = most if threats is None else threats
+        if not 1 <= count <= most:
+            raise BlastEnvError(f"threats is {count}, must be 1 to {most}")
+        checked = tuple(sorted(check_layout(self.scenario, layout)))
+        pairs: list[tuple[Layout, Threat]] = [
+            (checked, threat) for threat in self.case.threats[:count]
+        ]
+        try:
+            self.meter.add(pairs)
+        except BudgetError:
+            raise BudgetError(
+                f"{self.name}: {count} blasts asked for, {self.blasts_left} of the budget of "
+                f"{self.budget} are left"
+            ) from None
+        met = replace(self.case, threats=self.case.threats[:count])
+        (share,) = shares_of(met, [checked], self.evaluator)
+        self.history.append(Evaluated(checked, share, count, self.blasts))
+        return share
+
+    def judged(self, layout: Sequence[Element], processes: int = 1) -> float:
+        """Return the share of the load that remains under the threats of the judge.
+
+        For reports only: methods must not call it, and its blasts are not counted.
+
+        Raises:
+            LayoutError: If the layout is not legal.
+        """
+        checked = tuple(sorted(check_layout(self.scenario, layout)))
+        (share,) = shares_of(self.definition.case, [checked], self.evaluator, processes)
+        return share
+
+
+def shares_of(
+    case: Case, layouts: Sequence[Layout], evaluator: BlastEvaluator, processes: int = 1
+) -> list[float]:
+    """Return the objective of each layout relative to that without a barrier.
+
+    Args:
+        case: The case, with its threats.
+        layouts: The layouts.
+        evaluator: Runs the blasts.
+        processes: Number of worker processes.
+
+    Raises:
+        BlastEnvError: If the objective without a barrier is 0.
+    """
+    pairs = [(layout, threat) for layout in ((), *layouts) for threat in case.threats]
+    loads = [
+        each.load(case.scenario.objective) for each in evaluator.loads_of_many(pairs, processes)
+    ]
+    of_layout = [
+        case.counted(own, layout)
+        for layout, own in zip(
+            ((), *layouts), np.reshape(loads, (-1, len(case.threats))), strict=True
+        )
+    ]
+    if not of_layout[0] > 0.0:
+        raise BlastEnvError(f"{case.name or case.scenario.name}: nothing arrives without a barrier")
+    return [load / of_layout[0] for load in of_layout[1:]]
+
+
+def make(
+    problem: str | Definition,
+    budget: int = BUDGETS[1],
+    cell_m: float | None = None,
+    engine: str | Engine = JUDGE,
+    cache: str | Path | BlastCache | None = None,
+) -> BenchmarkProblem:
+    """Return a problem of the benchmark.
+
+    Args:
+        problem: Its name, such as `control_room-told-v2`, or its definition.
+        budget: Most gas blasts.
+        cell_m: Side of the cells, m; 0.5 unless given.
+        engine: Another engine than gas dynamics, for tests.
+        cache: Folder or cache in which blasts are kept.
+
+    Raises:
+        UnknownNameError: If there is no such problem; the message names the nearest one.
+        BlastEnvError: If the digest of the definition differs from the stored one, or an argument
+            is out of bounds.
+    """
+    definition = find_definition(problem) if isinstance(problem, str) else problem
+    known = stored_references().get(definition.name)
+    if known is not None and known.digest != definition.digest:
+        raise BlastEnvError(
+            f"{definition.name}: the site or its charges have changed (digest {definition.digest}, "
+            f"must be {known.digest}): a version never changes its content"
+        )
+    return BenchmarkProblem(definition, budget, find_engine(engine, cell_m), cache)

@@ -1,0 +1,216 @@
+"""Submissions: a method's layouts, one per run, in a file for the judge."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
+from blast_env.benchmark.problem import BenchmarkProblem
+from blast_env.documents import checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.geometry import Layout
+from blast_env.journal import Journal
+from blast_env.layout import check_layout
+from blast_env.values import MOST_SEED, path_of
+
+FORMAT: Final = "blast-env submission 1"
+MOST_BYTES: Final = 20_000_000
+"""Most bytes of a file."""
+
+MOST_RUNS: Final = 10_000
+"""Most runs of a file: each problem with each budget and sixty seeds."""
+
+MOST_BLASTS: Final = BUDGETS[-1]
+"""Most blasts of a run: the largest budget of the score."""
+
+Method = Callable[[BenchmarkProblem, int], Layout]
+"""Finds a layout for a problem within its budget; the number is the random seed."""
+
+Blasts = Annotated[int, Field(ge=0, le=MOST_BLASTS)]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a method on a problem.
+
+    Attributes:
+        problem: Name of the problem.
+        budget: Most blasts of the run.
+        seed: Seed of the run.
+        blasts: Blasts spent.
+        layout: The layout found.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    problem: str
+    budget: Blasts
+    seed: Annotated[int, Field(ge=0, le=MOST_SEED)]
+    blasts: Blasts
+    layout: Layout
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """Problem, budget and seed, which identify the run within a submission."""
+        return self.problem, self.budget, self.seed
+
+
+@dataclass(frozen=True)
+class Submission:
+    """All runs of a method.
+
+    Attributes:
+        method: Name in the table.
+        runs: One per problem, budget and seed.
+        note: Settings, versions, location of the code: one line.
+        format: Format of the file.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
+    method: Annotated[str, Field(min_length=1, max_length=60)]
+    runs: Annotated[tuple[Run, ...], Field(min_length=1, max_length=MOST_RUNS)]
+    note: Annotated[str, Field(max_length=500)] = ""
+    format: Literal["blast-env submission 1"] = FORMAT
+
+    @classmethod
+    def load(
+        cls, path: str | Path, definitions: Mapping[str, Definition] = DEFINITIONS
+    ) -> "Submission":
+        """Read a file and check it.
+
+        Raises:
+            BlastEnvError: If it cannot be read or has another format, or as `check`.
+        """
+        try:
+            found = checked_as(cls, read_runs(path))
+            found.check(definitions)
+        except BlastEnvError as error:
+            raise BlastEnvError(f"{path}: {error}") from error
+        return found
+
+    def save(self, path: str | Path) -> Path:
+        """Write the file, one run per line.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        return write_runs(path, self)
+
+    def check(self, definitions: Mapping[str, Definition] = DEFINITIONS) -> None:
+        """Refuse invalid runs.
+
+        Raises:
+            BlastEnvError: If a problem is unknown, a run is there twice or exceeds its budget, or a
+                layout is illegal; the message names run and reason.
+        """
+        seen, legal = set(), set()
+        for index, run in enumerate(self.runs):
+            where = f"runs[{index}]"
+            if run.problem not in definitions:
+                raise BlastEnvError(f"{where}: there is no problem {run.problem!r}")
+            if run.key in seen:
+                raise BlastEnvError(
+                    f"{where}: {run.problem}, {run.budget}, {run.seed}: appears twice"
+                )
+            if run.blasts > run.budget:
+                raise BlastEnvError(
+                    f"{where}: {run.blasts} blasts were spent, the budget is {run.budget}"
+                )
+            seen.add(run.key)
+            if (run.problem, run.layout) in legal:
+                continue
+            try:
+                check_layout(definitions[run.problem].scenario, run.layout)
+            except BlastEnvError as error:
+                raise BlastEnvError(f"{where}: {run.problem}: {error}") from error
+            legal.add((run.problem, run.layout))
+
+
+def read_runs(path: str | Path) -> Any:
+    """Return the unchecked content of a file of runs.
+
+    Raises:
+        BlastEnvError: If it cannot be read, is not JSON, or has more than `MOST_RUNS` runs.
+    """
+    content = parse_json(read_text(path_of(path), MOST_BYTES))
+    runs = content.get("runs") if isinstance(content, dict) else None
+    if isinstance(runs, list) and len(runs) > MOST_RUNS:
+        raise BlastEnvError(f"has {len(runs):,} runs, must have at most {MOST_RUNS:,}")
+    return content
+
+
+def write_runs(path: str | Path, record: Any) -> Path:
+    """Write a dataclass with `runs` as JSON, one run per line.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    rest = {name: value for name, value in asdict(record).items() if name != "runs"}
+    lines = ",\n".join(f"    {json.dumps(asdict(run))}" for run in record.runs)
+    head = json.dumps(rest, indent=2, allow_nan=False)[:-2]
+    with write_atomically(path) as temporary:
+        temporary.write_text(f'{head},\n  "runs": [\n{lines}\n  ]\n}}\n', "utf-8")
+    return path_of(path)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The runs of a method: every problem, budget and seed.
+
+    Attributes:
+        problems: Functions that make the problems from a budget.
+        budgets: Budgets, blasts.
+        seeds: Seeds of the runs; with the budget 0 only the first is used.
+    """
+
+    problems: Sequence[Callable[[int], BenchmarkProblem]]
+    budgets: Sequence[int]
+    seeds: Sequence[int] = field(default=(0,))
+
+    def __iter__(self) -> Any:
+        """Yield (function that makes the problem, budget, seed), seed by seed."""
+        for seed in self.seeds:
+            for budget in self.budgets:
+                if budget or seed == self.seeds[0]:
+                    yield from ((make, budget, seed) for make in self.problems)
+
+
+def play(
+    method: Method,
+    asked: Iterable[tuple[Callable[[int], BenchmarkProblem], int, int]],
+    journal: Path | None = None,
+    progress: Callable[[Run], None] | None = None,
+) -> tuple[Run, ...]:
+    """Run a method on problems.
+
+    Args:
+        method: The method.
+        asked: Triples (function that makes the problem, budget, seed); see `Asked`.
+        journal: File to which each run is appended; runs that it already has are not repeated.
+        progress: Called with each run.
+
+    Raises:
+        BudgetError: If the method exceeds its budget.
+        LayoutError: If its layout is illegal.
+    """
+    kept = Journal(journal, Run) if journal is not None else None
+    found = {run.key: run for run in kept.read()} if kept else {}
+    runs = []
+    for make, budget, seed in asked:
+        problem = make(budget)
+        run = found.get((problem.name, budget, seed))
+        if run is None:
+            layout = check_layout(problem.scenario, method(problem, seed))
+            run = Run(problem.name, budget, seed, problem.blasts, tuple(sorted(layout)))
+            if kept:
+                kept.add(run)
+        runs.append(run)
+        if progress is not None:
+            progress(run)
+    return tuple(runs)

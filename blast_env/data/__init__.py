@@ -1,6 +1,0 @@
-"""The gas blasts of studies, searches and trainings, as one documented data set."""
-
-from blast_env.data.gas_blasts import COLUMNS, TABLES, as_tensors, load, sources
-from blast_env.data.published import PublishedBlasts
-
-__all__ = ["COLUMNS", "TABLES", "PublishedBlasts", "as_tensors", "load", "sources"]

@@ -1,0 +1,1 @@
+"""The choice of a layout: rules, optimisers, and the surrogate of the gas engine."""

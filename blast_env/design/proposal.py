@@ -1,0 +1,286 @@
+"""The proposals of the package for a site: `blast_env.propose` and `blast_env.search`."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from blast_env.design.search.methods import BestRuleSearch
+from blast_env.design.search.problem import LayoutProblem, Proposer, Report, SearchResult
+from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
+from blast_env.envs.episode import find_realisations
+from blast_env.errors import import_extra
+from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
+from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.geometry import Element, Layout, Removal
+from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
+from blast_env.site.scene import Charge
+from blast_env.sites import FAMILIES
+from blast_env.statistics import reductions
+
+if TYPE_CHECKING:  # half a second to import
+    from blast_env.design.surrogate.search import Guesses
+
+HIDDEN_THREATS: Final = 8
+"""Number of threats for an unknown charge."""
+
+LEAST_GAIN: Final = 0.03
+"""Least predicted relative reduction of the load by a layout; otherwise nothing is proposed."""
+
+LEAST_PIECE_GAIN: Final = 0.001
+"""Least predicted relative reduction of the load by a piece; otherwise it is omitted."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The proposer for a site.
+
+    Attributes:
+        proposer: The proposer.
+        by: Description of its basis.
+        budget: Blasts that it needs at most.
+        source: Identification of the weights, surrogate or rules, for the reproduction.
+        is_guessed: Whether predictions of the surrogate select the layout.
+    """
+
+    proposer: Proposer
+    by: str
+    budget: int
+    source: Mapping[str, str]
+    is_guessed: bool = False
+
+    def propose(
+        self,
+        problem: LayoutProblem,
+        budget: int | None = None,
+        seed: int = 0,
+        report: Report | None = None,
+    ) -> SearchResult:
+        """Return the layout, its predicted gain, and its source in `by`.
+
+        The layout is empty if the gain, by blasts or predictions, is below `LEAST_GAIN`. A layout
+        selected by predictions is compared with those of the rules: see `worth_its_pieces`. Trained
+        weights were judged on their site by gas dynamics, so predictions never replace their
+        layout by a rule's.
+
+        Args:
+            problem: The problem.
+            budget: Largest number of blasts, for proposers that need some.
+            seed: Seed of all random draws.
+            report: Called with the progress.
+
+        Raises:
+            KeyboardInterrupt: If it was interrupted: the best of some rules is not a proposal.
+        """
+        blasts = self.budget if budget is None else min(budget, self.budget)
+        result = self.proposer.propose(problem, blasts, seed, report)
+        if result.interrupted:
+            raise KeyboardInterrupt
+        layout, by = result.layout, self.by
+        gain: float | None = None
+        rules = layouts_by_rule(problem.scenario, problem.told)
+        if self.budget:  # name the rule
+            by = f"{by}: {next(name for name, each in rules.items() if each == layout)}"
+            gain = problem.reduction(result.history[-1])
+        elif problem.scenario.zone.items:
+            guesses = _guesses(problem)
+            if self.is_guessed:
+                layout = worth_its_pieces(guesses, layout, rules.values())
+            else:
+                by = f"{by}; reduction predicted by the surrogate"
+            gain = reductions(*guesses.loads([layout, ()])).item()
+        if gain is not None and not gain >= LEAST_GAIN:  # NaN: nothing arrives
+            by = (
+                f"{by}: no layout has an expected reduction of {100.0 * LEAST_GAIN:g} %, "
+                f"the best one {100.0 * gain:.1f} %"
+            )
+            layout, gain = (), 0.0
+        return replace(result, method=PackageProposer.name, by=by, layout=layout, gain=gain)
+
+
+def _guesses(problem: LayoutProblem) -> "Guesses":
+    # Imported here because the import takes half a second.
+    from blast_env.design.surrogate import packaged_surrogate
+    from blast_env.design.surrogate.search import Guesses, case_for
+
+    return Guesses.of(packaged_surrogate(), case_for(problem.scenario, problem.told))
+
+
+def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]) -> Layout:
+    """Return a layout without useless pieces, or that of a better rule.
+
+    A rule's layout with a better prediction replaces the layout. Each piece that reduces the load
+    by less than `LEAST_PIECE_GAIN` is then removed, the least useful first, as long as the rest is
+    not worse than the best rule's layout and gains `LEAST_GAIN`.
+
+    Args:
+        guesses: Predicted loads of layouts.
+        layout: The layout.
+        rules: The layouts of the rules.
+    """
+
+    def load(each: Layout) -> float:
+        return guesses.loads([each]).item()
+
+    bare, ruled = load(()), [tuple(sorted(each)) for each in rules]
+    best = min([layout, *ruled], key=load)
+    most = min(map(load, ruled), default=bare)
+    if load(best) <= (1.0 - LEAST_GAIN) * bare:
+        most = min(most, (1.0 - LEAST_GAIN) * bare)
+
+    def without(piece: Element) -> Layout:
+        return tuple(each for each in best if each != piece)
+
+    # Removed walls stay removed, because pieces may stand in their place.
+    pieces = [each for each in best if not isinstance(each, Removal)]
+    guesses.loads([without(piece) for piece in pieces])  # all at once
+    for piece in sorted(pieces, key=lambda each: load(without(each))):
+        fewer = without(piece)
+        if load(fewer) <= min(load(best) + LEAST_PIECE_GAIN * bare, most):
+            best = fewer
+    return best
+
+
+def chosen_for(problem: LayoutProblem) -> Chosen:
+    """Return the proposer of the package for a case: the first applicable one of these.
+
+    1. The bundled weights that were trained for the scenario.
+    2. The surrogate, which was fitted to generated sites, for a scenario with a catalogue. On
+       generated sites it is better than the weights trained for them.
+    3. The best rule by gas dynamics, with one blast per rule and threat.
+    """
+    scenario = problem.scenario
+    # Imported here because torch is an extra, and torch and the surrogate take seconds to import.
+    with import_extra("agents", "proposals by trained weights"):
+        from blast_agents.training.packaged import packaged_agent
+
+        from blast_env.design.surrogate import LearntSearch, packaged_surrogate, search_by
+
+    found = packaged_agent(scenario, "hidden" if problem.told is None else "visible")
+    if found is not None and found[1].scenario not in FAMILIES:
+        agent, record = found
+        weights = {"weights": record.configuration.scenario_hash[:12]}
+        return Chosen(LearntSearch(agent=agent), f"the weights of {record.scenario}", 0, weights)
+    if scenario.zone.items:
+        surrogate = packaged_surrogate()
+        known = {"surrogate": surrogate.digest}
+        return Chosen(
+            search_by(surrogate), "the surrogate of gas dynamics", 0, known, is_guessed=True
+        )
+    blasts = len(layouts_by_rule(scenario, problem.told)) * len(problem.threats)
+    rules = {"method": BestRuleSearch.name}
+    return Chosen(BestRuleSearch(), "the best rule by gas dynamics", blasts, rules)
+
+
+@dataclass(frozen=True)
+class PackageProposer:
+    """Proposes the package's best layout for a site; see `chosen_for`."""
+
+    name: str = "package"
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return the layout, with its source in `by`; only the best rule needs blasts."""
+        found = chosen_for(problem).propose(problem, budget, seed, report)
+        return replace(found, budget=budget)
+
+
+def propose(
+    scenario: AnyScenario,
+    charge: AnyCharge | None = None,
+    *,
+    processes: int = 1,
+    report: Report | None = None,
+) -> SearchResult:
+    """Return the layout that the package proposes for a site.
+
+    This takes seconds; for a scenario without a catalogue and without bundled weights it takes
+    minutes, for the blasts of all rules; see `chosen_for`.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; it has a build zone.
+        charge: The charge, if it is known; otherwise the layout is for all charges of the scenario.
+        processes: Worker processes for blasts, if any.
+        report: Called with the progress.
+
+    Returns:
+        The layout, with its source in `by`.
+
+    Raises:
+        BlastEnvError: If the scenario has no build zone or no protected structure.
+        MissingExtraError: If the extra `agents` is not installed.
+    """
+    problem = problem_of(scenario, charge, processes)
+    return chosen_for(problem).propose(problem, report=report)
+
+
+def search(
+    scenario: AnyScenario,
+    method: str = "genetic",
+    budget: int | None = None,
+    *,
+    charge: AnyCharge | None = None,
+    threats: int = 16,
+    seed: int = 0,
+    engine: str | Engine = JUDGE,
+    cache: str | Path | None = None,
+    initial: Sequence[Layout] = (),
+    processes: int = 1,
+    report: Report | None = None,
+) -> SearchResult:
+    """Search for the layout with the least load on the protected structures.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; it has a build zone.
+        method: One of `blast_env.design.search.proposers()`.
+        budget: Largest number of blasts; by default that of the method.
+        charge: The charge, if it is known; otherwise the layout is for all charges of the scenario.
+        threats: Number of threats to draw for an unknown charge.
+        seed: Seed of all random draws.
+        engine: Name of the engine, or the engine; gas dynamics by default.
+        cache: Folder of stored blasts.
+        initial: Initial layouts of the search, in addition to random ones.
+        processes: Worker processes; results do not depend on their number.
+        report: Called with the progress.
+
+    Raises:
+        UnknownNameError: If the method, scenario or engine is unknown.
+        BlastEnvError: If the scenario has no build zone, nothing arrives at the protected
+            structures, or the method is not applicable to the budget.
+    """
+    found = find_scenario(scenario)
+    evaluator = BlastEvaluator(found, engine, cache=cache)
+    if charge is None:
+        case = practice_hidden(found, threats, 1, seed)
+    else:
+        realisations = find_realisations(None, "visible", evaluator.engine)
+        case = practice_visible(found, charge, realisations, seed)
+    problem = LayoutProblem(evaluator, case, processes)
+    proposer = find_proposer(method, tuple(tuple(each) for each in initial))
+    blasts = proposer_row(method).budget if budget is None else budget
+    return proposer.propose(problem, blasts, seed, report)
+
+
+def problem_of(
+    scenario: AnyScenario,
+    charge: AnyCharge | None,
+    processes: int = 1,
+    engine: str | Engine = JUDGE,
+) -> LayoutProblem:
+    """Return the problem of a proposal and its judgement: by default gas dynamics, unseen threats.
+
+    A charge with a single possible place is known, whether it is given or not.
+    """
+    found = find_scenario(scenario)
+    only = found.charge[0]
+    if charge is None and len(found.charge) == 1 and isinstance(only, PointSource):
+        charge = Charge(only.position_m, only.tnt_kg, only.height_m)
+    first = SeedRange.JUDGEMENT.value.start
+    if charge is not None:
+        case = Case(found, (Threat(charge, first),), charge=charge)
+    else:
+        threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
+        case = Case(found, one_of_each_charge(threats))
+    return LayoutProblem(BlastEvaluator(found, engine), case, processes)

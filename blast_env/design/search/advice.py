@@ -1,0 +1,340 @@
+"""Best use of a budget by kind of measure: keep the charge away, shield, harden, or all of them.
+
+The loads depend only on the structures on the ground. Each barrier is therefore combined with its
+best choice of the other measures, and the choices are compared without further blasts.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import IntEnum, StrEnum
+from itertools import combinations
+from math import inf
+from typing import Final
+
+import numpy as np
+
+from blast_env.design.search.moves import Moves, legal_part
+from blast_env.design.search.problem import LayoutProblem
+from blast_env.design.search.registry import layouts_by_rule
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastMeter, BudgetError
+from blast_env.geometry import Layout, Measure
+from blast_env.layout import Placement
+from blast_env.layout.placement import met_by_blasts
+from blast_env.response.damage import worst
+from blast_env.site import AnyCharge, Scenario
+from blast_env.values import generator
+
+_LOW_M: Final = 1.5
+"""Items that stop vehicles and are lower than this keep them away; others shield."""
+
+_MOST_LOOKED_AT: Final = 10
+"""Largest number of measures with all choices compared; of more, only each alone and all."""
+
+_KEPT: Final = 3
+"""Number of best barriers that the search changes."""
+
+_MARGIN: Final = 0.1
+"""Required reduction of the damage after a layout failed before a judge, in damage levels."""
+
+_TOO_LITTLE: Final = 1e-9
+"""Least excess over 1 of the worth of a layout that fails."""
+
+_FEWER_SHARE: Final = 0.4
+"""Share of the changes that remove a piece, because the cheapest layout that passes is sought."""
+
+
+class AdviceVerdict(IntEnum):
+    """Verdict of a judge on a layout; larger is better.
+
+    Attributes:
+        FAILS: The layout misses the target.
+        PASSES_BARELY: It reaches the target, but not with peaks unclipped by the cell size.
+        PASSES: It reaches the target either way.
+    """
+
+    FAILS = 0
+    PASSES_BARELY = 1
+    PASSES = 2
+
+
+class MeasureKind(StrEnum):
+    """Kinds of measures."""
+
+    NOTHING = "nothing"
+    KEEP_AWAY = "keep the charge away"
+    SHIELD = "shield"
+    HARDEN = "harden"
+    TOGETHER = "together"
+
+
+@dataclass(frozen=True, order=True)
+class Tried:
+    """A layout that was assessed: a simulated barrier with some of the measures.
+
+    Attributes:
+        worth: Value of the objective with its target: at most 1 if it passes; see
+            `ObjectiveSection.counted`.
+        cost: Its cost, in the unit of the zone's budget.
+        damage: The worst damage of all components under all charges, from 0 to 5; see
+            `blast_env.response.damage`.
+        layout: The layout.
+    """
+
+    worth: float
+    cost: float
+    damage: float
+    layout: Layout
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The best layout of a kind of measures.
+
+    Attributes:
+        kind: The kind.
+        best: The cheapest layout that passes, or else the one with the least shortfall.
+        blasts: Blasts requested.
+        tried: All assessed layouts.
+    """
+
+    kind: MeasureKind
+    best: Tried
+    blasts: int
+    tried: tuple[Tried, ...] = ()
+
+    @property
+    def layout(self) -> Layout:
+        """The layout."""
+        return self.best.layout
+
+    @property
+    def worth(self) -> float:
+        """Value of the objective for the layout; at most 1 if it passes."""
+        return self.best.worth
+
+    @property
+    def passes(self) -> bool:
+        """Whether the layout reaches the target under the blasts of the search."""
+        return self.worth <= 1.0
+
+
+def kinds_for(scenario: Scenario) -> tuple[MeasureKind, ...]:
+    """Return the kinds of measures available in a scenario, `NOTHING` first."""
+    kinds = [MeasureKind.NOTHING]
+    kinds += [
+        kind for kind in (MeasureKind.KEEP_AWAY, MeasureKind.SHIELD) if _items_of(scenario, kind)
+    ]
+    kinds += [MeasureKind.HARDEN] if scenario.zone.hardening else []
+    return (*kinds, MeasureKind.TOGETHER) if len(kinds) > 2 else tuple(kinds)
+
+
+def only(scenario: Scenario, kind: MeasureKind) -> Scenario:
+    """Return the scenario restricted to one kind of measures."""
+    zone = scenario.zone
+    names = _items_of(scenario, kind)
+    items = tuple(
+        each if each.name in names else each.model_copy(update={"stock": 0}) for each in zone.items
+    )
+    hardening = zone.hardening if kind in (MeasureKind.HARDEN, MeasureKind.TOGETHER) else ()
+    removable = zone.removable if kind in (MeasureKind.SHIELD, MeasureKind.TOGETHER) else ()
+    update = {"items": items, "hardening": hardening, "removable": removable}
+    changed = zone.model_copy(update=update)
+    return scenario.model_copy(update={"build_zone": changed})
+
+
+def _items_of(scenario: Scenario, kind: MeasureKind) -> set[str]:
+    low = {
+        each.name
+        for each in scenario.zone.items
+        if each.stops_vehicles and each.height_m < _LOW_M and scenario.vehicles
+    }
+    every = {each.name for each in scenario.zone.items if each.stock > 0}
+    return {
+        MeasureKind.NOTHING: set[str](),
+        MeasureKind.KEEP_AWAY: every & low,
+        MeasureKind.SHIELD: every - low,
+        MeasureKind.HARDEN: set[str](),
+        MeasureKind.TOGETHER: every,
+    }[kind]
+
+
+def advise(
+    problem: LayoutProblem,
+    kind: MeasureKind,
+    budget: int,
+    seed: int = 0,
+    begin_with: tuple[Layout, ...] = (),
+    progress: Callable[[float], None] | None = None,
+    *,
+    damage_below: float = inf,
+) -> Advice:
+    """Return the best layout of a kind of measures.
+
+    The search starts with the rules' layouts, those against each charge alone, and parts of them.
+    It then changes the best by moving or removing pieces.
+
+    Args:
+        problem: Problem of a scenario whose objective has a target.
+        kind: The kind.
+        budget: Largest number of blasts.
+        seed: Seed of all random draws.
+        begin_with: Initial layouts, for example of other kinds.
+        progress: Called with the share of the blasts that is spent.
+        damage_below: Exclusive bound on the worst damage, for a margin to the target.
+
+    Raises:
+        BlastEnvError: If the budget does not pay for one layout under all threats.
+    """
+    if budget < len(problem.threats):
+        raise BlastEnvError(
+            f"budget is {budget} blasts, must be at least {len(problem.threats)}: one per threat"
+        )
+    scenario, rng = only(problem.scenario, kind), generator(seed)
+    meter = BlastMeter(budget)
+    metered = replace(problem, meter=meter)
+    best: dict[Layout, Tried] = {}
+    tried: list[Tried] = []
+    moves = Moves(scenario)
+
+    def drawn() -> Iterator[Layout]:
+        yield ()
+        for layout in begin_with:
+            yield met_by_blasts(layout)
+        if _items_of(scenario, kind):
+            bare = scenario.zone.model_copy(update={"hardening": ()})
+            unhardened = scenario.model_copy(update={"build_zone": bare})
+            ruled = layouts_by_rule(unhardened, problem.told)
+            yield from ruled.values()
+            yield from against_each(unhardened, problem.case.charges)
+            for layout in ruled.values():
+                yield layout[: len(layout) // 2]
+            while True:
+                ranked = sorted(best, key=lambda each: best[each])[:_KEPT]
+                chosen = ranked[int(rng.integers(len(ranked)))]
+                yield met_by_blasts(_changed(moves, chosen, rng))
+
+    tries = 0
+    try:
+        for barrier in drawn():
+            tries += 1
+            key = tuple(sorted(legal_part(scenario, barrier).layout))
+            if tries > 20 * budget:
+                break
+            if key in best:
+                continue
+            choices = _hardened(metered, scenario, key, damage_below)
+            tried += choices
+            best[key] = min(choices)
+            if progress is not None:
+                progress(meter.blasts / budget)
+    except BudgetError:
+        pass
+    return Advice(kind, min(best.values()), meter.blasts, tuple(tried))
+
+
+def advise_until(
+    judge: Callable[[Layout], AdviceVerdict],
+    problem: LayoutProblem,
+    kind: MeasureKind,
+    budget: int,
+    seed: int = 0,
+    begin_with: tuple[Layout, ...] = (),
+    progress: Callable[[float], None] | None = None,
+    *,
+    rounds: int = 1,
+) -> Advice:
+    """Search until a judge passes the best layout, and return the best of all searches.
+
+    Each search after the first requires a margin to the damage of the layout that the judge failed.
+
+    Args:
+        judge: Returns the verdict on a layout.
+        problem: As for `advise`.
+        kind: The kind.
+        budget: Largest number of blasts per search.
+        seed: Seed of all random draws.
+        begin_with: Initial layouts.
+        progress: Called with the share of the searches that is done.
+        rounds: Largest number of searches.
+    """
+    every: list[Advice] = []
+    below = inf
+    for _ in range(rounds):
+        found = advise(problem, kind, budget, seed, begin_with, damage_below=below)
+        if every and not found.passes:
+            break
+        every.append(found)
+        if progress is not None:
+            progress(len(every) / rounds)
+        if not found.passes or judge(found.layout) is AdviceVerdict.PASSES:
+            break
+        below = found.best.damage - _MARGIN
+        begin_with = (*begin_with, found.layout)
+    return replace(
+        best_of(every, judge),
+        blasts=sum(each.blasts for each in every),
+        tried=tuple(tried for each in every for tried in each.tried),
+    )
+
+
+def best_of(found: Iterable[Advice], judge: Callable[[Layout], AdviceVerdict]) -> Advice:
+    """Return the result with the best verdict; among equals the cheapest or nearest to passing."""
+    return min(found, key=lambda each: (-judge(each.layout), each.best))
+
+
+def against_each(scenario: Scenario, charges: Collection[AnyCharge]) -> Iterator[Layout]:
+    """Yield for each rule the union of its layouts against several charges.
+
+    Each charge gets an equal share of the budget. Nothing is yielded for a single charge or a
+    zone without a budget.
+    """
+    distinct, zone = tuple(dict.fromkeys(charges)), scenario.zone
+    if len(distinct) < 2 or zone.budget is None:
+        return
+    share = zone.model_copy(update={"budget": zone.budget / len(distinct)})
+    poorer = scenario.model_copy(update={"build_zone": share})
+    ruled = [layouts_by_rule(poorer, charge) for charge in distinct]
+    for name in ruled[0]:
+        yield tuple(element for each in ruled for element in each.get(name, ()))
+
+
+def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
+    if len(layout) > 1 and rng.random() < _FEWER_SHARE:
+        index = int(rng.integers(len(layout)))
+        return layout[:index] + layout[index + 1 :]
+    return moves.neighbour(layout, rng)
+
+
+def _hardened(
+    problem: LayoutProblem, scenario: Scenario, barrier: Layout, damage_below: float
+) -> list[Tried]:
+    """Return a barrier with each choice of measures that the rest of the zone's budget pays for.
+
+    Only the barrier alone needs blasts.
+
+    Raises:
+        BudgetError: If the blasts exceed the budget of the problem.
+    """
+    names = [each.name for each in scenario.zone.hardening]
+    counts = range(len(names) + 1) if len(names) <= _MOST_LOOKED_AT else (0, 1, len(names))
+    placement = Placement(scenario, barrier)
+    left = placement.budget_left
+    prices = {each.name: each.cost for each in scenario.zone.hardening}
+    found: list[Tried] = []
+    for count in counts:
+        for taken in combinations(names, count):
+            cost = sum(prices[name] for name in taken)
+            if left is None or cost <= left:
+                layout = (*barrier, *map(Measure.named, taken))
+                worth, damage = problem.load(layout), _worst_damage(problem, layout)
+                if worth <= 1.0 and damage >= damage_below:
+                    worth = 1.0 + damage - damage_below + _TOO_LITTLE
+                found.append(Tried(worth, placement.cost + cost, damage, layout))
+    return found
+
+
+def _worst_damage(problem: LayoutProblem, layout: Layout) -> float:
+    """Return the worst damage over all threats, from the blasts that were run before."""
+    loads = problem.evaluator.loads_of_many((layout, threat) for threat in problem.threats)
+    return worst(each.worst_damage or 0.0 for load in loads for each in load.protected)

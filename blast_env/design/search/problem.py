@@ -1,0 +1,337 @@
+"""The contract of proposers (rules, searches and trained agents): problem, progress and result."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from time import perf_counter, process_time
+from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, BlastMeter, Case, Threat
+from blast_env.evaluation.cases import check_distinct
+from blast_env.evaluation.comparison import check_something_arrives
+from blast_env.geometry import Element, Layout, layout_text
+from blast_env.layout import Placement
+from blast_env.runner import check_workers
+from blast_env.site import AnyCharge, Scenario
+from blast_env.statistics import reductions
+
+if TYPE_CHECKING:  # takes a third of a second to import
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutProblem:
+    """A case to search a layout for, and the evaluator that runs its blasts.
+
+    Attributes:
+        evaluator: Runs the blasts and caches their loads.
+        case: The scenario and the threats, and how their loads combine into one number. A search
+            may use only the first few threats, so different charges should come first.
+        processes: Worker processes; results do not depend on their number.
+        meter: Counts the blasts requested; `None` counts none.
+
+    Raises:
+        BlastEnvError: If a threat is repeated, the scenario has no build zone, or `processes` is
+            below 1.
+    """
+
+    evaluator: BlastEvaluator
+    case: Case
+    processes: int = 1
+    meter: BlastMeter | None = None
+
+    def __post_init__(self) -> None:
+        check_distinct(self.case.threats)
+        if self.scenario.build_zone is None:
+            raise BlastEnvError(f"{self.scenario.name} has no build zone: no layout to search for")
+        check_workers("processes", self.processes)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.case.scenario
+
+    @property
+    def threats(self) -> tuple[Threat, ...]:
+        """The threats of the case."""
+        return self.case.threats
+
+    @property
+    def stock(self) -> int:
+        """Largest number of modules or pieces in a layout."""
+        return self.scenario.zone.stock
+
+    def price(self, layout: Layout) -> float:
+        """Return the number of modules of a layout or, with a catalogue, the cost of its pieces."""
+        return self.cost(layout) if self.scenario.zone.items else len(layout)
+
+    def cost(self, layout: Layout) -> float:
+        """Return the cost of a legal layout, in the unit of the zone's budget."""
+        return Placement(self.scenario, layout).cost
+
+    @property
+    def told(self) -> AnyCharge | None:
+        """The charge if it is known, that is, the same in all threats; otherwise `None`."""
+        known = set(self.case.charges)
+        return known.pop() if len(known) == 1 else None
+
+    def metered(self, budget: int) -> "LayoutProblem":
+        """Return the same problem with a budget of blasts.
+
+        The loads without a barrier, `unprotected`, are not charged to the budget.
+        """
+        return replace(self, meter=BlastMeter(budget))
+
+    @property
+    def blasts_run(self) -> int:
+        """Blasts requested from the meter, or blasts simulated by the evaluator if those are more.
+
+        Those of `unprotected` are excluded. The evaluator must be new and keep all loads.
+        """
+        free = len(self.threats) if "unprotected" in vars(self) else 0
+        asked = 0 if self.meter is None else self.meter.blasts
+        return max(asked, self.evaluator.blasts - free)
+
+    def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+        """Return the load of each blast, in the unit of the scenario's objective.
+
+        Raises:
+            BudgetError: If the problem is metered and the blasts exceed its budget.
+            LayoutError: If a layout does not fit the build zone.
+        """
+        if self.meter is not None:
+            self.meter.add(pairs)
+        return self._unmetered(pairs)
+
+    def _unmetered(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+        loads = self.evaluator.loads_of_many(pairs, self.processes)
+        return [each.load(self.scenario.objective) for each in loads]
+
+    def load(self, layout: Sequence[Element]) -> float:
+        """Return the load of a layout over all threats, in the unit of the objective.
+
+        Raises:
+            BudgetError: As for `loads`.
+            LayoutError: If the layout does not fit the build zone.
+        """
+        pairs = [(tuple(layout), threat) for threat in self.threats]
+        return self.case.counted(self.loads(pairs), layout)
+
+    @cached_property
+    def unprotected(self) -> tuple[float, ...]:
+        """The load without a barrier, one per threat, in the unit of the objective.
+
+        These blasts are not charged to any budget.
+
+        Raises:
+            BlastEnvError: If nothing arrives: there is nothing to reduce.
+        """
+        bare = self._unmetered([((), threat) for threat in self.threats])
+        check_something_arrives([self.case], np.array(bare))
+        return tuple(bare)
+
+    def reduction(self, candidate: "Candidate") -> float:
+        """Return the relative reduction of the load, under the threats of the candidate."""
+        bare = self.case.counted(self.unprotected[: candidate.threats])
+        return reductions(candidate.load, bare).item()
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A layout with its load and cost, at one point of a search.
+
+    Attributes:
+        blasts: Blasts spent by the search up to this point.
+        layout: Its cells or pieces, sorted.
+        load: Value of the scenario's objective under the first `threats` threats, in its unit.
+        threats: Number of threats under which the layout was assessed, counted from the first.
+        cost: Cost of its modules or pieces, in the unit of the zone's budget.
+    """
+
+    blasts: int
+    layout: Layout
+    load: float
+    threats: int
+    cost: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The progress of a proposer.
+
+    Attributes:
+        blasts: Blasts spent.
+        budget: Largest number of blasts; 0 for a proposer that spends none.
+        best: The best simulated layout so far; `None` before the first.
+        guessed: Estimated share of the work that is done, for a proposer that spends no blasts.
+    """
+
+    blasts: int
+    budget: int
+    best: Candidate | None = None
+    guessed: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Approximate share of the work that is done."""
+        return self.blasts / self.budget if self.budget else self.guessed
+
+
+Report = Callable[[Progress], None]
+"""Called with the progress of a proposer after every batch of blasts."""
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """A proposed layout, with an account of the search that found it.
+
+    Attributes:
+        layout: The layout, its cells sorted; empty if a search ended before it had one.
+        method: Name of the proposer.
+        by: Description of the source of the layout, for a proposer that consults others.
+        gain: Relative reduction of the load that the proposer predicts; `None` without a
+            prediction.
+        load: Its load under the first `threats` threats, in the unit of the scenario's objective;
+            `None` without a blast. A search selected the layout on these blasts, so that its load
+            on other blasts is somewhat larger.
+        threats: Number of threats under which the layout was assessed.
+        blasts: Blasts spent: distinct pairs of layout and threat that were requested, whether
+            cached or not.
+        budget: Largest number of blasts.
+        seed: Seed of all random draws.
+        history: The best layout each time it changed.
+        interrupted: Whether Ctrl-C ended the search early.
+        front: The Pareto front of load and number of modules (or, with a catalogue, cost), in
+            ascending order of the latter; only of methods that search for it.
+    """
+
+    layout: Layout
+    method: str = ""
+    by: str = ""
+    gain: float | None = None
+    load: float | None = None
+    threats: int = 0
+    blasts: int = 0
+    budget: int = 0
+    seed: int = 0
+    history: tuple[Candidate, ...] = ()
+    interrupted: bool = False
+    front: tuple[Candidate, ...] = ()
+
+    @property
+    def expectation(self) -> str:
+        """The predicted gain as text; empty without a prediction."""
+        return "" if self.gain is None else f"expected reduction {100.0 * self.gain:.1f} %"
+
+    def best_at(self, blasts: int) -> Candidate | None:
+        """Return the best layout after a number of blasts, or `None` if there was none yet.
+
+        A search plans for its whole budget. Its best layout after part of the budget is worse than
+        that of a search with the smaller budget.
+        """
+        by_then = [each for each in self.history if each.blasts <= blasts]
+        return by_then[-1] if by_then else None
+
+    def history_table(self) -> "pd.DataFrame":
+        """Return one row per change of the best layout."""
+        return _table(self.history)
+
+    def front_table(self) -> "pd.DataFrame":
+        """Return one row per layout of the front."""
+        return _table(self.front)
+
+
+def _table(candidates: tuple[Candidate, ...]) -> "pd.DataFrame":
+    # Imported here because the import takes a third of a second.
+    import pandas as pd
+
+    rows = [
+        (
+            *(each.blasts, each.load, each.threats, len(each.layout), each.cost),
+            layout_text(each.layout),
+        )
+        for each in candidates
+    ]
+    columns = ["blasts", "load", "threats", "modules", "cost", "layout"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+class Proposer(Protocol):
+    """Proposes a layout for a case: a rule, a search or a trained agent."""
+
+    @property
+    def name(self) -> str:
+        """Name in tables and on the command line."""
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return a layout, for instance as `SearchResult(layout)`.
+
+        The same arguments give the same layout. Ctrl-C ends a search, which returns its best
+        layout so far.
+
+        Args:
+            problem: The problem to minimise. `problem.load` and `problem.loads` run blasts.
+            budget: Largest number of blasts; see `SearchResult.blasts`.
+            seed: Seed of all random draws.
+            report: Called with the progress.
+
+        Raises:
+            BlastEnvError: If the proposer is not applicable to the budget or the site.
+        """
+
+
+class LayoutAgent(Protocol):
+    """Proposes a layout for a site without simulating a blast."""
+
+    def propose(self, scenario: Scenario, charge: AnyCharge | None = None, /) -> Layout:
+        """Return a layout that satisfies all conditions of the build zone; it is deterministic.
+
+        Args:
+            scenario: The scenario; it has a build zone.
+            charge: The charge, if it is known; otherwise the layout is for all charges of the
+                scenario.
+        """
+
+
+class SamplingAgent(LayoutAgent, Protocol):
+    """Proposes a layout, and samples others."""
+
+    def sample(
+        self, scenario: Scenario, charge: AnyCharge | None = None, count: int = 8, seed: int = 0, /
+    ) -> Sequence[Layout]:
+        """Return `count` random layouts; some may be equal."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed layout with the time and blasts spent on it, as a league stores it.
+
+    Attributes:
+        layout: Its cells or pieces.
+        seconds: Wall time of the proposal, in s.
+        blasts: Blasts spent on it, of the judging engine.
+        other_blasts: Blasts spent on it, of other engines that the method uses.
+        cpu_s: Processor time of this process, in s.
+    """
+
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    layout: Layout
+    seconds: Annotated[float, Field(ge=0.0)]
+    blasts: Annotated[int, Field(ge=0)] = 0
+    other_blasts: Annotated[int, Field(ge=0)] = 0
+    cpu_s: Annotated[float, Field(ge=0.0)] = 0.0
+
+
+def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
+    """Return a layout that needs no blast, with the time of its computation."""
+    began_s, began_cpu_s = perf_counter(), process_time()
+    layout = propose()
+    seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s
+    return Proposal(layout, seconds, cpu_s=cpu_s)

@@ -1,0 +1,133 @@
+"""The surrogate as an engine, for training, where simulated blasts are too expensive."""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import ClassVar, Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.design.surrogate.network import Surrogate, load_surrogate, packaged_surrogate
+from blast_env.design.surrogate.walls import SurrogateSite, site_of
+from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
+from blast_env.geometry import Element
+from blast_env.layout.build_scene import charge_against
+from blast_env.site import AnyCharge, Scenario
+
+SURROGATE: Final = "surrogate"
+"""Name of the surrogate as an engine."""
+
+_KEPT_SITES: Final = 64
+"""Number of cached sites, of some megabytes each."""
+
+_SITE_BYTES: Final = 2**23
+"""Bound on the cache of messages per site."""
+
+
+@dataclass(frozen=True)
+class SurrogateEngine(Engine):
+    """An engine that predicts the loads on protected structures without simulating a blast.
+
+    `gymnasium.make("BlastBarrier-v0", scenario=..., engine=SurrogateEngine())` has episodes of
+    milliseconds. Agents trained on it must be judged by gas dynamics. It predicts peaks only if
+    the objective counts them. Structures that are not protected have zero loads. The response of
+    facades is that to triangular loads of the predicted impulse and peak, equal on all bays of a
+    structure (`Guess.loads`).
+
+    Attributes:
+        surrogate: The surrogate; by default the bundled one.
+        digest: Its digest.
+    """
+
+    has_peaks: ClassVar[bool] = True
+    title: ClassVar[str] = "Surrogate"
+    caveat: ClassVar[str] = (
+        "These are predictions of a surrogate, not blasts: judge with engine 'gas'."
+    )
+    validated_range: ClassVar[str] = "a validated range: they are predictions of the surrogate"
+
+    surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
+    name: str = field(init=False, default=SURROGATE)
+    version: str = field(init=False)
+    digest: str = field(init=False)
+    _sites: OrderedDict[str, SurrogateSite] = field(
+        default_factory=OrderedDict, init=False, repr=False, compare=False
+    )
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "digest", self.surrogate.digest)
+        object.__setattr__(self, "version", f"{SURROGATE} {self.digest}")
+
+    def loads(
+        self,
+        scenario: Scenario,
+        layout: Sequence[Element],
+        charge: AnyCharge,
+        seed: int = 0,  # noqa: ARG002
+    ) -> BlastLoads:
+        """Return the predicted loads of one charge and layout.
+
+        Args:
+            scenario: The scenario.
+            layout: A legal layout.
+            charge: The charge, or the vehicle that carries it.
+            seed: Ignored: predictions have no noise.
+
+        Returns:
+            The loads. All modules of a structure have the same load, since only the mean is
+            predicted.
+
+        Raises:
+            BlastEnvError: If no structure is protected.
+        """
+        site = self._site(scenario)
+        guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])
+        names = [each.name for each in site.protected]
+
+        def of_all(on_protected: FloatArray) -> list[float]:
+            known = dict(zip(names, on_protected.tolist(), strict=True))
+            return [known.get(each.name, 0.0) for each in scenario.structures]
+
+        impulse_pa_s = of_all(guess.impulse_pa_s[0])
+        nothing = [None] * len(impulse_pa_s)
+        peak_pa = nothing if guess.peak_pa is None else of_all(guess.peak_pa[0])
+        structures = tuple(
+            StructureLoad.on(*told, notes=("a prediction of the surrogate, not a blast",))
+            for told in zip(scenario.structures, impulse_pa_s, peak_pa, strict=True)
+        )
+        modules = [each.modules for each in scenario.structures]
+        bays = guess.bays(site, 0) if scenario.objective.is_response else ()
+        return BlastLoads(structures, np.repeat(impulse_pa_s, modules), bays)
+
+    def _site(self, scenario: Scenario) -> SurrogateSite:
+        key = scenario.content_hash
+        if key not in self._sites:
+            self._sites[key] = site_of(scenario, _SITE_BYTES)
+            if len(self._sites) > _KEPT_SITES:
+                self._sites.popitem(last=False)
+        self._sites.move_to_end(key)
+        return self._sites[key]
+
+
+def is_surrogate(name: str) -> bool:
+    """Return whether an engine name is `"surrogate"` or a surrogate's file (.json)."""
+    return name == SURROGATE or Path(name).suffix == ".json"
+
+
+def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None = None) -> Engine:
+    """Return an engine by its name, which may be that of a surrogate.
+
+    Args:
+        name: The name of an engine, or a surrogate's file (.json).
+        cell_m: Side of the cells of gas dynamics; by default the engine's.
+        cells: Rule of their growth; by default the engine's.
+
+    Raises:
+        UnknownNameError: If no engine has that name.
+        BlastEnvError: If the engine does not support the cells, or the file is not a surrogate.
+    """
+    if Path(name).suffix == ".json":
+        return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m, cells=cells)
+    return find_engine(name, cell_m, cells=cells)

@@ -1,0 +1,480 @@
+"""Fit of the surrogate to blasts, and its errors on samples held out of the fit."""
+
+import json
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import groupby
+from math import ceil
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pandas as pd
+import torch
+from scipy.stats import spearmanr
+from torch import Tensor, nn
+
+from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.design.surrogate.network import (
+    HIDDEN,
+    IMPULSE_POWER,
+    MESSAGE,
+    PEAK_POWER,
+    Fit,
+    Member,
+    Networks,
+    Surrogate,
+    agreed,
+    bounded,
+    log_loads,
+)
+from blast_env.design.surrogate.relations import RELATIONS
+from blast_env.design.surrogate.walls import FEATURES, INPUTS, site_of
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element, Piece
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
+
+MEMBERS: Final = 5
+_BATCH: Final = 6
+"""Groups of samples per update."""
+
+_GROUP: Final = 24
+"""Largest number of samples in a group; a group is of one case."""
+
+_COMMON: Final = 0.2
+"""Weight of the error common to all layouts of a case, which does not affect their ranking."""
+
+_RATE: Final = 7e-3
+_DECAY: Final = 1e-3
+_MOST_GRADIENT: Final = 1.0
+"""Bound on the norm of a gradient, against outliers among the groups."""
+
+_LEAST_SCALE: Final = 1e-3
+_LEAST_CASE: Final = 4
+"""Least number of layouts of a case for its rank correlation."""
+
+_CHARGE: Final = ("charge_x_m", "charge_y_m", "charge_height_m", "tnt_kg")
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """One kind of load on the structures of samples: impulses, Pa s, or peaks, Pa.
+
+    Attributes:
+        known: Logarithm of Kingery and Bulmash's load at all points (points,).
+        target: Logarithm of the load by gas dynamics (samples,).
+        power: Exponent of the mean over the points of a structure.
+    """
+
+    known: FloatArray
+    target: FloatArray
+    power: float
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Loads of structures, with the features of the points on their walls.
+
+    Attributes:
+        features: Features of all points (points, FEATURES).
+        relations: Relations of solids to points, ordered by sample, solid and point
+            (rows, RELATIONS).
+        area_m2: Wall area represented by each point (points,).
+        counts: Number of points of each sample (samples,).
+        solids: Number of structures and pieces of each sample (samples,).
+        impulse: The impulses.
+        peak: The peak overpressures.
+        site: Index of the site (samples,).
+        case: Index of the combination of site, structure and charge (samples,).
+        layout: Index of the combination of site and layout (samples,).
+    """
+
+    features: FloatArray
+    relations: FloatArray
+    area_m2: FloatArray
+    counts: np.ndarray
+    solids: np.ndarray
+    impulse: Loads
+    peak: Loads
+    site: np.ndarray
+    case: np.ndarray
+    layout: np.ndarray
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.counts)
+
+    @classmethod
+    def of(cls, blasts: pd.DataFrame, scenarios: dict[str, Scenario]) -> "Samples":
+        """Return the loads on protected structures of a table of `studies.blast_table`.
+
+        Args:
+            blasts: The table.
+            scenarios: Scenarios by content hash; rows of others are omitted.
+
+        Raises:
+            BlastEnvError: If no row remains.
+        """
+        known = blasts["protected"] & blasts["scenario_hash"].isin(list(scenarios))
+        rows = blasts[known & (blasts["impulse_pa_s"] > 0.0) & (blasts["peak_pa"] > 0.0)]
+        if rows.empty:
+            raise BlastEnvError("no load of a protected structure of a known scenario")
+        sites = {name: site_of(scenarios[name]) for name in rows["scenario_hash"].unique()}
+        features, related, area_m2, impulses, peaks = [], [], [], [], []
+        wanted = ("scenario_hash", "layout", *_CHARGE, "structure")
+        columns: list[list[Any]] = [rows[name].tolist() for name in wanted]
+        of_blast = groupby(zip(*columns, strict=True), key=lambda row: row[:-1])
+        for (scenario_hash, layout, *numbers), loads in of_blast:
+            site = sites[scenario_hash]
+            x_m, y_m, height_m, tnt_kg = map(float, numbers)
+            approach = site.approach(Charge((x_m, y_m), tnt_kg, height_m))
+            barrier = site.barrier(elements(layout))
+            of_points = approach.features(barrier).astype(np.float32)
+            of_solids = np.concatenate((approach.solids, approach.relations(barrier)))
+            names = [each.name for each in site.protected]
+            for *_, structure in loads:
+                own = approach.points_of(names.index(structure))
+                features.append(of_points[own])
+                related.append(of_solids[:, own].astype(np.float32))
+                area_m2.append(approach.area_m2[own])
+                impulses.append(approach.log_impulse[own])
+                peaks.append(approach.log_peak[own])
+        place = rows[["scenario_hash", "structure", *_CHARGE]]
+        return cls(
+            features=np.concatenate(features),
+            relations=np.concatenate([each.reshape(-1, RELATIONS) for each in related]),
+            area_m2=np.concatenate(area_m2),
+            counts=np.array([len(each) for each in features]),
+            solids=np.array([len(each) for each in related]),
+            impulse=Loads(
+                np.concatenate(impulses),
+                np.log(rows["impulse_pa_s"].to_numpy()),
+                IMPULSE_POWER,
+            ),
+            peak=Loads(
+                np.concatenate(peaks),
+                np.log(rows["peak_pa"].to_numpy()),
+                PEAK_POWER,
+            ),
+            site=rows.groupby("scenario_hash").ngroup().to_numpy(),
+            case=place.groupby(list(place.columns)).ngroup().to_numpy(),
+            layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
+        )
+
+
+def elements(text: str) -> tuple[Element, ...]:
+    """Return the layout of a row of the table."""
+    found = (tuple(each) for each in json.loads(text))
+    return tuple(each if len(each) == 2 else Piece(*each) for each in found)
+
+
+def fit(
+    samples: Samples,
+    chosen: BoolArray,
+    epochs: int,
+    seed: int,
+    about: Fit,
+    members: int = MEMBERS,
+    peaks: bool = True,
+) -> Surrogate:
+    """Fit the networks to some of the samples, two networks at a time.
+
+    Args:
+        samples: All samples.
+        chosen: Mask of the samples to use (samples,).
+        epochs: Number of passes over the samples.
+        seed: Seed of initial weights and orders.
+        about: Provenance, for the surrogate's file.
+        members: Number of networks per kind of load.
+        peaks: Whether to fit the networks for peaks, too.
+    """
+    points = samples.features[np.repeat(chosen, samples.counts)]
+    solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
+    mean = np.concatenate([each.mean(axis=0, dtype=np.float64) for each in (points, solids)])
+    scale = np.concatenate([each.std(axis=0, dtype=np.float64) for each in (points, solids)])
+    scale += _LEAST_SCALE
+    cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
+    own = [each for each in cases if len(each)]
+    tensors = _Tensors.of(samples, mean, scale)
+    of_both = (samples.impulse, samples.peak) if peaks else (samples.impulse,)
+    tasks = []
+    for loads in of_both:
+        for number in range(members):
+            torch.manual_seed(seed + number)
+            tasks.append((_Network(), _Target.of(loads), seed + number))
+
+    def fitted(task: tuple["_Network", "_Target", int]) -> Member:
+        return _fitted(tensors, own, epochs, *task)
+
+    with ThreadPoolExecutor(2) as pool:
+        found = [*pool.map(fitted, tasks)]
+    impulse, peak = found[:members], found[members:]
+    return Surrogate(mean, scale, Networks(impulse), Networks(peak), about)
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Errors of the predictions of one kind of load.
+
+    Attributes:
+        rms: Root mean square error of the logarithm.
+        within: The same after subtraction of the mean error of each case, which ranks no layout.
+        bias: Mean error of the logarithm.
+        rank: Rank correlation among the layouts of a case, mean over the cases.
+        lost: Excess of the load of the layout with the best prediction over that of the best
+            layout, relative to the largest load of the case; mean over the cases.
+        cases: Number of cases with enough layouts for `rank` and `lost`.
+    """
+
+    rms: float
+    within: float
+    bias: float
+    rank: float
+    lost: float
+    cases: int
+
+
+class ErrorsOfBoth(NamedTuple):
+    """Errors of the predictions of impulses and of peaks."""
+
+    impulse: Errors
+    peak: Errors
+
+
+def errors(surrogate: Surrogate, samples: Samples, chosen: BoolArray) -> ErrorsOfBoth:
+    """Compare predictions with gas dynamics on some samples."""
+    return ErrorsOfBoth(
+        load_errors(surrogate, surrogate.impulse, samples, samples.impulse, chosen),
+        load_errors(surrogate, surrogate.peak, samples, samples.peak, chosen),
+    )
+
+
+def load_errors(
+    surrogate: Surrogate,
+    networks: Networks,
+    samples: Samples,
+    loads: Loads,
+    chosen: BoolArray,
+) -> Errors:
+    """Compare predictions of one kind of load, by `networks` of the surrogate, with `loads`."""
+    counts, solids = samples.counts[chosen], samples.solids[chosen]
+    points = np.repeat(chosen, samples.counts)
+    starts = np.cumsum([0, *counts[:-1]])
+    told = networks.messages(
+        surrogate.related(samples.relations[np.repeat(chosen, samples.counts * samples.solids)])
+    )
+    heard = np.zeros((len(told), points.sum(), told.shape[2]))
+    first = 0
+    for start, count, number in zip(starts, counts, solids, strict=True):
+        own = told[:, first : first + number * count]
+        own = own.reshape(len(told), number, count, -1)
+        heard[:, start : start + count] = own.sum(axis=1)
+        first += number * count
+    differs = networks(surrogate.scaled(samples.features[points]), heard)
+    known, area_m2 = loads.known[points], samples.area_m2[points]
+    logs = log_loads(differs, known, area_m2, starts, loads.power)
+    return _errors(agreed(logs), loads.target[chosen], samples.case[chosen])
+
+
+def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray) -> Errors:
+    """Compare logarithms of predicted and simulated loads (samples,)."""
+    off = guess - target
+    ranks, lost, within = [], [], np.zeros_like(off)
+    for case in np.unique(cases):
+        own = cases == case
+        within[own] = off[own] - off[own].mean()
+        true = target[own]
+        if own.sum() >= _LEAST_CASE and np.ptp(true) > 0.0:
+            ranks.append(float(spearmanr(guess[own], true).statistic))
+            shares = np.exp(true - true.max())
+            lost.append(float(shares[guess[own].argmin()] - shares.min()))
+    return Errors(
+        rms=float(np.sqrt(np.mean(off**2))),
+        within=float(np.sqrt(np.mean(within**2))),
+        bias=float(off.mean()),
+        rank=float(np.mean(ranks)) if ranks else float("nan"),
+        lost=float(np.mean(lost)) if lost else float("nan"),
+        cases=len(ranks),
+    )
+
+
+def folds(numbers: np.ndarray, count: int, seed: int) -> list[BoolArray]:
+    """Return the masks of held-out samples for each fold; equal numbers share a fold.
+
+    Args:
+        numbers: Index of the site or the layout of each sample (samples,).
+        count: Number of folds.
+        seed: Seed of the order.
+    """
+    distinct = np.random.default_rng(seed).permutation(np.unique(numbers))
+    return [np.isin(numbers, distinct[first::count]) for first in range(count)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """`Loads` as tensors.
+
+    Attributes:
+        known: As in `Loads`.
+        target: As in `Loads`.
+        power: As in `Loads`.
+    """
+
+    known: Tensor
+    target: Tensor
+    power: float
+
+    @classmethod
+    def of(cls, loads: Loads) -> "_Target":
+        known, target = (
+            torch.from_numpy(each.astype(np.float32)) for each in (loads.known, loads.target)
+        )
+        return cls(known, target, loads.power)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tensors:
+    """`Samples` as inputs of the networks.
+
+    Attributes:
+        features: Scaled features (points, FEATURES).
+        relations: Scaled relations (rows, RELATIONS).
+        area_m2: Wall area represented by each point (points,).
+        starts: Index of the first point of each sample (samples,).
+        counts: Number of points of each sample (samples,).
+        first_rows: Index of the first row of relations of each sample (samples,).
+        rows: Number of these rows (samples,).
+        solids: Number of structures and pieces of each sample (samples,).
+    """
+
+    features: Tensor
+    relations: Tensor
+    area_m2: Tensor
+    starts: IntArray
+    counts: IntArray
+    first_rows: IntArray
+    rows: IntArray
+    solids: IntArray
+
+    @classmethod
+    def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+        of_points, of_solids = slice(None, FEATURES), slice(FEATURES, INPUTS)
+        features, relations = (
+            torch.from_numpy(bounded(each, mean[own], scale[own]).astype(np.float32))
+            for each, own in ((samples.features, of_points), (samples.relations, of_solids))
+        )
+        area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32))
+        starts = np.cumsum([0, *samples.counts[:-1]])
+        rows = samples.counts * samples.solids
+        firsts = np.cumsum([0, *rows[:-1]])
+        return cls(
+            features, relations, area_m2, starts, samples.counts, firsts, rows, samples.solids
+        )
+
+    def loss(self, network: "_Network", target: _Target, groups: Sequence[IntArray]) -> Tensor:
+        """Return the mean square error of the logarithm on groups of samples, each of one case.
+
+        The mean error of a group has a smaller weight (`_COMMON`) than the deviations from it.
+        """
+        errors = self._errors(network, target, np.concatenate(groups))
+        parts = errors.split([*map(len, groups)])  # type: ignore[no-untyped-call]
+        common = torch.cat([each.mean().expand(len(each)) for each in parts])
+        return (errors - common).square().mean() + _COMMON * common.square().mean()
+
+    def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
+        """Return the errors of the logarithm on some samples (samples,)."""
+        counts, solids = self.counts[numbers], self.solids[numbers]
+        points = torch.from_numpy(_runs_of(self.starts[numbers], counts))
+        related = torch.from_numpy(_runs_of(self.first_rows[numbers], self.rows[numbers]))
+        begin = np.cumsum([0, *counts[:-1]])
+        hearing = [
+            np.tile(np.arange(first, first + count), number)
+            for first, count, number in zip(begin, counts, solids, strict=True)
+        ]
+        over = network(
+            self.features[points],
+            self.relations[related],
+            torch.from_numpy(np.concatenate(hearing)),
+        )
+        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts))
+        logs = target.power * (target.known[points] + over)
+        empty = torch.zeros(len(numbers))
+        # Relative to the largest: high powers of pascals overflow.
+        largest = torch.from_numpy(np.maximum.reduceat(logs.detach().numpy(), begin))
+        area_m2 = self.area_m2[points]
+        shares = area_m2 * torch.exp(logs - largest[owner])
+        mean = empty.index_add(0, owner, shares) / empty.index_add(0, owner, area_m2)
+        log_loads = (torch.log(mean) + largest) / target.power
+        return log_loads - target.target[torch.from_numpy(numbers)]
+
+
+def _runs_of(starts: IntArray, counts: IntArray) -> IntArray:
+    """Return the concatenated ranges of `counts` integers from each start."""
+    runs = [np.arange(e, e + count) for e, count in zip(starts, counts, strict=True)]
+    return np.concatenate(runs)
+
+
+class _Network(nn.Module):
+    """A network during its fit; its parameters are in the order of `Member`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.send = nn.Linear(RELATIONS, MESSAGE)
+        self.message = nn.Linear(MESSAGE, MESSAGE)
+        self.first = nn.Linear(FEATURES + MESSAGE, HIDDEN)
+        self.second = nn.Linear(HIDDEN, HIDDEN)
+        self.last = nn.Linear(HIDDEN, 1)
+
+    def forward(self, features: Tensor, relations: Tensor, hearing: Tensor) -> Tensor:
+        """Return the predictions at points (points,).
+
+        Args:
+            features: Features of the points (points, FEATURES).
+            relations: Relations of solids to points (rows, RELATIONS).
+            hearing: Index of the point of each of these rows (rows,).
+        """
+        silu = nn.functional.silu
+        messages = silu(self.message(silu(self.send(relations))))
+        heard = torch.zeros(len(features), MESSAGE).index_add(0, hearing, messages)
+        hidden = silu(self.first(torch.cat((features, heard), dim=1)))
+        said: Tensor = self.last(silu(self.second(hidden)))[:, 0]
+        return said
+
+    def plain(self) -> Member:
+        """Return the weights and biases as arrays."""
+        arrays: Sequence[FloatArray] = [
+            each.detach().numpy().astype(np.float64) for each in self.parameters()
+        ]
+        return Member(*(array.T if array.ndim == 2 else array for array in arrays))
+
+
+def _fitted(
+    data: _Tensors,
+    cases: Sequence[IntArray],
+    epochs: int,
+    network: _Network,
+    target: _Target,
+    seed: int,
+) -> Member:
+    """Fit one network to the samples of some cases."""
+    rng = np.random.default_rng(seed)
+    optimizer = torch.optim.AdamW(network.parameters(), _RATE, weight_decay=_DECAY)
+    groups = [
+        group
+        for case in cases
+        for group in np.array_split(rng.permutation(case), ceil(len(case) / _GROUP))
+    ]
+    batches = max(1, round(len(groups) / _BATCH))
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, _RATE, total_steps=epochs * batches)
+    for epoch in range(epochs):
+        for batch in np.array_split(rng.permutation(len(groups)), batches):
+            loss = data.loss(network, target, [groups[number] for number in batch])
+            if not torch.isfinite(loss):
+                raise BlastEnvError(f"network of seed {seed} in epoch {epoch}: no finite error")
+            optimizer.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            nn.utils.clip_grad_norm_(network.parameters(), _MOST_GRADIENT)
+            optimizer.step()
+            schedule.step()
+    return network.plain()

@@ -1,0 +1,503 @@
+"""The surrogate: small networks that predict the load at each point of a wall and its spread.
+
+Each solid sends a message to each point, computed from their relations. The prediction at a point
+is a function of the features of the point and the sum of all messages.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from itertools import pairwise, zip_longest
+from math import prod
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from blast_env.arrays import FloatArray
+from blast_env.design.surrogate.relations import RELATIONS
+from blast_env.design.surrogate.walls import FEATURES, INPUTS, Approach, SingleArray, SurrogateSite
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError
+from blast_env.files import write_atomically
+from blast_env.geometry import Element
+from blast_env.response.damage import BayDamage
+from blast_env.site.scene import Charge
+
+IntArray = NDArray[np.int64]
+AnyFloats = NDArray[np.floating[Any]]
+_PACKAGED: Final = Path(__file__).with_name("gas.json")
+
+HIDDEN: Final = 64
+"""Width of the two hidden layers."""
+
+MESSAGE: Final = 32
+"""Length of a message, and width of its hidden layer."""
+
+IMPULSE_POWER: Final = 1.0
+"""Exponent of the power mean over the walls for impulses: the arithmetic mean."""
+
+PEAK_POWER: Final = 16.0
+"""Exponent of the power mean over the walls for peaks: close to the maximum."""
+
+_AT_ONCE: Final = 64
+"""Points per matrix product.
+
+So few fit into a processor's cache, and one thread multiplies them: with more, OpenBLAS wakes other
+threads, which mostly wait in a loop, or for ever where processors are busy.
+"""
+
+_MOST_SPREADS: Final = 4.0
+"""Bound on the distance of inputs from their mean, in units of their scale."""
+
+SHAPES: Final = ((RELATIONS, MESSAGE), (MESSAGE,), (MESSAGE, MESSAGE), (MESSAGE,)) + (
+    (FEATURES + MESSAGE, HIDDEN),
+    (HIDDEN,),
+    (HIDDEN, HIDDEN),
+    (HIDDEN,),
+    (HIDDEN, 1),
+    (1,),
+)
+"""Shapes of the arrays of a network, in the order of `Member`."""
+
+
+class Check(BaseModel):
+    """Errors of the predictions of one kind of load on sites held out of the fit.
+
+    Attributes:
+        rms: Root mean square error of the logarithm of a load.
+        rank: Rank correlation with the engine among the layouts of a case.
+        lost: Regret of a choice by prediction: excess of the load of the layout with the best
+            prediction over the least load of the case, relative to the largest.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    rms: float
+    rank: float
+    lost: float
+
+
+class Fit(BaseModel):
+    """Provenance of a surrogate, and its errors on sites held out of the fit.
+
+    Attributes:
+        format: Version of the file format.
+        command: Command that fitted it.
+        versions: Versions of the software.
+        engine: Engine of the blasts.
+        blasts: Number of loads of structures in the fit.
+        sites: Number of sites in the fit.
+        seconds: Duration of the fit without the check, in s.
+        impulse: Errors of impulses, if checked.
+        peak: Errors of peak overpressures, if checked.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    format: Literal[3] = 3
+    command: str
+    versions: dict[str, str]
+    engine: str
+    blasts: Annotated[int, Field(ge=1)]
+    sites: Annotated[int, Field(ge=1)]
+    seconds: Annotated[float, Field(ge=0.0)] = 0.0
+    impulse: Check | None = None
+    peak: Check | None = None
+
+
+class Guess(NamedTuple):
+    """Predicted loads of layouts.
+
+    Attributes:
+        impulse_pa_s: Mean impulse on each protected structure (layouts, structures).
+        spread: Standard deviation of its logarithm among the members (layouts, structures).
+        peak_pa: Largest overpressure on each protected structure (layouts, structures); `None` if
+            the objective counts no peaks.
+        peak_spread: Standard deviation of its logarithm among the members (layouts, structures).
+    """
+
+    impulse_pa_s: FloatArray
+    spread: FloatArray
+    peak_pa: FloatArray | None = None
+    peak_spread: FloatArray | None = None
+
+    def loads(self, site: SurrogateSite, layouts: Sequence[Sequence[Element]] = ()) -> FloatArray:
+        """Return the load of each layout, in the objective's unit (layouts,).
+
+        If the objective counts the response of facades, each bay of a structure has a triangular
+        load with the predicted impulse and peak of the structure. The peak is the largest one on
+        the structure, so that the response is conservative.
+
+        Args:
+            site: The site of the prediction.
+            layouts: The layouts; required if the objective counts the response of facades.
+        """
+        load, structures = site.scenario.objective.load, site.protected
+        if site.scenario.objective.is_response:
+            return np.array(
+                [self._response(site, index, each) for index, each in enumerate(layouts)]
+            )
+        peak_pa = np.zeros_like(self.impulse_pa_s) if self.peak_pa is None else self.peak_pa
+        both = np.stack((self.impulse_pa_s, peak_pa), axis=2).tolist()
+        return np.array(
+            [
+                sum(
+                    load(impulse, peak, each.weight, each.counted_peak_weight)
+                    for each, (impulse, peak) in zip(structures, of_layout, strict=True)
+                )
+                for of_layout in both
+            ]
+        )
+
+    def bays(self, site: SurrogateSite, index: int) -> tuple[BayDamage, ...]:
+        """Return the damage of the bays behind a layout, by its index, under triangular loads."""
+        assert self.peak_pa is not None
+        found: list[BayDamage] = []
+        for column, structure in enumerate(site.protected):
+            peak_pa, impulse_pa_s = self.peak_pa[index, column], self.impulse_pa_s[index, column]
+            found += site.bay_damages(structure.name, float(peak_pa), float(impulse_pa_s))
+        return tuple(found)
+
+    def _response(self, site: SurrogateSite, index: int, layout: Sequence[Element]) -> float:
+        assert self.peak_pa is not None
+        loads = zip(self.peak_pa[index].tolist(), self.impulse_pa_s[index].tolist(), strict=True)
+        return sum(
+            each.weight * site.response(each.name, layout, *load)
+            for each, load in zip(site.protected, loads, strict=True)
+        )
+
+
+class Member(NamedTuple):
+    """A network: weights and biases of its layers, in the order of their use.
+
+    The first two layers compute messages, the others the prediction at a point from messages and
+    features.
+    """
+
+    send: AnyFloats
+    send_bias: AnyFloats
+    message: AnyFloats
+    message_bias: AnyFloats
+    first: AnyFloats
+    first_bias: AnyFloats
+    second: AnyFloats
+    second_bias: AnyFloats
+    last: AnyFloats
+    last_bias: AnyFloats
+
+
+class Networks:
+    """An ensemble of networks fitted to the same loads from different initial weights.
+
+    They use single precision: its rounding is far below their errors.
+
+    Args:
+        members: The networks.
+
+    Attributes:
+        members: The networks.
+    """
+
+    def __init__(self, members: Sequence[Member]) -> None:
+        self.members = tuple(members)
+        stacked = [
+            np.stack(arrays) if members else np.empty((0, *shape))
+            for arrays, shape in zip_longest(zip(*members, strict=True), SHAPES)
+        ]
+        single = [each.astype(np.float32) for each in stacked]
+        self._layers = Member(*(each[:, np.newaxis] if each.ndim == 2 else each for each in single))
+
+    def messages(self, scaled: FloatArray) -> SingleArray:
+        """Return the message of each solid to each point (members, solids x points, MESSAGE).
+
+        Args:
+            scaled: Their relations, less the mean, over the scale (solids x points, RELATIONS).
+        """
+        layers = self._layers
+        found = np.empty((len(self.members), len(scaled), MESSAGE), dtype=np.float32)
+        given = scaled.astype(np.float32)
+        for few in _runs(len(scaled)):
+            sent = _silu(given[few] @ layers.send + layers.send_bias)
+            found[:, few] = _silu(sent @ layers.message + layers.message_bias)
+        return found
+
+    def __call__(self, scaled: FloatArray, heard: SingleArray) -> FloatArray:
+        """Return the predicted differences of logarithmic loads from Kingery and Bulmash's.
+
+        Args:
+            scaled: Features of points, less the mean, over the scale (points, FEATURES).
+            heard: Sum of the messages to each point (members, points, MESSAGE).
+
+        Returns:
+            (members, points).
+        """
+        layers = self._layers
+        of_point, of_message = layers.first[:, :FEATURES], layers.first[:, FEATURES:]
+        differs = np.empty((len(self.members), len(scaled)))
+        given = scaled.astype(np.float32)
+        for few in _runs(len(scaled)):
+            met = given[few] @ of_point + heard[:, few] @ of_message
+            first = _silu(met + layers.first_bias)
+            second = _silu(first @ layers.second + layers.second_bias)
+            differs[:, few] = (second @ layers.last + layers.last_bias)[..., 0]
+        return differs
+
+
+def _runs(count: int) -> list[slice]:
+    """Return the slices of rows that are multiplied together.
+
+    No slice has a single row unless that is all, since a single row is summed in a different order.
+    """
+    starts = range(0, max(count - 1, 1), _AT_ONCE)
+    return [slice(*ends) for ends in pairwise((*starts, count))]
+
+
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """Networks fitted to blasts.
+
+    Attributes:
+        mean: Mean of each feature and each relation (INPUTS,).
+        scale: Their standard deviations (INPUTS,).
+        impulse: The networks for impulses.
+        peak: The networks for peak overpressures.
+        fit: Their provenance.
+    """
+
+    mean: FloatArray
+    scale: FloatArray
+    impulse: Networks
+    peak: Networks
+    fit: Fit
+
+    @property
+    def digest(self) -> str:
+        """Digest of all numbers, which identifies the surrogate."""
+        members = (*self.impulse.members, *self.peak.members)
+        arrays = (self.mean, self.scale, *(each for member in members for each in member))
+        numbers = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        return sha256(numbers).hexdigest()[:16]
+
+    def guess(
+        self, site: SurrogateSite, layouts: Sequence[Sequence[Element]], charges: Sequence[Charge]
+    ) -> Guess:
+        """Return the predicted loads of layouts.
+
+        Args:
+            site: The site.
+            layouts: Legal layouts.
+            charges: The charge against each layout (layouts,).
+
+        Raises:
+            LayoutError: If the catalogue has no such piece.
+        """
+        pairs = [
+            (site.approach(charge), site.barrier(layout))
+            for layout, charge in zip(layouts, charges, strict=True)
+        ]
+        scaled = self.scaled(np.concatenate([each.features(barrier) for each, barrier in pairs]))
+        area_m2 = np.concatenate([each.area_m2 for each, _ in pairs])
+        before = np.cumsum([0, *(len(each.area_m2) for each, _ in pairs[:-1])])
+        starts = np.concatenate(
+            [first + each.starts for first, (each, _) in zip(before, pairs, strict=True)]
+        )
+
+        def of(networks: Networks, known: Sequence[FloatArray], power: float) -> list[FloatArray]:
+            heard = [self._heard(networks, *each, site) for each in pairs]
+            differs = networks(scaled, np.concatenate(heard, axis=1))
+            logs = log_loads(differs, np.concatenate(known), area_m2, starts, power)
+            return [each.reshape(len(pairs), -1) for each in _mean_and_spread(logs)]
+
+        impulse = of(self.impulse, [each.log_impulse for each, _ in pairs], IMPULSE_POWER)
+        if not site.counts_peaks:
+            return Guess(*impulse)
+        return Guess(*impulse, *of(self.peak, [each.log_peak for each, _ in pairs], PEAK_POWER))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the surrogate as a JSON file, numbers to five digits.
+
+        Raises:
+            BlastEnvError: If the file cannot be written.
+        """
+        path = Path(path)
+        content = _File(
+            fit=self.fit,
+            mean=_numbers(self.mean),
+            scale=_numbers(self.scale),
+            members=_flat(self.impulse.members),
+            peak_members=_flat(self.peak.members),
+        )
+        with write_atomically(path) as temporary:
+            temporary.write_text(f"{content.model_dump_json()}\n", encoding="utf-8")
+        return path
+
+    def _heard(
+        self, networks: Networks, approach: Approach, barrier: FloatArray, site: SurrogateSite
+    ) -> SingleArray:
+        """Return the sum of messages to each point (members, points, MESSAGE).
+
+        Layouts have many pieces in common, so the messages of each piece are cached.
+        """
+
+        def sent(related: FloatArray) -> SingleArray:
+            solids, points, _ = related.shape
+            told = networks.messages(self.related(related.reshape(-1, RELATIONS)))
+            summed: SingleArray = told.reshape(-1, solids, points, MESSAGE).sum(axis=1)
+            return summed
+
+        heard = site.memory.of((networks, approach), lambda: sent(approach.solids)).copy()
+        for piece in barrier:
+            key = (networks, approach, piece.tobytes())
+            heard += site.memory.of(key, partial(_of_piece, sent, approach, piece))
+        return heard
+
+    def scaled(self, features: FloatArray) -> FloatArray:
+        """Return the scaled and bounded features of points (points, FEATURES)."""
+        return bounded(features, self.mean[:FEATURES], self.scale[:FEATURES])
+
+    def related(self, relations: FloatArray) -> FloatArray:
+        """Return the scaled and bounded relations (solids x points, RELATIONS)."""
+        return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
+
+
+def _of_piece(
+    sent: Callable[[FloatArray], SingleArray], approach: Approach, piece: FloatArray
+) -> SingleArray:
+    return sent(approach.relations(piece[np.newaxis]))
+
+
+def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return numbers less their mean, over their scale, clipped to the range of a fit (rows, n).
+
+    A wall of 60 m has points much farther from its edges than the sites of a fit, and predictions
+    so far outside that range are unbounded.
+    """
+    found: FloatArray = np.clip((numbers - mean) / scale, -_MOST_SPREADS, _MOST_SPREADS)
+    return found
+
+
+def _mean_and_spread(logs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the trimmed geometric mean over the networks, and the spread of logarithms (n,)."""
+    return np.exp(agreed(logs)), logs.std(axis=0)
+
+
+def agreed(logs: FloatArray) -> FloatArray:
+    """Return the mean over the networks without the highest and the lowest (members, n) -> (n,).
+
+    A single network may be far off on layouts unlike those of the fit.
+    """
+    middle: FloatArray = np.sort(logs, axis=0)[1:-1] if len(logs) > 2 else logs
+    mean: FloatArray = middle.mean(axis=0)
+    return mean
+
+
+def log_loads(
+    differs: FloatArray, known: FloatArray, area_m2: FloatArray, starts: IntArray, power: float
+) -> FloatArray:
+    """Return the logarithm of the load on each structure, by each network (members, structures).
+
+    It is the power mean of the loads at its points, weighted by area.
+
+    Args:
+        differs: Predictions at all points, from `Networks` (members, points).
+        known: Logarithm of Kingery and Bulmash's load (points,).
+        area_m2: Wall area represented by each point (points,).
+        starts: Index of the first point of each structure (structures,).
+        power: Exponent of the mean.
+    """
+    area_of_all_m2 = np.add.reduceat(area_m2, starts)
+    loads = area_m2 * np.exp(power * (known + differs))
+    logs: FloatArray = np.log(np.add.reduceat(loads, starts, axis=1) / area_of_all_m2) / power
+    return logs
+
+
+def load_surrogate(path: str | Path) -> Surrogate:
+    """Return a surrogate from its file.
+
+    Raises:
+        BlastEnvError: If the file does not exist, is damaged or is not a surrogate.
+    """
+    path = Path(path)
+    try:
+        text = read_text(path)
+    except DocumentError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
+    try:
+        content = checked_as(_File, parse_json(text))
+    except DocumentError as error:
+        raise BlastEnvError(f"{path}: is no surrogate, or damaged: {error}") from error
+    return Surrogate(
+        np.array(content.mean),
+        np.array(content.scale),
+        _networks(content.members),
+        _networks(content.peak_members),
+        content.fit,
+    )
+
+
+def packaged_surrogate() -> Surrogate:
+    """Return the bundled surrogate.
+
+    It was fitted to generated sites only (see `fit`), so that all bundled sites are valid tests.
+    """
+    return load_surrogate(_PACKAGED)
+
+
+_Members = Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
+
+
+class _File(BaseModel):
+    """Content of a file: arrays as flat lists."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    fit: Fit
+    mean: list[float]
+    scale: list[Annotated[float, Field(gt=0.0)]]
+    members: _Members
+    peak_members: _Members
+
+    @model_validator(mode="after")
+    def _check_sizes(self) -> Self:
+        for name, numbers in (("mean", self.mean), ("scale", self.scale)):
+            if len(numbers) != INPUTS:
+                raise ValueError(f"{name} has {len(numbers)} numbers, must be {INPUTS}")
+        wanted = [prod(shape) for shape in SHAPES]
+        for name, members in (("members", self.members), ("peak_members", self.peak_members)):
+            for number, member in enumerate(members):
+                sizes = [len(flat) for flat in member]
+                if sizes != wanted:
+                    raise ValueError(f"{name}: network {number} has {sizes}, must be {wanted}")
+        return self
+
+
+def _flat(members: Sequence[Member]) -> list[list[list[float]]]:
+    return [[_numbers(array) for array in member] for member in members]
+
+
+def _networks(members: Sequence[Sequence[Sequence[float]]]) -> Networks:
+    return Networks(
+        [
+            Member(
+                *(np.array(flat).reshape(shape) for flat, shape in zip(each, SHAPES, strict=True))
+            )
+            for each in members
+        ]
+    )
+
+
+def _numbers(array: AnyFloats) -> list[float]:
+    return [float(f"{value:.5g}") for value in array.ravel()]
+
+
+def _silu(values: AnyFloats) -> SingleArray:
+    """Return x / (1 + exp(-x)), by the hyperbolic tangent for speed and without overflow."""
+    half: SingleArray = np.float32(0.5) * values
+    silu: SingleArray = np.tanh(half)
+    silu *= half
+    silu += half
+    return silu

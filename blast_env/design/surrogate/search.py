@@ -1,0 +1,392 @@
+"""Layouts from trained models: a surrogate, an agent or both, with and without blasts."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import ceil
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.design.search.moves import Moves
+from blast_env.design.search.problem import (
+    LayoutProblem,
+    Progress,
+    Report,
+    SamplingAgent,
+    SearchResult,
+)
+from blast_env.design.search.registry import layouts_by_rule
+from blast_env.design.search.session import Plan, Search, SearchSession
+from blast_env.design.surrogate.correction import Correction
+from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
+from blast_env.design.surrogate.walls import SurrogateSite, site_of
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Case, Threat
+from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
+from blast_env.geometry import Layout
+from blast_env.site import AnyCharge, Scenario
+from blast_env.values import generator
+
+_DRAWN_CHARGES: Final = 16
+_HIDDEN_CHARGES: Final = 4
+"""Number of drawn charges, and of those used for predictions, where the charge is unknown.
+
+The latter are the central one and those farthest apart.
+"""
+
+_KEPT: Final = 4
+"""Number of best layouts that the search changes."""
+
+_BATCH: Final = 8
+"""Number of changed layouts per call of the surrogate."""
+
+_SITE_SHARE: Final = 0.3
+"""Approximate share of the rules and paths of a site in the time of a search without blasts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guesses:
+    """Cached predictions of a surrogate for the layouts of a case.
+
+    Attributes:
+        surrogate: The surrogate.
+        case: The scenario and its threats.
+        site: The scenario as the surrogate represents it.
+    """
+
+    surrogate: Surrogate
+    case: Case
+    site: SurrogateSite
+    _known: dict[Layout, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, surrogate: Surrogate, case: Case) -> "Guesses":
+        """Return an empty cache.
+
+        Raises:
+            BlastEnvError: If no structure is protected.
+        """
+        return cls(surrogate, case, site_of(case.scenario))
+
+    def loads(self, layouts: Sequence[Layout]) -> FloatArray:
+        """Return the predicted value of the objective for each layout (layouts,)."""
+        new = [each for each in dict.fromkeys(layouts) if each not in self._known]
+        if new:
+            by_threat = [self._weighted(new, threat) for threat in self.case.threats]
+            for layout, loads in zip(new, np.transpose(by_threat), strict=True):
+                self._known[layout] = self.case.counted(loads, layout)
+        return np.array([self._known[each] for each in layouts])
+
+    @property
+    def count(self) -> int:
+        """Number of layouts with a prediction."""
+        return len(self._known)
+
+    def ranked(self) -> list[Layout]:
+        """Return all layouts with a prediction, the least load first."""
+        return sorted(self._known, key=lambda layout: self._known[layout])
+
+    def _weighted(self, layouts: Sequence[Layout], threat: Threat) -> FloatArray:
+        charges = [threat.charge_against(self.case.scenario, each) for each in layouts]
+        return self.surrogate.guess(self.site, layouts, charges).loads(self.site, layouts)
+
+
+def improved(
+    guesses: Guesses,
+    begin_with: Iterable[Layout],
+    most: int,
+    rng: np.random.Generator,
+    tell: Callable[[float], None] = lambda _: None,
+) -> list[Layout]:
+    """Return all layouts of a search by predictions alone, the best first.
+
+    The search starts from given layouts, then changes the best so far by one or two moves.
+
+    Args:
+        guesses: The predictions, which it extends.
+        begin_with: Legal initial layouts.
+        most: Largest number of further layouts.
+        rng: Draws the changes.
+        tell: Called with the share that is done.
+    """
+    guesses.loads([tuple(sorted(each)) for each in begin_with])
+    moves, end = Moves(guesses.case.scenario), guesses.count + most
+    tries = 0
+    while guesses.count < end and tries < 4 * most:
+        tell(1.0 - (end - guesses.count) / most)
+        best = guesses.ranked()[:_KEPT]
+        changed = [moves.near_best(best, rng) for _ in range(min(_BATCH, end - guesses.count))]
+        guesses.loads(changed)
+        tries += len(changed)
+    return guesses.ranked()
+
+
+@dataclass(frozen=True)
+class LearntSearch(Search):
+    """A search guided by a surrogate of gas dynamics, a trained agent, or both.
+
+    Without a blast (a budget of 0) it proposes
+
+    - with a surrogate, the best prediction among the rules' layouts and changes of them;
+    - with an agent, the agent's layout;
+    - with both, the best prediction among the agent's layout and its samples.
+
+    With blasts, a surrogate selects the layouts to simulate: first the agent's layout, then in
+    turn the rules' layouts and the best of a search by predictions alone, then changes of the best
+    simulated layouts, one out of many at a time. The selection uses predictions corrected by the
+    errors on similar layouts (`Correction`). Against a hidden charge, layouts are simulated for a
+    few places only. The prediction under all places, times the ratio of simulated to predicted
+    load under those few, estimates a layout better than its simulated loads alone: it selects the
+    layouts to change, and those to simulate for the other places in the end.
+
+    An agent without a surrogate spends its blasts on its own layout, its samples and the rules,
+    and then on changes of the best of these by one or two moves, in favour of the better ones.
+
+    Attributes:
+        surrogate: The surrogate.
+        agent: The agent.
+        digest: Digest of both, which identifies results.
+        changes: Number of changed layouts to predict in a search without blasts.
+        ranked: Number of samples of the agent in a search without blasts.
+        guesses: Number of layouts to predict before the first blast.
+        agent_draws: Number of samples of the agent among these.
+        drawn: Number of changed layouts from which the surrogate selects one, afterwards.
+        guessed_share: Share of the blasts for layouts found by predictions alone.
+        drawn_share: Without a surrogate, share of the layouts that the agent samples.
+        name: Name in tables.
+
+    Raises:
+        BlastEnvError: If there is neither a surrogate nor an agent.
+    """
+
+    surrogate: Surrogate | None = field(default=None, repr=False)
+    agent: SamplingAgent | None = field(default=None, repr=False)
+    digest: str = ""
+    changes: int = 300
+    ranked: int = 16
+    guesses: int = 600
+    agent_draws: int = 64
+    drawn: int = 16
+    guessed_share: float = 0.4
+    drawn_share: float = 0.3
+    name: str = "surrogate"
+
+    def __post_init__(self) -> None:
+        if self.surrogate is None and self.agent is None:
+            raise BlastEnvError("there is neither a surrogate nor an agent, must be one or both")
+
+    def propose(
+        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+    ) -> SearchResult:
+        """Return the best layout by blasts or, with a budget of 0, by predictions.
+
+        Raises:
+            BlastEnvError: If no structure is protected.
+        """
+        if budget:
+            return super().propose(problem, budget, seed, report)
+
+        def tell(share: float) -> None:
+            if report is not None:
+                report(Progress(0, 0, guessed=share))
+
+        layout = self.at_once(problem.scenario, problem.told, tell)
+        return SearchResult(layout, self.name, seed=seed)
+
+    def at_once(
+        self,
+        scenario: Scenario,
+        charge: AnyCharge | None = None,
+        tell: Callable[[float], None] = lambda _: None,
+    ) -> Layout:
+        """Return the layout proposed without a blast; it is deterministic.
+
+        Args:
+            scenario: The scenario; it has a build zone.
+            charge: The charge, if it is known; otherwise the layout is for some of the charges of
+                the scenario.
+            tell: Called with the share that is done.
+
+        Raises:
+            BlastEnvError: As for `propose`.
+        """
+        if self.surrogate is None:
+            return tuple(sorted(_given(self.agent).propose(scenario, charge)))
+        guesses = Guesses.of(self.surrogate, case_for(scenario, charge))
+        tell(0.5 * _SITE_SHARE)
+        if self.agent is None:
+            begin_with = [(), *layouts_by_rule(scenario, charge).values()]
+
+            def go_on(share: float) -> None:
+                tell(_SITE_SHARE + (1.0 - _SITE_SHARE) * share)
+
+            return improved(guesses, begin_with, self.changes, generator(0), go_on)[0]
+        proposed = self.agent.propose(scenario, charge)
+        drawn = self.agent.sample(scenario, charge, self.ranked, 0)
+        guesses.loads([tuple(sorted(each)) for each in (proposed, *drawn)])
+        return guesses.ranked()[0]
+
+    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+        """Divide the blasts; with a surrogate and a hidden charge, favour threats over layouts."""
+        plan = Plan.of(problem, budget)
+        most = len(problem.threats)
+        places = min(max(plan.threats, _LEAST_PLACES), most, budget)
+        if self.surrogate is None or problem.told is not None or places == most:
+            return plan
+        return Plan(places, budget - min(round(_CHOOSING_SHARE * budget), budget - places))
+
+    def phases(self, session: SearchSession) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Return the functions that explore a session and make the final choice."""
+        if self.surrogate is None:
+            return super().phases(session)
+        estimates = _Estimates.of(self.surrogate, session)
+
+        def choose() -> None:
+            for layout in estimates.ranked():
+                session.assess([layout], len(session.problem.threats))
+
+        return partial(self._explore_by_guesses, session, estimates), choose
+
+    def explore(self, session: SearchSession) -> None:
+        """Simulate the rules' layouts and the agent's samples, then changes of the best."""
+        scenario, told, plan = session.problem.scenario, session.problem.told, session.plan
+        agent = _given(self.agent)
+        count = max(1, round(self.drawn_share * plan.exploring_layouts))
+        session.assess([agent.propose(scenario, told)])
+        session.assess([*layouts_by_rule(scenario, told).values()])
+        session.assess(agent.sample(scenario, told, count, session.seed))
+        moves = Moves(scenario)
+        while True:
+            best = session.ranked(plan.threats)[:_KEPT]
+            session.assess([moves.near_best(best, session.rng)])
+
+    def _explore_by_guesses(self, session: SearchSession, estimates: "_Estimates") -> None:
+        """Simulate the layouts with the best predictions, then changes of the best."""
+        scenario, told = session.problem.scenario, session.problem.told
+        guesses = estimates.everywhere
+        rules = layouts_by_rule(scenario, told).values()
+        proposed: list[Layout] = []
+        if self.agent is not None:
+            drawn = self.agent.sample(scenario, told, self.agent_draws, session.seed)
+            proposed = [self.agent.propose(scenario, told), *drawn]
+        session.assess(proposed[:1])
+        found = improved(guesses, [(), *rules, *proposed], self.guesses, session.rng)
+        layouts = session.plan.exploring_layouts
+        share = max(1, round(self.guessed_share * layouts))
+        ruled = sorted(rules, key=lambda layout: guesses.loads([layout]).item())
+        ruled = ruled[: ceil(layouts / _LAYOUTS_A_RULE)]
+        tried = {*proposed[:1]}
+
+        def try_best(candidates: Sequence[Layout]) -> None:
+            new = [each for each in dict.fromkeys(candidates) if each not in tried]
+            chosen = estimates.likeliest(new or candidates)
+            tried.add(chosen)
+            session.assess([chosen])
+
+        for number in range(share):
+            try_best(found[:_POOL])
+            try_best(ruled[number : number + 1] or found[:_POOL])
+        moves = Moves(scenario)
+        while True:
+            best = estimates.ranked()[:_KEPT]
+            try_best([moves.near_best(best, session.rng) for _ in range(self.drawn)])
+
+
+def packaged_search() -> LearntSearch:
+    """Return the search by the bundled surrogate."""
+    return search_by(packaged_surrogate())
+
+
+def search_by(surrogate: Surrogate) -> LearntSearch:
+    """Return the search by a surrogate."""
+    return LearntSearch(surrogate, digest=surrogate.digest)
+
+
+def _given(agent: SamplingAgent | None) -> SamplingAgent:
+    assert agent is not None  # as checked when it was made
+    return agent
+
+
+def case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
+    """Return the case of a proposal without blasts: the charge, or some of the possible ones."""
+    if charge is not None:
+        return practice_visible(scenario, charge, 1, 0)
+    drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
+    return replace(drawn, threats=one_of_each_charge(drawn.threats)[:_HIDDEN_CHARGES])
+
+
+_LAYOUTS_A_RULE: Final = 8
+"""Exploring layouts per rule's layout: limits the rules that are simulated."""
+
+_LEAST_PLACES: Final = 4
+"""Least number of threats per exploring layout against a hidden charge."""
+
+_POOL: Final = 64
+"""Number of best predicted layouts that are candidates for a blast."""
+
+_LEARNT_FROM: Final = 64
+"""Number of best layouts that the correction is fitted to: its cost grows with the cube."""
+
+_LEAST_SHARE: Final = 1e-3
+"""Least ratio of simulated to predicted load; without it, a load of zero has no logarithm."""
+
+_HOPE: Final = 0.5
+"""Standard deviations below the mean at which the lower confidence bound lies."""
+
+_CHOOSING_SHARE: Final = 0.4
+"""Share of the blasts held in reserve for the remaining places of a hidden charge."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimates:
+    """Estimated loads under all threats for layouts simulated under the first threats.
+
+    Attributes:
+        session: Holds the simulated loads under the first threats.
+        everywhere: Predictions under all threats.
+        met: Predictions under the first threats, those of exploration.
+    """
+
+    session: SearchSession
+    everywhere: Guesses
+    met: Guesses
+
+    @classmethod
+    def of(cls, surrogate: Surrogate, session: SearchSession) -> "_Estimates":
+        """Return estimates without predictions."""
+        problem = session.problem
+
+        def under(threats: Sequence[Threat]) -> Guesses:
+            case = Case(problem.scenario, tuple(threats), risk=problem.case.risk)
+            return Guesses.of(surrogate, case)
+
+        first = problem.threats[: session.plan.threats]
+        return cls(session, under(problem.threats), under(first))
+
+    def ranked(self) -> list[Layout]:
+        """Return the layouts simulated under the first threats, the least estimate first."""
+        layouts = self.session.ranked(self.session.plan.threats)
+        if not layouts:
+            return []
+        wrong_by = np.exp(self._errors(layouts))
+        order = np.argsort(wrong_by * self.everywhere.loads(layouts), kind="stable")
+        return [layouts[index] for index in order.tolist()]
+
+    def likeliest(self, layouts: Sequence[Layout]) -> Layout:
+        """Return the layout with the least lower confidence bound of the corrected prediction."""
+        scores = np.log(self.everywhere.loads(layouts))
+        met = self.session.ranked(self.session.plan.threats)[:_LEARNT_FROM]
+        if met:
+            barrier = self.everywhere.site.barrier
+            correction = Correction.of([barrier(each) for each in met], self._errors(met))
+            mean, spread = correction.expected([barrier(each) for each in layouts])
+            scores += mean - _HOPE * spread
+        return layouts[int(scores.argmin())]
+
+    def _errors(self, layouts: Sequence[Layout]) -> FloatArray:
+        """Return the logarithms of simulated over predicted loads, first threats (layouts,)."""
+        shares = self.session.assess(layouts) / self.met.loads(layouts)
+        errors: FloatArray = np.log(np.maximum(shares, _LEAST_SHARE))
+        return errors

@@ -1,0 +1,35 @@
+"""Engines: their common interface, the registry, and functions that run blasts on them.
+
+`engines.gas` is not imported here, because it imports Numba, which takes half a second.
+"""
+
+from blast_env.evaluation.engines.contract import (
+    CALIBRATED_ENGINES,
+    ENGINE_NAMES,
+    JUDGE,
+    BlastLoads,
+    Engine,
+    EngineOption,
+    StructureLoad,
+    default_engine,
+    find_engine,
+)
+from blast_env.evaluation.engines.particles import Blast, BlastResult, ParticleEngine
+from blast_env.evaluation.engines.simulate import simulate, simulate_many
+
+__all__ = [
+    "CALIBRATED_ENGINES",
+    "ENGINE_NAMES",
+    "JUDGE",
+    "Blast",
+    "BlastLoads",
+    "BlastResult",
+    "Engine",
+    "EngineOption",
+    "ParticleEngine",
+    "StructureLoad",
+    "default_engine",
+    "find_engine",
+    "simulate",
+    "simulate_many",
+]

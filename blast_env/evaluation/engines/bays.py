@@ -1,0 +1,295 @@
+"""Bays of facades under a gas-dynamics blast: pressure histories, response and damage.
+
+The history of a bay is the mean overpressure on its cell faces at each step. Bays that no air
+touches, as in a wall between two parts of a building, have none and are left out.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import UnknownNameError
+from blast_env.evaluation.engines.gas_tables import KNOWN_COLUMN
+from blast_env.gas.ending import is_known
+from blast_env.gas.settings import FACE_NAMES
+from blast_env.response.damage import Alternatives, BayDamage, bay_damages
+from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
+from blast_env.response.glass import GlazingCondition
+from blast_env.response.sdof import impulses
+from blast_env.site.scene import StructureOutline
+from blast_env.tables import Column, table_of
+
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
+    from blast_env.gas.engine import FaceTable, GasRun
+    from blast_env.gas.probes import PatchHistories
+
+BAY_COLUMNS: Final = (
+    Column("bay", "", "structure/wall/storey/number"),
+    Column("structure", "", "name of the structure"),
+    Column("wall", "", "west, east, south or north"),
+    Column("storey", "", "counted from 1 at the ground"),
+    Column("number", "", "counted from 1 along the wall, from west or from south"),
+    Column("area_m2", "m2", "area of the bay"),
+    Column("peak_pa", "Pa", "largest mean overpressure on the bay"),
+    Column("impulse_pa_s", "Pa s", "peak specific impulse of that mean"),
+    Column("panes", "", "panes in the bay"),
+    Column("break_probability", "", "share of such panes that break"),
+    Column("condition", "", "performance condition of glazing, GSA: 1, 2, 3a, 3b, 4, 5"),
+    Column("flight_m", "m", "how far the fragments of panes that break fly; 0 where they are held"),
+    Column("ductility", "", "of the wall panel: largest deflection over that at yield"),
+    Column("rotation_deg", "degrees", "support rotation of the wall panel"),
+    Column("damage", "", "damage of the wall panel in the terms of PDC-TR 06-08"),
+)
+"""One row per bay; values for components that a bay lacks are empty."""
+
+LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN)
+"""One row per bay under a blast."""
+
+
+@dataclass(frozen=True, eq=False)
+class BayLoads:
+    """The pressure histories of the bays under a blast.
+
+    Attributes:
+        bays: The bays that air touches.
+        recorder: Their histories along the normals of the walls, one patch each.
+    """
+
+    bays: tuple[FilledBay, ...]
+    recorder: "PatchHistories"
+
+    @classmethod
+    def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
+        """Return the loads of a run that has not begun, to be recorded by `GasRun.record`.
+
+        Args:
+            run: The run.
+            bays: The bays of its scenario.
+        """
+        from blast_env.gas.probes import PatchHistories
+
+        patch = bay_patches(run.table, [each.name for each in run.site.structures], bays)
+        seen = np.unique(patch[patch >= 0])
+        renumbered = np.full(len(bays) + 1, -1)  # the last is for no bay
+        renumbered[seen] = np.arange(len(seen))
+        shown = tuple(bays[index] for index in seen.tolist())
+        return cls(shown, PatchHistories(renumbered[patch], len(shown), run.table.share))
+
+    @property
+    def history_pa(self) -> NDArray[np.float32]:
+        """Mean overpressures along the normals of the walls, Pa (bays, steps)."""
+        return self.recorder.history_pa
+
+    @cached_property
+    def response(self) -> FacadeResponse:
+        """The response of the windows and wall panels in the bays."""
+        return respond(self.bays, *self.histories)
+
+    def damages(
+        self, alternatives: Sequence[Alternatives], peak_factor: float
+    ) -> tuple[BayDamage, ...]:
+        """Return the damage of the bays with each of their possible components.
+
+        Args:
+            alternatives: The possible components of the bays of the scenario.
+            peak_factor: Factor on peaks to make them as sharp as in the open.
+        """
+        by_name = {each.name: each for each in alternatives}
+        own = [by_name[each.bay.name] for each in self.bays]
+        return bay_damages(own, *self.histories, peak_factor) if own else ()
+
+    @property
+    def histories(self) -> tuple[FloatArray, FloatArray]:
+        """Two or more times, s (times,), and the overpressures at them, Pa (bays, times).
+
+        A run of fewer than two steps is padded to two times.
+        """
+        time_s, step_s = self.recorder.time_s, self.recorder.step_s
+        history_pa = self.history_pa.astype(np.float64)
+        if len(time_s) > 1:
+            return time_s, history_pa
+        if not len(time_s):
+            return np.array([0.0, 1.0]), np.zeros((len(self.bays), 2))
+        return time_s + 0.5 * step_s * np.array([-1.0, 1.0]), np.repeat(history_pa, 2, axis=1)
+
+    def history(self, name: str) -> "pd.DataFrame":
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If no bay of that name touches air.
+        """
+        import pandas as pd
+
+        names = [each.bay.name for each in self.bays]
+        if name not in names:
+            raise UnknownNameError("bay", name, names)
+        history = self.history_pa[names.index(name)]
+        return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
+
+    def table(self, run: "GasRun") -> "pd.DataFrame":
+        """Return one row per bay; see `LOADED_BAY_COLUMNS`.
+
+        Args:
+            run: The run that recorded the bays.
+        """
+        if not self.bays:
+            return table_of([], LOADED_BAY_COLUMNS)
+        known = self.known(run)
+        rows = [row | {"known": known[str(row["bay"])]} for row in bay_rows(self.response)]
+        return table_of(rows, LOADED_BAY_COLUMNS)
+
+    def known(self, run: "GasRun") -> dict[str, bool]:
+        """Return whether the load of each bay was known at the end of the run, by its name.
+
+        Args:
+            run: The run that recorded the bays.
+        """
+        names = [each.name for each in run.site.structures]
+        come = {name: run.has_come(index) for index, name in enumerate(names)}
+        net = impulses(self.response.time_s, self.response.pressure_pa)
+        known = is_known(net.max(axis=1, initial=0.0), net[:, -1])
+        return {
+            filled.bay.name: come[filled.bay.structure] and is_one
+            for filled, is_one in zip(self.bays, known.tolist(), strict=True)
+        }
+
+
+class UnjudgedWalls(NamedTuple):
+    """Counted walls of a building with a facade that lie in no bay: no verdict covers them.
+
+    Attributes:
+        building: Name of the building.
+        area_m2: Area of these walls that touches air, m2.
+        of_m2: Area of all counted walls of the building that touches air, m2.
+        structures: The parts of the building with such walls.
+    """
+
+    building: str
+    area_m2: float
+    of_m2: float
+    structures: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """A sentence that states the area and the parts."""
+        parts = ", ".join(self.structures)
+        return (
+            f"{self.area_m2:.1f} of {self.of_m2:.1f} m2 of its walls stand in no bay ({parts}): "
+            "no verdict covers them"
+        )
+
+
+def unjudged_walls(
+    table: "FaceTable",
+    outlines: Sequence[StructureOutline],
+    buildings: Mapping[str, str],
+    bays: Sequence[FilledBay],
+    area_m2: FloatArray,
+) -> tuple[UnjudgedWalls, ...]:
+    """Return the walls that no verdict covers, one item per building with any.
+
+    Only buildings with a facade are examined.
+
+    Args:
+        table: The faces of cells.
+        outlines: The structures of the run, with their counted walls.
+        buildings: The building of each structure of the scenario.
+        bays: The bays of the scenario.
+        area_m2: Area of each face along the normal of its wall, m2 (faces,).
+    """
+    structures = [each.name for each in outlines]
+    left_out, counts = bay_patches(table, structures, bays) < 0, np.zeros(len(table.face), bool)
+    for index, each in enumerate(outlines):
+        walls = [FACE_NAMES.index(name) for name in each.faces]
+        counts |= (table.structure == index) & np.isin(table.face, walls)
+    found = []
+    for building in dict.fromkeys(buildings[each.bay.structure] for each in bays):
+        parts = [i for i, name in enumerate(structures) if buildings.get(name) == building]
+        own = counts & np.isin(table.structure, parts)
+        without = own & left_out
+        if without.any():
+            names = tuple(structures[i] for i in np.unique(table.structure[without]).tolist())
+            left_m2, of_m2 = float(area_m2[without].sum()), float(area_m2[own].sum())
+            found.append(UnjudgedWalls(building, left_m2, of_m2, names))
+    return tuple(found)
+
+
+def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
+    """Return the response of bays, one row each, with the keys of `BAY_COLUMNS`."""
+    panes = {index: row for row, index in enumerate(found.glazed.tolist())}
+    panels = {index: row for row, index in enumerate(found.walled.tolist())}
+    rows = []
+    for index, filled in enumerate(found.bays):
+        bay = filled.bay
+        pressure = found.pressure_pa[index]
+        row: dict[str, object] = {
+            "bay": bay.name,
+            "structure": bay.structure,
+            "wall": bay.wall,
+            "storey": bay.storey,
+            "number": bay.number,
+            "area_m2": bay.area_m2,
+            "peak_pa": pressure.max(),
+            "impulse_pa_s": impulses(found.time_s, pressure).max(),
+            "panes": filled.panes,
+            "break_probability": np.nan,
+            "condition": "",
+            "flight_m": np.nan,
+            "ductility": np.nan,
+            "rotation_deg": np.nan,
+            "damage": "",
+        }
+        if index in panes:
+            pane = panes[index]
+            row["flight_m"] = found.glazing.flight_m[pane]
+            row["break_probability"] = found.glazing.break_probability[pane]
+            row["condition"] = GlazingCondition(int(found.glazing.condition[pane])).label
+        if index in panels:
+            panel = panels[index]
+            row["ductility"] = found.walls.ductility[panel]
+            row["rotation_deg"] = found.walls.rotation_deg[panel]
+            row["damage"] = found.walls.levels[panel].name.lower()
+        rows.append(row)
+    return rows
+
+
+def bay_patches(
+    table: "FaceTable", structures: Sequence[str], bays: Sequence[FilledBay]
+) -> NDArray[np.int64]:
+    """Return the index of the bay of each cell face, -1 for none (faces,)."""
+    patch = np.full(len(table.faces), -1)
+    walls: dict[tuple[str, str], list[int]] = {}
+    for index, each in enumerate(bays):
+        walls.setdefault((each.bay.structure, each.bay.wall), []).append(index)
+    for (structure, wall), members in walls.items():
+        own = np.flatnonzero(
+            (table.structure == structures.index(structure))
+            & (table.face == FACE_NAMES.index(wall))
+        )
+        for index in members:
+            bay = bays[index].bay
+            patch[own[_inside(bay, table, own)]] = index
+    return patch
+
+
+def _inside(bay: Bay, table: "FaceTable", own: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return which of some faces of its side lie in a bay (own,)."""
+    places_m, height_m = table.centre_m[own, :2], table.centre_m[own, 2]
+    inside = (height_m >= bay.floor_m) & (height_m < bay.top_m)
+    left_m, right_m = bay.left_m, bay.right_m
+    if bay.line is None:
+        along_m = places_m[:, 1 if bay.wall in ("west", "east") else 0]
+    else:
+        along_m = bay.line.along_m(places_m)
+        inside &= table.wall[own] == bay.line_number
+        # Steps at corners may lie beyond the ends of the wall.
+        left_m = -np.inf if left_m == 0.0 else left_m
+        right_m = np.inf if right_m >= bay.line.length_m else right_m
+    return np.asarray(inside & (along_m >= left_m) & (along_m < right_m))

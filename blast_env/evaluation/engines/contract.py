@@ -1,0 +1,569 @@
+"""The interface of engines, which compute the loads of a blast, and the registry of engines.
+
+A custom engine is a class with a name, a version and `loads`; everything else has a default:
+
+    class Mine(Engine):
+        name, version = "mine", "mine 1"
+
+        def loads(self, scenario, layout, charge, seed): ...
+
+An instance is accepted wherever an engine's name is. A row in the table below registers a name.
+"""
+
+from abc import ABC
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from importlib import import_module
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
+from blast_env.geometry import Element
+from blast_env.particles.calibration.model import Calibration
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.damage import BayDamage, level_of, worst
+from blast_env.site import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
+from blast_env.site.facade import NamedBay
+from blast_env.site.models import StructureSection
+
+if TYPE_CHECKING:  # pandas takes a third of a second to import
+    import pandas as pd
+
+    from blast_env.gas.cost import CostGuess
+
+
+@dataclass(frozen=True)
+class StructureLoad:
+    """The load on one structure.
+
+    Attributes:
+        name: Name of the structure.
+        protected: Whether its load counts.
+        weight: Its weight among the protected structures.
+        impulse_sim: Sum of m |v| over the collisions, simulation units.
+        transferred_impulse_sim: Momentum actually transferred, simulation units.
+        impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; for gas
+            dynamics the peak specific impulse, averaged over the counted walls.
+        peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which have none.
+        peak_weight: Weight of the peak among the protected structures.
+        in_range: Whether this distance and charge lie in the range of the calibration.
+        notes: Reasons if they do not, one sentence each.
+        building: The building that it is part of; its own name if it is a building by itself.
+        area_m2: Area of the counted walls; `None` where the engine has no areas.
+        response: Response of its bays in the objective; `None` unless the objective is a response.
+        worst_damage: The largest damage of its bays, for the same objective.
+    """
+
+    name: str
+    protected: bool
+    weight: float
+    impulse_sim: float
+    transferred_impulse_sim: float
+    impulse_pa_s: float
+    peak_pa: float | None
+    peak_weight: float
+    in_range: bool
+    notes: tuple[str, ...]
+    building: str
+    area_m2: float | None = None
+    response: float | None = None
+    worst_damage: float | None = None
+
+    @classmethod
+    def on(
+        cls,
+        structure: StructureSection,
+        impulse_pa_s: float,
+        peak_pa: float | None = None,
+        in_range: bool = False,
+        notes: tuple[str, ...] = (),
+        area_m2: float | None = None,
+    ) -> Self:
+        """Return the load on a structure of a scenario by an engine without simulation units.
+
+        Args:
+            structure: The structure.
+            impulse_pa_s: Impulse per area, Pa*s.
+            peak_pa: Largest overpressure on its walls, Pa.
+            in_range: Whether the engine was checked for this distance and charge.
+            notes: Reasons if it was not, one sentence each.
+            area_m2: Area of the counted walls.
+        """
+        return cls(
+            name=structure.name,
+            protected=structure.protected,
+            weight=structure.weight,
+            impulse_sim=np.nan,
+            transferred_impulse_sim=np.nan,
+            impulse_pa_s=impulse_pa_s,
+            peak_pa=peak_pa,
+            peak_weight=structure.counted_peak_weight,
+            in_range=in_range,
+            notes=notes,
+            building=structure.building_name,
+            area_m2=area_m2,
+        )
+
+
+class _Part(Protocol):
+    @property
+    def protected(self) -> bool: ...
+
+
+AnyPart = TypeVar("AnyPart", bound=_Part)
+
+
+def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
+    """Return the parts whose loads make up a building's load: the protected ones, or else all."""
+    return [each for each in parts if each.protected] or parts
+
+
+def mean_over_area(load: FloatArray, area: FloatArray) -> float:
+    """Return the area-weighted mean load of a wall, structure or building; NaN without parts.
+
+    Args:
+        load: Loads on its parts (n,).
+        area: Their areas, in any unit (n,).
+    """
+    return float(np.average(load, weights=area)) if len(load) else np.nan
+
+
+def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
+    """Combine the loads on structures into loads on buildings.
+
+    Impulses are means over the area of the counted walls. Where the engine has no areas, the
+    weights of the structures replace them.
+    """
+    parts: dict[str, list[StructureLoad]] = {}
+    for load in loads:
+        parts.setdefault(load.building, []).append(load)
+    return tuple(
+        replace(own[0], name=name) if len(own) == 1 else _on_building(name, own)
+        for name, own in parts.items()
+    )
+
+
+def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
+    counted = counted_parts(parts)
+    areas_m2 = [each.area_m2 for each in counted if each.area_m2 is not None]
+    weights = [each.weight for each in counted]
+    is_known = len(areas_m2) == len(counted)
+    peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
+    impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
+    return replace(
+        counted[0],
+        name=name,
+        weight=sum(weights),
+        impulse_sim=sum(each.impulse_sim for each in parts),
+        transferred_impulse_sim=sum(each.transferred_impulse_sim for each in parts),
+        impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
+        peak_pa=max(peaks_pa, default=None),
+        in_range=all(each.in_range for each in counted),
+        area_m2=sum(areas_m2) if is_known else None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BlastLoads:
+    """The loads of one blast on all structures, without the barrier.
+
+    Attributes:
+        structures: One load per structure, in the order of the scene.
+        module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
+            scene, simulation units (modules,); for gas dynamics the momentum on its walls, N s.
+        bays: Damage of the bays of facades with each of their possible components; empty unless
+            the objective is a response.
+    """
+
+    structures: tuple[StructureLoad, ...]
+    module_impulse_sim: NDArray[np.float64]
+    bays: tuple[BayDamage, ...] = ()
+
+    def with_facades(
+        self, named: Collection[NamedBay], objective: ObjectiveSection
+    ) -> "BlastLoads":
+        """Return the loads with the response of given facades, without another blast.
+
+        Args:
+            named: The bays with the names of their components.
+            objective: Defines the measure of the response.
+
+        Raises:
+            BlastEnvError: If the bays were not recorded.
+        """
+        if not self.bays:
+            raise BlastEnvError("the engine records no bays, but objective.kind is 'response'")
+        responded = []
+        for load in self.structures:
+            own = [each for each in self.bays if each.structure == load.name]
+            response, most = structure_response(own, named, objective)
+            responded.append(replace(load, response=response, worst_damage=most))
+        return replace(self, structures=tuple(responded))
+
+    @property
+    def level(self) -> LevelOfProtection:
+        """The level of protection of the facades of the protected structures."""
+        return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
+
+    def are_for(self, scenario: AnyScenario) -> bool:
+        """Return whether these can be the loads of a scenario.
+
+        They must be finite, one per structure and module, with its bays where it needs them.
+        """
+        found = find_scenario(scenario)
+        names = [structure.name for structure in found.structures]
+        modules = sum(structure.modules for structure in found.structures)
+        impulses = np.array([load.impulse_pa_s for load in self.structures])
+        return (
+            [load.name for load in self.structures] == names
+            and self.module_impulse_sim.shape == (modules,)
+            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse_sim).all())
+            and self._has_bays_of(found)
+        )
+
+    def _has_bays_of(self, scenario: Scenario) -> bool:
+        """Return whether the bays and components are the scenario's, and the damage is finite."""
+        if not scenario.objective.is_response:
+            return not self.bays
+        known = {each.name: {*each.glazing, *each.wall} for each in scenario.alternatives}
+        return bool(self.bays) and all(
+            known.get(each.name) == set(each.damage)
+            and np.isfinite([*each.damage.values(), each.area_m2, each.glazed_m2]).all()
+            for each in self.bays
+        )
+
+    @property
+    def protected(self) -> tuple[StructureLoad, ...]:
+        """The loads on the protected structures."""
+        return tuple(load for load in self.structures if load.protected)
+
+    @property
+    def protected_impulse_pa_s(self) -> float:
+        """Weighted sum of the impulses of the protected buildings, Pa*s."""
+        return sum(each.weight * each.impulse_pa_s for each in on_buildings(self.protected))
+
+    @property
+    def protected_impulse_sim(self) -> float:
+        """Weighted sum of the impulses of the protected structures, simulation units."""
+        return sum(load.weight * load.impulse_sim for load in self.protected)
+
+    @property
+    def protected_peak_pa(self) -> float:
+        """The largest overpressure on any wall of a protected structure, Pa; NaN for particles."""
+        peaks = [load.peak_pa for load in self.protected]
+        return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
+
+    def load(self, objective: ObjectiveSection) -> float:
+        """Return the load of the protected structures in the unit of the objective.
+
+        Args:
+            objective: Selects the load: impulse, peak or response.
+        """
+        impulse_pa_s = {each.name: each.impulse_pa_s for each in on_buildings(self.protected)}
+        return sum(
+            objective.load(
+                impulse_pa_s[load.building],
+                load.peak_pa or 0.0,
+                load.weight,
+                load.peak_weight,
+                load.response,
+            )
+            for load in self.protected
+        )
+
+    @property
+    def in_range(self) -> bool:
+        """Whether the load on every protected structure is in the range of the calibration."""
+        return all(load.in_range for load in self.protected)
+
+
+def structure_response(
+    bays: Collection[BayDamage], named: Collection[NamedBay], objective: ObjectiveSection
+) -> tuple[float, float]:
+    """Return the response of one structure in the objective, and the largest damage of its bays.
+
+    Args:
+        bays: The damage of its bays with each of their possible components.
+        named: The bays of all structures with the names of their components.
+        objective: Defines the measure of the response.
+    """
+    chosen = {each.bay.name: each for each in named}
+    is_glazing = objective.measure == "glazing"
+    damage, area_m2 = [], []
+    for each in bays:
+        bay = chosen[each.name]
+        names = (bay.glazing,) if is_glazing else (bay.glazing, bay.wall)
+        damage.append(worst(each.damage[name] for name in names if name is not None))
+        area_m2.append(each.glazed_m2 if is_glazing else each.area_m2)
+    return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
+
+
+@dataclass(frozen=True)
+class EngineOption:
+    """A setting that is specific to one engine.
+
+    Attributes:
+        name: Name of the field and, with dashes, of the command-line option.
+        help: Description for users, one sentence.
+    """
+
+    name: str
+    help: str
+
+
+class BlastOutcome(Protocol):
+    """The outcome of a blast on any engine."""
+
+    @property
+    def structures(self) -> "pd.DataFrame":
+        """One row per structure."""
+
+    @property
+    def digest(self) -> str:
+        """Hexadecimal digest of the whole outcome."""
+
+    def loads(self) -> BlastLoads:
+        """Return the loads on all structures."""
+
+
+class RunnableBlast(Protocol):
+    """One blast that can be run to its end."""
+
+    def run(self, progress: Callable[[float], None] | None = None) -> BlastOutcome:
+        """Run the blast.
+
+        Args:
+            progress: Called periodically with the elapsed share of the time limit.
+        """
+
+
+class Engine(ABC):
+    """Computes the loads of blasts on a site.
+
+    Attributes:
+        name: Name in records and calibrations.
+        version: Version of the code that does the physics.
+        has_noise: Whether one charge has several realisations, selected by a seed.
+        has_peaks: Whether it computes overpressures as well as impulses.
+        knows_heights: Whether blasts pass over structures and barriers.
+        needs_calibration: Whether a calibration of the scenario converts its impulses to Pa s.
+        title: Its kind, for display.
+        caveat: Warning with every result, one sentence; empty for none.
+        validated_range: The range in which it was validated, for "outside ...".
+        options: Settings that only this engine has.
+        unfolding: The class that shows a blast step by step in `BlastSimulator-v0`, as
+            "module:Class"; empty where there is no blast to show.
+        screening: The class that makes films of a blast, in the same form.
+        shown: The class that shows a blast in `blast-env simulate`, in the same form.
+    """
+
+    has_noise: ClassVar[bool] = False
+    has_peaks: ClassVar[bool] = False
+    knows_heights: ClassVar[bool] = True
+    needs_calibration: ClassVar[bool] = False
+    title: ClassVar[str] = "Own engine"
+    caveat: ClassVar[str] = ""
+    validated_range: ClassVar[str] = "the validated range of the engine"
+    options: ClassVar[tuple[EngineOption, ...]] = ()
+    unfolding: ClassVar[str] = ""
+    screening: ClassVar[str] = ""
+    shown: ClassVar[str] = ""
+
+    name: str
+    version: str
+
+    def loads(
+        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
+    ) -> BlastLoads:
+        """Return the loads of one blast on all structures, by default by running `blast`.
+
+        Args:
+            scenario: The scenario.
+            layout: A legal layout.
+            charge: The charge in place, or the vehicle that carries it.
+            seed: Seed of the noise; engines without noise ignore it.
+        """
+        return self.blast(scenario, layout, seed, charge).run().loads()
+
+    def blast(
+        self,
+        scenario: AnyScenario,  # noqa: ARG002
+        layout: Sequence[Element] = (),  # noqa: ARG002
+        seed: int = 0,  # noqa: ARG002
+        charge: AnyCharge | None = None,  # noqa: ARG002
+    ) -> RunnableBlast:
+        """Return one blast, for running and inspection.
+
+        Raises:
+            BlastEnvError: If the engine computes loads without a blast.
+        """
+        raise BlastEnvError(
+            f"engine {self.name!r} predicts loads without a blast: there is none to show"
+        )
+
+    def check(self, scenario: Scenario) -> None:
+        """Refuse a scenario whose loads this engine cannot compute.
+
+        Raises:
+            BlastEnvError: If it cannot; the message gives the reason.
+        """
+        if scenario.objective.needs_peaks and not self.has_peaks:
+            counts = scenario.objective
+            key, instead = ("kind", "load") if counts.is_response else ("quantity", "impulse")
+            raise BlastEnvError(
+                f"scenario {scenario.name!r}: objective.{key} is {getattr(counts, key)!r}, but"
+                f" engine {self.name!r} knows no overpressure: must be {instead!r}, or the engine"
+                " 'gas'"
+            )
+
+    def cost(self, scenario: Scenario, charge: AnyCharge) -> "CostGuess | None":  # noqa: ARG002
+        """Return an estimate of the cost of a blast; `None` for engines without one."""
+        return None
+
+    def calibration(self, scenario: Scenario) -> Calibration | None:  # noqa: ARG002
+        """Return the calibration that converts its impulses to Pa s; `None` if it needs none."""
+        return None
+
+    def preset(self, scenario: Scenario) -> str | None:  # noqa: ARG002
+        """Return the name of the preset of parameters in the scenario; `None` if it has none."""
+        return None
+
+    @property
+    def words(self) -> str:
+        """The engine's name and the settings that affect its results, for display."""
+        return self.name
+
+    def final(self, scenarios: Sequence[Scenario]) -> "Engine":  # noqa: ARG002
+        """Return the engine with the resolution of final statements on some sites.
+
+        Args:
+            scenarios: The sites.
+        """
+        return self
+
+    @property
+    def coarser(self) -> "Engine | None":
+        """The engine with cells twice as large, for their error; `None` if it has none."""
+        return None
+
+    def describe(self, scenarios: Iterable[Scenario] = ()) -> str:  # noqa: ARG002
+        """Describe the engine in one line.
+
+        Args:
+            scenarios: The scenarios of its runs; engines with parameters name their presets.
+        """
+        known = self.version.split()[0] == self.name
+        return f"engine {self.version}" if known else f"engine {self.name}, {self.version}"
+
+    def configured(self, **settings: object) -> Self:
+        """Return the engine with other settings; `None` leaves one as it is.
+
+        Raises:
+            BlastEnvError: If the engine has no such setting, or the value is out of bounds.
+        """
+        given = {name: value for name, value in settings.items() if value is not None}
+        own = {option.name for option in self.options}
+        for name, value in given.items():
+            if name not in own:
+                noun = "cells" if name == "cell_m" else f"setting {name}"
+                raise BlastEnvError(
+                    f"{name} is {value_text(value)}, but engine {self.name!r} has no {noun}"
+                )
+        made: Self = replace(self, **given) if given else self  # type: ignore[type-var]
+        return made
+
+
+@dataclass(frozen=True)
+class _Row:
+    """The place of an engine, and the facts needed before its import.
+
+    Attributes:
+        place: "module:Class", as text: only the engine in use is imported, because Numba alone
+            takes half a second.
+        needs_calibration: Same as `Engine.needs_calibration` of the class.
+        extra: The package extra that it needs; empty for none.
+    """
+
+    place: str
+    needs_calibration: bool = False
+    extra: str = ""
+
+
+_TABLE: Final[Mapping[str, _Row]] = MappingProxyType(
+    {
+        "pymunk": _Row(
+            "blast_env.evaluation.engines.particles:PymunkEngine", needs_calibration=True
+        ),
+        "event": _Row("blast_env.evaluation.engines.particles:EventEngine", needs_calibration=True),
+        "gas": _Row("blast_env.evaluation.engines.gas:GasEngine"),
+        "surrogate": _Row("blast_env.design.surrogate.engine:SurrogateEngine", extra="agents"),
+    }
+)
+
+ENGINE_NAMES: Final = tuple(_TABLE)
+"""The engines in the package; the first one is the reference of the paper's model."""
+
+CALIBRATED_ENGINES: Final = tuple(name for name, row in _TABLE.items() if row.needs_calibration)
+"""The engines whose loads need a calibration to be in Pa s."""
+
+JUDGE: Final = "gas"
+"""The engine whose results decide about protection."""
+
+
+def default_engine(*scenarios: Scenario, particles: str = ENGINE_NAMES[0]) -> str:
+    """Return the name of the default engine of sites.
+
+    It is gas dynamics if any site has a feature that particles ignore: a height, a catalogue, a
+    raised charge, walls that do not count, a gauge. Otherwise it is the particle model, which was
+    made for sites without such features.
+
+    Args:
+        scenarios: The sites.
+        particles: The engine of the particle model.
+    """
+    return JUDGE if any(each.height_notes for each in scenarios) else particles
+
+
+def find_engine(
+    engine: str | Engine,
+    cell_m: float | None = None,
+    until: str | float | None = None,
+    cells: str | None = None,
+) -> Engine:
+    """Return an engine by its name, or the engine itself.
+
+    Args:
+        engine: The name, or the engine.
+        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
+        until: Loads that a blast of gas dynamics waits for; those of the engine unless given.
+        cells: Growth of the cells of gas dynamics; that of the engine unless given.
+
+    Raises:
+        UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If `cell_m` does not divide the side of a module, or a setting is given for
+            an engine that does not have it; or an extra is missing.
+    """
+    found = _made(engine) if isinstance(engine, str) else engine
+    if not isinstance(found, Engine):
+        raise BlastEnvError(f"engine is {value_text(engine)}, must be a name or an engine")
+    return found.configured(cell_m=cell_m, until=until, cells=cells)
+
+
+def _made(name: str) -> Engine:
+    if name not in _TABLE:
+        raise UnknownNameError("engine", name, ENGINE_NAMES)
+    row = _TABLE[name]
+    with import_extra(row.extra, f"engine {name!r}") if row.extra else nullcontext():
+        made: Engine = load_plugin(row.place)()
+    return made
+
+
+def load_plugin(place: str) -> Any:
+    """Import and return the object at "module:name"; see `Engine.unfolding`."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)

@@ -1,0 +1,601 @@
+"""Gas dynamics as an engine: loads directly in Pa s and Pa, without a calibration.
+
+Impulses are peak specific impulses (`blast_env.gas.probes`). The engine is deterministic
+for a given charge and layout; a seed only draws the charge.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation.engines.bays import (
+    LOADED_BAY_COLUMNS,
+    BayLoads,
+    UnjudgedWalls,
+    unjudged_walls,
+)
+from blast_env.evaluation.engines.contract import (
+    BlastLoads,
+    Engine,
+    EngineOption,
+    StructureLoad,
+    mean_over_area,
+)
+from blast_env.evaluation.engines.gas_tables import (
+    BUILDING_COLUMNS,
+    FACE_COLUMNS,
+    GAUGE_COLUMNS,
+    MODULE_COLUMNS,
+    STRUCTURE_COLUMNS,
+    WALL_COLUMNS,
+    face_table,
+    gauge_table,
+    load_values,
+    module_table,
+    structure_table,
+    wall_table,
+)
+from blast_env.evaluation.engines.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
+from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
+from blast_env.gas.cost import CostGuess, cost_of_run
+from blast_env.gas.settings import (
+    CHECKED_SCALED_DISTANCE,
+    FACE_NAMES,
+    GasSettings,
+)
+from blast_env.geometry import Element, layout_text
+from blast_env.layout.build_scene import build_site, draw_threat, outlines
+from blast_env.particles.calibration.model import ScaledImpulse
+from blast_env.particles.run import EndReason
+from blast_env.provenance import versions
+from blast_env.response.damage import BayDamage
+from blast_env.response.facade import peak_factor, slowest_period_s
+from blast_env.site import (
+    AnyCharge,
+    AnyScenario,
+    Scenario,
+    ScenarioField,
+    VehicleCharge,
+    find_scenario,
+)
+from blast_env.site.scene import WALLS, BlastSite, Charge
+from blast_env.site.zone import source_bounds_m
+from blast_env.tables import table_of
+from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
+    import pandas as pd
+
+    from blast_env.gas.engine import GasRun, Recorders
+    from blast_env.particles.tables import RunRecord
+
+NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
+"""Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
+
+_PROGRESS_CALLS: Final = 100
+
+_FINAL_CELL_M: Final = 0.25
+_WIDEST_UNIFORM_M: Final = 40.0
+"""Side of the cells of final statements, and the widest site on which they do not grow."""
+
+_PERIODS: Final = 2.0
+"""Natural periods for a loaded component to swing in and rebound; a cracked one is slower."""
+
+
+def response_time_s(scenario: Scenario) -> float:
+    """Return the response time of the slowest component of the facades of a site, s.
+
+    Components that hardening may install are included.
+    """
+    hardened = (
+        bay
+        for each in scenario.alternatives
+        for bay in (*each.glazing.values(), *each.wall.values())
+    )
+    return _PERIODS * slowest_period_s([*scenario.bays, *hardened])
+
+
+@dataclass(frozen=True)
+class GasEngine(GasSettings, Engine):
+    """Computes blasts in a compressible gas, in compiled code; for settings see `GasSettings`."""
+
+    has_peaks: ClassVar[bool] = True
+    title: ClassVar[str] = "Gas dynamics"
+    validated_range: ClassVar[str] = "the validated range of gas dynamics"
+    options: ClassVar[tuple[EngineOption, ...]] = (
+        EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
+        EngineOption("cells", "Whether cells of gas dynamics grow with the blast."),
+        EngineOption("until", "Loads that a blast of gas dynamics waits for."),
+    )
+    unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
+    screening: ClassVar[str] = "blast_env.plots.pressure_film:PressureScreening"
+    shown: ClassVar[str] = "blast_env.cli.simulate:ShownGas"
+
+    name: str = "gas"
+    version: str = f"gas 6 (numba {version('numba')})"
+
+    def start_on(
+        self, site: BlastSite, recorders: "Recorders" = lambda _: (), response_s: float = 0.0
+    ) -> "GasRun":
+        """Return a run at time 0, independent of every other run.
+
+        Args:
+            site: The structures, the barrier, the charge and the gauges.
+            recorders: Makes further recorders for the grid: maps, pictures.
+            response_s: Minimum duration of the run after the last load has arrived.
+
+        Raises:
+            BlastEnvError: If the grid does not fit into memory, or the charge or a gauge is in a
+                solid.
+        """
+        from blast_env.gas.engine import GasRun  # Numba takes half a second to import
+
+        return GasRun(self, site, recorders, response_s)
+
+    def blast(
+        self,
+        scenario: AnyScenario,
+        layout: Sequence[Element] = (),
+        seed: int = 0,
+        charge: AnyCharge | None = None,
+    ) -> "GasBlast":
+        """Return one blast, for running and inspection."""
+        return GasBlast(find_scenario(scenario), layout, seed, self, charge)
+
+    def cost(self, scenario: Scenario, charge: AnyCharge) -> CostGuess:
+        """Return an estimate of the cost of a blast, without building its grid."""
+        if isinstance(charge, VehicleCharge):
+            source = charge.source
+            charge = Charge(source_bounds_m(source).centre, source.tnt_kg)
+        site = BlastSite(
+            site_m=scenario.site.rectangle_m,
+            charge=charge,
+            structures=outlines(scenario),
+            air_height_m=scenario.air_height_m,
+        )
+        return cost_of_run(self, site, response_time_s(scenario))
+
+    def final(self, scenarios: Sequence[Scenario]) -> "GasEngine":
+        """Return the engine with cells of 0.25 m, which grow if a site is wider than 40 m."""
+        sides_m = [each.site.width_m for each in scenarios]
+        sides_m += [each.site.height_m for each in scenarios]
+        if max(sides_m, default=0.0) > _WIDEST_UNIFORM_M:
+            return replace(self, cells="fine")
+        return replace(self, cell_m=_FINAL_CELL_M)
+
+    @property
+    def coarser(self) -> "GasEngine | None":
+        """The engine with cells twice as large; `None` if they would exceed a module."""
+        cell_m = 2.0 * self.smallest_m
+        modules = MODULE_SIDE_M / cell_m
+        if modules < 1.0 - 1e-9 or abs(modules - round(modules)) > 1e-9:
+            return None
+        return replace(self, cell_m=cell_m, cells="coarse" if self.is_growing else self.cells)
+
+    @property
+    def words(self) -> str:
+        """Its name and the side of its cells."""
+        return f"{self.name}, {self.cell_words}"
+
+    def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
+        """Describe the engine and its cells in one line."""
+        return f"{super().describe(scenarios)}, {self.cell_words}"
+
+
+@dataclass(frozen=True, eq=False)
+class GasBlast:
+    """One blast of the gas engine, ready to run.
+
+    Attributes:
+        scenario: The scenario, or its bundled name or path.
+        layout: Cells of the build zone that hold a barrier module.
+        seed: Draws the charge where the scenario leaves it open, and nothing else.
+        engine: The engine.
+        charge: The charge, instead of one drawn from the scenario.
+    """
+
+    scenario: ScenarioField = ScenarioField()
+    layout: Sequence[Element] = ()
+    seed: int = 0
+    engine: GasEngine = field(default_factory=GasEngine)
+    charge: AnyCharge | None = None
+
+    @cached_property
+    def site(self) -> BlastSite:
+        """The structures, the barrier, the charge and the gauges."""
+        return build_site(self.scenario, self.layout, self.seed, self.charge)
+
+    @property
+    def threat(self) -> AnyCharge:
+        """The charge before the layout is known, or the vehicle that carries it."""
+        return draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
+
+    def run(
+        self,
+        progress: Callable[[float], None] | None = None,
+        recorders: "Recorders" = lambda _: (),
+    ) -> "GasResult":
+        """Run the blast to its end.
+
+        Args:
+            progress: Called periodically with the elapsed share of the time limit.
+            recorders: Makes further recorders for the grid: maps, pictures. The result keeps them
+                in `run.solver.recorders`.
+        """
+        run = self.engine.start_on(self.site, recorders, response_time_s(self.scenario))
+        oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
+        bays = BayLoads.begin(run, self.scenario.bays_with(self.layout))
+        if bays.bays:
+            run.record(bays.recorder)
+        pieces = PieceLoads.begin(run, self.scenario, self.layout)
+        if pieces is not None:
+            run.record(pieces.recorder)
+        while run.end_reason is None:
+            run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
+            if progress is not None:
+                progress(min(run.time_s / run.limit_s, 1.0))
+        return GasResult(self, run, bays, pieces, oblique)
+
+
+@dataclass(frozen=True, eq=False)
+class GasResult:
+    """The outcome of a blast of the gas engine.
+
+    Attributes:
+        blast: The blast.
+        run: The run, at its end.
+        bay_loads: Histories of the bays of facades; `None` if not recorded.
+        piece_loads: Histories on both sides of the barrier's pieces; `None` if not recorded or if
+            no piece has a height.
+        oblique: Loads on oblique walls along the normal of the wall; `None` without such a wall.
+    """
+
+    blast: GasBlast
+    run: "GasRun"
+    bay_loads: BayLoads | None = None
+    piece_loads: PieceLoads | None = None
+    oblique: ObliqueLoads | None = None
+
+    @property
+    def engine_name(self) -> str:
+        """Name of the engine."""
+        return self.blast.engine.name
+
+    @property
+    def engine_version(self) -> str:
+        """Version of the code that computed the physics."""
+        return self.blast.engine.version
+
+    @property
+    def end_reason(self) -> EndReason:
+        """Reason for the end of the run."""
+        return self.run.end_reason or EndReason.TIME_LIMIT
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time at the end."""
+        return self.run.time_s
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of the engine."""
+        return self.run.steps
+
+    @property
+    def collisions(self) -> "pd.DataFrame":
+        """Unavailable, since a gas has no particles that collide.
+
+        Raises:
+            BlastEnvError: Always; the message names the alternatives.
+        """
+        raise BlastEnvError(
+            "engine 'gas' has no collisions: loads are in structures, modules, faces and gauges"
+        )
+
+    @cached_property
+    def faces(self) -> "pd.DataFrame":
+        """One row per cell face, structures and barrier; see `FACE_COLUMNS`."""
+        return face_table(self.run)
+
+    @cached_property
+    def on_walls(self) -> "pd.DataFrame":
+        """`faces` with loads on oblique walls along their normals."""
+        return self.faces if self.oblique is None else self.oblique.table(self.faces)
+
+    @cached_property
+    def modules(self) -> "pd.DataFrame":
+        """One row per module face that touches air; see `MODULE_COLUMNS`."""
+        return module_table(self.run, self.faces)
+
+    @cached_property
+    def walls(self) -> "pd.DataFrame":
+        """One row per wall or roof of a structure; see `WALL_COLUMNS`."""
+        return wall_table(self.run, self.on_walls)
+
+    @cached_property
+    def structures(self) -> "pd.DataFrame":
+        """One row per structure; see `STRUCTURE_COLUMNS`."""
+        return structure_table(self.run, self.on_walls)
+
+    @cached_property
+    def buildings(self) -> "pd.DataFrame":
+        """One row per building, with its parts combined; see `BUILDING_COLUMNS`."""
+        names = self.blast.scenario.building_names
+        stepped = stepped_buildings(self.blast.scenario.structures)
+        return structure_table(self.run, self.on_walls, names, stepped)
+
+    @property
+    def stepped_notes(self) -> tuple[str, ...]:
+        """Notes on peaks on oblique walls, one sentence per building."""
+        stepped = self.buildings["stepped"].to_numpy(dtype=bool)
+        return tuple(f"{name}: {STEPPED}" for name in self.buildings["building"][stepped])
+
+    @cached_property
+    def gauges(self) -> "pd.DataFrame":
+        """One row per gauge, in the order of the scenario; see `GAUGE_COLUMNS`."""
+        return gauge_table(self.run)
+
+    @property
+    def gauge_notes(self) -> tuple[str, ...]:
+        """Notes on gauges whose load is not known, one sentence each."""
+        late = ~self.gauges["known"].to_numpy(dtype=bool)
+        return tuple(f"gauge {name}: {NOT_KNOWN}" for name in self.gauges["name"][late])
+
+    def history(self, gauge: str) -> "pd.DataFrame":
+        """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If there is no gauge of that name.
+        """
+        import pandas as pd  # it takes a third of a second
+
+        names = [each.name for each in self.run.site.gauges]
+        if gauge not in names or self.run.gauges is None:
+            raise UnknownNameError("gauge", gauge, names)
+        pressure = np.asarray(self.run.gauges.history_pa)[:, names.index(gauge)]
+        return pd.DataFrame({"time_s": self.run.gauges.time_s, "overpressure_pa": pressure})
+
+    @cached_property
+    def bays(self) -> "pd.DataFrame":
+        """One row per bay, with its load and response; see `LOADED_BAY_COLUMNS`."""
+        if self.bay_loads is None:
+            return table_of([], LOADED_BAY_COLUMNS)
+        return self.bay_loads.table(self.run)
+
+    @cached_property
+    def unjudged(self) -> tuple[UnjudgedWalls, ...]:
+        """Counted walls in no bay, one item per building with a facade and such walls."""
+        scenario, table = self.blast.scenario, self.run.table
+        return unjudged_walls(
+            table,
+            self.run.site.structures,
+            scenario.building_names,
+            scenario.bays_with(self.blast.layout),
+            self._share * self.run.grid.cell_m**2,
+        )
+
+    def bay_history(self, name: str) -> "pd.DataFrame":
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
+
+        Raises:
+            UnknownNameError: If no bay of that name touches air.
+        """
+        if self.bay_loads is None:
+            raise UnknownNameError("bay", name, ())
+        return self.bay_loads.history(name)
+
+    @cached_property
+    def pieces(self) -> "pd.DataFrame":
+        """One row per barrier piece, with its load and stability; see `PIECE_COLUMNS`."""
+        if self.piece_loads is None:
+            return table_of([], PIECE_COLUMNS)
+        return self.piece_loads.table(self.time_s)
+
+    def piece_history(self, name: str) -> "pd.DataFrame":
+        """Return the mean overpressures on the sides of a piece: `time_s`, `west_pa` and others.
+
+        Raises:
+            UnknownNameError: If there is no piece of that name with a height.
+        """
+        if self.piece_loads is None:
+            raise UnknownNameError("piece", name, ())
+        return self.piece_loads.history(name)
+
+    def impulse(self, structure: str) -> ScaledImpulse:
+        """Return the peak specific impulse on a structure, averaged over the counted walls.
+
+        Args:
+            structure: Name of the structure.
+
+        Returns:
+            `.pa_s`, `.psi_s`, and `.in_range` with `.notes`: whether the engine was checked for
+            such a distance, charge and cell, and the load was known at the end of the run.
+
+        Raises:
+            UnknownNameError: If there is no structure of that name.
+        """
+        names = [each.name for each in self.run.site.structures if not each.is_barrier]
+        if structure not in names:
+            raise UnknownNameError("structure", structure, names)
+        return self._scaled(names.index(structure))
+
+    @property
+    def structure_loads(self) -> tuple[StructureLoad, ...]:
+        """The loads on all structures; values in simulation units are NaN."""
+        named = {each.name: each for each in self.blast.scenario.structures}
+        return tuple(
+            StructureLoad.on(
+                named[outline.name],
+                scaled.pa_s,
+                float(self._peak_pa[self._walls(index)].max(initial=0.0)),
+                scaled.in_range,
+                scaled.notes,
+                self._area_m2(index),
+            )
+            for index, outline in enumerate(self.run.site.structures)
+            if not outline.is_barrier
+            for scaled in [self._scaled(index)]
+        )
+
+    def loads(self) -> BlastLoads:
+        """Return the loads on all structures and, for a response, the damage of all bays."""
+        bays: tuple[BayDamage, ...] = ()
+        if self.bay_loads is not None and self.blast.scenario.objective.is_response:
+            factor = peak_factor(self.run.grid.cell_m, self.run.site.charge.tnt_kg)
+            bays = self.bay_loads.damages(self.blast.scenario.alternatives, factor)
+        return BlastLoads(self.structure_loads, self.module_impulse_n_s, bays)
+
+    def _walls(self, index: int) -> NDArray[np.int64]:
+        """Return the indices of the faces of the counted walls of a structure (n,)."""
+        table = self.run.table
+        counting = [FACE_NAMES.index(name) for name in self.run.site.structures[index].faces]
+        return np.flatnonzero((table.structure == index) & np.isin(table.face, counting))
+
+    @cached_property
+    def _peak_pa(self) -> FloatArray:
+        """Peaks on cell faces, Pa, on oblique walls along the normal of the wall (faces,)."""
+        peak_pa = self.run.loads.peak_pa
+        return peak_pa if self.oblique is None else self.oblique.peaks_pa(peak_pa)
+
+    def _mean(self, index: int, values: FloatArray) -> float:
+        """Return the mean of a load over the counted walls of a structure; NaN without any."""
+        own = self._walls(index)
+        along = values if self.oblique is None else self.oblique.along_normals(values)
+        return mean_over_area(along[own], self._share[own])
+
+    def _scaled(self, index: int) -> ScaledImpulse:
+        """Return the impulse on a structure, by its index in the site."""
+        notes = self._notes(index)
+        return ScaledImpulse(self._mean(index, self.run.loads.impulse_pa_s), not notes, notes)
+
+    def _area_m2(self, index: int) -> float:
+        """Return the area of the counted walls of a structure, m2."""
+        return float(self._share[self._walls(index)].sum()) * self.run.grid.cell_m**2
+
+    @cached_property
+    def _share(self) -> FloatArray:
+        """Ratio of the area of the real wall to that of each face (faces,)."""
+        return self.run.table.share
+
+    @cached_property
+    def module_impulse_n_s(self) -> FloatArray:
+        """Momentum on the walls of each module of the structures, N s (modules,).
+
+        Modules are in the order of the structures, row by row.
+        """
+        table, sums = self.run.table, []
+        for index, outline in enumerate(self.run.site.structures):
+            if not outline.is_barrier:
+                own = (table.structure == index) & (table.face < len(WALLS))
+                momentum = np.zeros((outline.rows, outline.columns))
+                values = self.run.loads.impulse_pa_s[own] * self.run.grid.cell_m**2
+                np.add.at(momentum, (table.row[own], table.column[own]), values)
+                sums.append(momentum[tuple(np.array(outline.filled).T)])
+        return np.concatenate(sums) if sums else np.zeros(0)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all loads, the gauges, the end time and the number of steps, hexadecimal."""
+        state = sha256()
+        for table in (self.run.loads, self.run.gauges):
+            if table is not None:
+                for values in load_values(table).values():
+                    state.update(np.ascontiguousarray(values).tobytes())
+        state.update(np.array([self.time_s, self.steps]).tobytes())
+        return state.hexdigest()
+
+    @cached_property
+    def run_record(self) -> "RunRecord":
+        """The inputs and versions needed to repeat the run, and its outcome."""
+        blast, charge, known = self.blast, self.run.site.charge, versions(self.engine_version)
+        return {
+            "scenario": blast.scenario.name,
+            "scenario hash": blast.scenario.content_hash,
+            "layout (row, column)": layout_text(blast.layout),
+            "charge x (m)": charge.position_m[0],
+            "charge y (m)": charge.position_m[1],
+            "charge height (m)": charge.height_m,
+            "charge TNT equivalent (kg)": charge.tnt_kg,
+            "engine": self.engine_name,
+            "cell (m)": blast.engine.smallest_m,
+            "kind of cells": blast.engine.cells,
+            "margin (m)": blast.engine.margin_m,
+            "border (m)": blast.engine.border_m,
+            "engine version": known["engine"],
+            "blast-env version": known["blast_env"],
+            "python version": known["python"],
+            "numpy version": known["numpy"],
+            "cells": int(np.prod(self.run.grid.shape)),
+            "cell updates": self.run.solver.cell_updates,
+            "cells raised to the floor": self.run.solver.lifted,
+            "steps": self.steps,
+            "simulated time (s)": self.time_s,
+            "ended because": str(self.end_reason),
+            "digest": self.digest,
+        }
+
+    def to_excel(self, path: str | Path) -> Path:
+        """Write a workbook with structures, modules, gauges and the run record.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        from blast_env.particles.workbook import SheetTable, write_tables
+
+        tables = [
+            SheetTable("Structures", self.structures, STRUCTURE_COLUMNS),
+            SheetTable("Walls", self.walls, WALL_COLUMNS),
+            SheetTable("Modules", self.modules, MODULE_COLUMNS),
+            SheetTable("Gauges", self.gauges, GAUGE_COLUMNS),
+        ]
+        if len(self.buildings) < len(self.structures):
+            tables.insert(0, SheetTable("Buildings", self.buildings, BUILDING_COLUMNS))
+        if len(self.bays):
+            tables.append(SheetTable("Bays", self.bays, LOADED_BAY_COLUMNS))
+        if len(self.pieces):
+            tables.append(SheetTable("Pieces", self.pieces, PIECE_COLUMNS))
+        return write_tables(self.run_record, tables, path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write the loads on all faces of cells as Parquet, the run record in its metadata.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        from blast_env.particles.parquet import write_table
+
+        faces = self.faces[[column.name for column in FACE_COLUMNS]]
+        return write_table(faces, FACE_COLUMNS, self.run_record, path)
+
+    def _notes(self, index: int) -> tuple[str, ...]:
+        from blast_env.gas.engine import scaled_distance  # the run has imported it
+
+        notes = list(self.run.notes)
+        low, high = CHECKED_SCALED_DISTANCE
+        scaled = scaled_distance(self.run.site, self.run.site.structures[index])
+        if not low <= scaled <= high:
+            notes.append(
+                f"scaled distance {scaled:.2f} m/kg^(1/3), checked from {low:g} to {high:g}"
+            )
+        if not self.run.is_known(index):
+            waited = self.end_reason is not EndReason.LOADS_KNOWN
+            why = str(self.end_reason) if waited else "take until='walls' to wait for it"
+            notes.append(f"{NOT_KNOWN}: {why}")
+        if self.run.solver.lifted:
+            notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")
+        return tuple(notes)

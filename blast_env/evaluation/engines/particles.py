@@ -1,0 +1,483 @@
+"""The particle engines, the paper's model on pymunk or event by event, and their blasts.
+
+Impulses are in simulation units; a calibration of the scenario converts them to Pa s.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar, Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError, UnknownNameError, value_text
+from blast_env.evaluation.engines.contract import BlastLoads, Engine, StructureLoad, find_engine
+from blast_env.geometry import Element, layout_text
+from blast_env.layout.build_scene import build_scene
+from blast_env.particles.calibration.model import (
+    Calibration,
+    CalibrationError,
+    LoadUnit,
+    ScaledImpulse,
+    scenario_calibration,
+)
+from blast_env.particles.run import BallStates, BlastRun, CollisionArray, EndReason
+from blast_env.provenance import versions
+from blast_env.site import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
+from blast_env.site.scene import Scene
+from blast_env.site.structure import ModularObstacle
+from blast_env.values import path_of
+
+if TYPE_CHECKING:  # pandas takes a third of a second to import
+    import pandas as pd
+
+    from blast_env.particles.event.engine import EventRun
+    from blast_env.particles.pymunk.engine import PymunkRun
+    from blast_env.particles.tables import RunRecord
+
+_PROGRESS_CALLS: Final = 200
+
+PARTICLES_OVERRATE: Final = (
+    "The particle model overrates barriers: on 'courtyard' it predicted 5.1 times the reduction of"
+    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Use engine"
+    " 'gas' for decisions."
+)
+"""Caveat of every evaluation with particles; measured by `python -m studies.gas judge`."""
+
+
+class ParticleEngine(Engine):
+    """An engine of the particle model, which runs scenes of balls."""
+
+    has_noise: ClassVar[bool] = True
+    knows_heights: ClassVar[bool] = False
+    needs_calibration: ClassVar[bool] = True
+    title: ClassVar[str] = "Particles"
+    caveat: ClassVar[str] = PARTICLES_OVERRATE
+    unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingParticles"
+    screening: ClassVar[str] = "blast_env.plots.placing:BlastScreening"
+    shown: ClassVar[str] = "blast_env.cli.simulate:ShownParticles"
+    step_name: ClassVar[str] = "steps"
+
+    @abstractmethod
+    def start(self, scene: Scene) -> BlastRun:
+        """Return a run of the scene at time 0, independent of every other run."""
+
+    def blast(
+        self,
+        scenario: AnyScenario,
+        layout: Sequence[Element] = (),
+        seed: int = 0,
+        charge: AnyCharge | None = None,
+    ) -> "Blast":
+        """Return one blast, for running and inspection."""
+        return Blast(find_scenario(scenario), layout, seed, self, charge)
+
+    def check(self, scenario: Scenario) -> None:
+        """Refuse a scenario that particles cannot run, or that has no calibration for them."""
+        super().check(scenario)
+        scenario.check_for_particles()
+        self.calibration(scenario)
+
+    def calibration(self, scenario: Scenario) -> Calibration:
+        """Return the scenario's calibration, checked against its parameters and this engine."""
+        return scenario_calibration(scenario, self.name)
+
+    def preset(self, scenario: Scenario) -> str:
+        """Return the name of the scenario's parameters."""
+        return scenario.simulation.preset
+
+    def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
+        """Describe the engine and its presets in one line."""
+        sections = [each.simulation for each in scenarios]
+        presets = [each.preset + " with overrides" * bool(each.overrides) for each in sections]
+        text = super().describe()
+        return f"{text}, preset {', '.join(dict.fromkeys(presets))}" if presets else text
+
+
+@dataclass(frozen=True)
+class PymunkEngine(ParticleEngine):
+    """Runs scenes on pymunk (Chipmunk): the reference of the paper's model."""
+
+    name: str = "pymunk"
+    version: str = f"pymunk {version('pymunk')}"
+
+    def start(self, scene: Scene) -> "PymunkRun":
+        """Return a run of the scene in a new space."""
+        from blast_env.particles.pymunk.engine import PymunkRun  # loads a compiled library
+
+        return PymunkRun(scene)
+
+
+@dataclass(frozen=True)
+class EventEngine(ParticleEngine):
+    """Runs scenes from one collision to the next, in compiled code.
+
+    Attributes:
+        cell_units: Side of the cells of the neighbour search; see `world_of`.
+    """
+
+    step_name: ClassVar[str] = "events"
+
+    name: str = "event"
+    version: str = f"event 1 (numba {version('numba')})"
+    cell_units: float | None = None
+
+    def start(self, scene: Scene) -> "EventRun":
+        """Return a run of the scene at time 0."""
+        from blast_env.particles.event.engine import EventRun  # Numba takes half a second to import
+
+        return EventRun(scene, self.cell_units)
+
+
+def find_particle_engine(engine: str | Engine) -> ParticleEngine:
+    """Return a particle engine by its name, or the engine itself.
+
+    Raises:
+        UnknownNameError: If there is no engine of that name.
+        BlastEnvError: If it is not a particle engine.
+    """
+    found = find_engine(engine)
+    if not isinstance(found, ParticleEngine):
+        raise BlastEnvError(
+            f"engine {found.name!r} has no particles: this is for the particle engines"
+        )
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Blast:
+    """One blast of a particle engine, ready to run; see the arguments of `simulate`.
+
+    Attributes:
+        scenario: The scenario, or its bundled name or path.
+        layout: Cells of the build zone that hold a barrier module.
+        seed: Draws the charge, where the scenario leaves it open, the fan and the air.
+        engine: The engine or its name.
+        charge: The charge, instead of one drawn from the scenario.
+    """
+
+    scenario: ScenarioField = ScenarioField()
+    layout: Sequence[Element] = ()
+    seed: int = 0
+    engine: str | Engine = "pymunk"
+    charge: AnyCharge | None = None
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The initial state."""
+        return build_scene(self.scenario, self.layout, self.seed, self.charge)
+
+    @cached_property
+    def particle_engine(self) -> ParticleEngine:
+        """The engine itself.
+
+        Raises:
+            UnknownNameError: If there is no such engine.
+            BlastEnvError: If it is not a particle engine.
+        """
+        return find_particle_engine(self.engine)
+
+    def start(self) -> BlastRun:
+        """Return a run at time 0."""
+        return self.particle_engine.start(self.scene)
+
+    def run(self, progress: Callable[[float], None] | None = None) -> "BlastResult":
+        """Run the blast to its end.
+
+        Args:
+            progress: Called periodically with the elapsed share of the time limit.
+        """
+        run = self.start()
+        limit_s = self.scene.parameters.stepping.time_limit_s
+        while run.end_reason is None:
+            run.advance(np.inf if progress is None else run.time_s + limit_s / _PROGRESS_CALLS)
+            if progress is not None:
+                progress(min(run.time_s / limit_s, 1.0))
+        return self.result(run)
+
+    def result(self, run: BlastRun) -> "BlastResult":
+        """Return the outcome of a run that has ended.
+
+        Raises:
+            ValueError: If the run has not ended.
+        """
+        if run.end_reason is None:
+            raise ValueError(f"the run is at {run.time_s} s and has not ended: advance it first")
+        engine = self.particle_engine
+        return BlastResult(
+            blast=self,
+            engine_name=engine.name,
+            engine_version=engine.version,
+            collision_array=run.log.to_array(),
+            obstacles=run.obstacles,
+            final_balls=run.balls(),
+            time_s=run.time_s,
+            steps=run.steps,
+            end_reason=run.end_reason,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BlastResult:
+    """The outcome of a blast of a particle engine.
+
+    Attributes:
+        blast: The blast.
+        engine_name: Name of the engine.
+        engine_version: Version of the library that computed the physics.
+        collision_array: The collisions with modules, of `COLLISION_DTYPE` (n,).
+        obstacles: The structures and, with a layout, the barrier, with their hits.
+        final_balls: The remaining balls at the end.
+        time_s: Simulated time at the end.
+        steps: Number of steps of the engine.
+        end_reason: Reason for the end of the run.
+    """
+
+    blast: Blast
+    engine_name: str
+    engine_version: str
+    collision_array: CollisionArray
+    obstacles: tuple[ModularObstacle, ...]
+    final_balls: BallStates
+    time_s: float
+    steps: int
+    end_reason: EndReason
+
+    @property
+    def step_name(self) -> str:
+        """The unit of `steps`: time steps, or the events of an event-driven engine."""
+        return self.blast.particle_engine.step_name
+
+    @cached_property
+    def collisions(self) -> "pd.DataFrame":
+        """One row per collision; the columns are `recording.tables.COLLISION_COLUMNS`."""
+        from blast_env.particles.tables import collision_table
+
+        return collision_table(self.collision_array, self.obstacles)
+
+    @cached_property
+    def modules(self) -> "pd.DataFrame":
+        """One row per module; the columns are `recording.tables.MODULE_COLUMNS`."""
+        from blast_env.particles.tables import module_table
+
+        return module_table(self.obstacles)
+
+    @cached_property
+    def structures(self) -> "pd.DataFrame":
+        """One row per structure; the columns are `recording.tables.STRUCTURE_COLUMNS`."""
+        from blast_env.particles.tables import structure_table
+
+        return structure_table(self.obstacles)
+
+    @cached_property
+    def buildings(self) -> "pd.DataFrame":
+        """One row per building; the columns are `recording.tables.BUILDING_COLUMNS`."""
+        from blast_env.particles.tables import building_table
+
+        return building_table(self.structures, self.blast.scenario.building_names)
+
+    @property
+    def bays(self) -> "pd.DataFrame":
+        """Unavailable, since particles have no pressure to load a pane or a panel.
+
+        Raises:
+            BlastEnvError: Always; the message names the alternative.
+        """
+        raise BlastEnvError(
+            f"engine {self.engine_name!r} has no overpressure, so no response of bays: use 'gas'"
+        )
+
+    @property
+    def pieces(self) -> "pd.DataFrame":
+        """Unavailable, since particles have no pressure to load a piece.
+
+        Raises:
+            BlastEnvError: Always; the message names the alternative.
+        """
+        raise BlastEnvError(
+            f"engine {self.engine_name!r} has no overpressure, so no loads on pieces: use 'gas'"
+        )
+
+    @cached_property
+    def calibration(self) -> Calibration:
+        """The scenario's calibration.
+
+        Raises:
+            UnknownNameError: If there is no calibration of that name.
+            CalibrationError: If the scenario names no calibration, or one that was made with
+                other parameters or another engine.
+        """
+        return scenario_calibration(self.blast.scenario, self.engine_name)
+
+    def obstacle(self, name: str) -> ModularObstacle:
+        """Return a structure, or the barrier, by its name.
+
+        Raises:
+            UnknownNameError: If there is none of that name; the message names the nearest one.
+        """
+        by_name = {obstacle.name: obstacle for obstacle in self.obstacles}
+        if name not in by_name:
+            raise UnknownNameError("structure", name, by_name)
+        return by_name[name]
+
+    def impulse_sim(self, structure: str) -> float:
+        """Return the sum of m |v| over the collisions with a structure, simulation units.
+
+        Args:
+            structure: Name of the structure.
+
+        Raises:
+            UnknownNameError: If there is no structure of that name.
+        """
+        return self.obstacle(structure).impulse
+
+    def impulse(self, structure: str, calibration: Calibration | None = None) -> ScaledImpulse:
+        """Return the impulse per area on a structure, converted by a calibration.
+
+        Args:
+            structure: Name of the structure.
+            calibration: By default the scenario's.
+
+        Returns:
+            `.psi_s`, `.pa_s`, and `.in_range` with `.notes`: whether this distance and charge lie
+            in the range of the calibration, and the blast ran to its end.
+
+        Raises:
+            UnknownNameError: If there is no structure or no calibration of that name.
+            CalibrationError: If the scenario names no calibration, or one that was made with
+                other parameters or another engine.
+        """
+        obstacle = self.obstacle(structure)
+        if obstacle.is_barrier:
+            raise CalibrationError(f"{structure!r} is no structure: it has no facade of one width")
+        law = self.calibration if calibration is None else calibration
+        if not isinstance(law, Calibration):
+            raise CalibrationError(f"calibration is {value_text(law)}, must be a Calibration")
+        scaled = law.convert_load(obstacle, self.blast.scene.charge)
+        if self.end_reason is not EndReason.EVENT_LIMIT:
+            return scaled
+        notes = (*scaled.notes, f"the blast was cut off: {self.end_reason}")
+        return ScaledImpulse(scaled.pa_s, False, notes)
+
+    def loads(self, calibration: Calibration | None = None) -> BlastLoads:
+        """Return the loads on all structures.
+
+        Args:
+            calibration: By default the scenario's.
+        """
+        law = self.calibration if calibration is None else calibration
+        structures = [obstacle for obstacle in self.obstacles if not obstacle.is_barrier]
+        impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
+        return BlastLoads(
+            structures=tuple(
+                StructureLoad(
+                    name=each.name,
+                    protected=each.protected,
+                    weight=each.weight,
+                    impulse_sim=each.impulse,
+                    transferred_impulse_sim=each.transferred_impulse,
+                    impulse_pa_s=scaled.pa_s,
+                    peak_pa=None,
+                    peak_weight=each.weight,
+                    in_range=scaled.in_range,
+                    notes=scaled.notes,
+                    building=self.blast.scenario.building_names[each.name],
+                )
+                for each in structures
+                for scaled in [self.impulse(each.name, law)]
+            ),
+            module_impulse_sim=np.array(impulse, dtype=np.float64),
+        )
+
+    @cached_property
+    def load_unit(self) -> LoadUnit:
+        """The unit of the loads in tables and pictures.
+
+        It is Pa s if the scenario has a calibration for the engine and any structure was hit.
+        """
+        charge = self.blast.scene.charge
+        try:
+            return LoadUnit.of(self.obstacles, charge, lambda each: self.impulse(each.name))
+        except BlastEnvError:
+            return LoadUnit()
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the whole outcome, as hexadecimal digits.
+
+        Two runs have the same digest if and only if all collisions, module loads, remaining balls,
+        the end time and the number of steps are the same to the last bit.
+        """
+        state = sha256(self.collision_array.tobytes())
+        loads = [
+            (part.x, part.y, part.hits, part.impulse, part.transferred_impulse)
+            for obstacle in self.obstacles
+            for part in obstacle.parts
+        ]
+        state.update(np.array(loads).tobytes())
+        balls = self.final_balls
+        for array in (balls.index, balls.position, balls.velocity, balls.mass, balls.radius):
+            state.update(np.ascontiguousarray(array).tobytes())
+        state.update(np.array([self.time_s, self.steps]).tobytes())
+        return state.hexdigest()
+
+    @cached_property
+    def run_record(self) -> "RunRecord":
+        """The inputs and versions needed to repeat the run, and its outcome."""
+        blast, charge = self.blast, self.blast.scene.charge
+        known = versions(self.engine_version)
+        record: RunRecord = {
+            "scenario": blast.scenario.name,
+            "scenario hash": blast.scenario.content_hash,
+            "layout (row, column)": layout_text(blast.layout),
+            "seed": blast.seed,
+            "charge x (m)": charge.position_m[0],
+            "charge y (m)": charge.position_m[1],
+            "charge height (m)": charge.height_m,
+            "charge TNT equivalent (kg)": charge.tnt_kg,
+            "engine": self.engine_name,
+            "engine version": known["engine"],
+            "preset": blast.scenario.simulation.preset,
+            "blast-env version": known["blast_env"],
+            "python version": known["python"],
+            "numpy version": known["numpy"],
+            "balls at the start": len(blast.scene.balls),
+            "balls at the end": len(self.final_balls),
+            self.step_name: self.steps,
+            "simulated time (s)": self.time_s,
+            "ended because": str(self.end_reason),
+            "digest": self.digest,
+        }
+        for group, values in blast.scenario.parameters.model_dump().items():
+            record |= {f"parameter {group}.{name}": value for name, value in values.items()}
+        return record
+
+    def to_excel(self, path: str | Path) -> Path:
+        """Write a workbook with collisions, modules, structures and the run record.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        from blast_env.particles.workbook import write_workbook
+
+        return write_workbook(self, path_of(path))
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write the collision table as Parquet, the run record in its metadata.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        from blast_env.particles.parquet import write_parquet
+
+        return write_parquet(self, path_of(path))

@@ -1,1 +1,0 @@
-"""Fitting of calibrations to blasts in a free field, and the paper's tables."""

@@ -1,0 +1,415 @@
+"""The gas engine: deterministic blasts in three dimensions.
+
+The site becomes a grid of cubic cells, in which structures, barrier and ground are solid. Around
+and above the site, cells grow outwards to distant open borders. The charge expands with spherical
+symmetry until its front reaches the first structure or the build zone. Then the solver takes over
+until the loads on the structures are known.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import cbrt, ceil, hypot
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.gas.cost import cost_of_run
+from blast_env.gas.doubling import DoublingSolver, shape_to_double
+from blast_env.gas.ending import (
+    AREA,
+    corners_m,
+    is_known,
+    limit_s,
+    sound_s,
+    watched_structures,
+)
+from blast_env.gas.faces import Faces, exposed_faces
+from blast_env.gas.grid import GasGrid, layers_to
+from blast_env.gas.opening import opening_of
+from blast_env.gas.probes import FaceLoads, Gauges
+from blast_env.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
+from blast_env.gas.solver import Gas, GasSolver, Recorder, Settling
+from blast_env.gas.source import (
+    GasCharge,
+    clearance_m,
+    largest_radius_m,
+    least_clearance_m,
+    set_charge,
+)
+from blast_env.particles.run import EndReason
+from blast_env.site.scene import OUTWARDS, WALLS, BlastSite, StructureOutline
+from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:
+    from blast_env.site.footprint import Footprint
+
+_HOTTEST: Final = 4.0  # temperature limit of settled products, in units of still air's
+_LOOK_EVERY: Final = 4  # steps between two checks of the loads
+
+Recorders = Callable[[GasGrid], Sequence[Recorder]]
+
+
+def _none(_: GasGrid) -> Sequence[Recorder]:
+    return ()
+
+
+@dataclass(frozen=True, eq=False)
+class FaceTable:
+    """The cell faces of structures and barrier.
+
+    Attributes:
+        faces: The faces for the solver (n,).
+        structure: Index into the site's structures (n,).
+        row: Row of the module in its structure (n,).
+        column: Column of the module (n,).
+        face: Index into `FACE_NAMES`; of a wall of a polygon, the side that it mostly faces (n,).
+        centre_m: Centres (n, 3).
+        wall: Index of the wall of a polygon, -1 for other faces (n,).
+        share: Area of the wall per area of the face: the cosine between their normals (n,).
+        outward: Normals of the walls in plan, 0 for roofs and undersides (n, 2).
+    """
+
+    faces: Faces
+    structure: NDArray[np.int64]
+    row: NDArray[np.int64]
+    column: NDArray[np.int64]
+    face: NDArray[np.int64]
+    centre_m: FloatArray
+    wall: NDArray[np.int64]
+    share: FloatArray
+    outward: FloatArray
+
+
+class GasRun:
+    """One blast in progress.
+
+    Attributes:
+        site: The structures, the barrier, the charge and the gauges.
+        settings: The settings of the run.
+        cost: Estimate of its cost.
+        grid: The grid.
+        solver: The solver.
+        charge: The charge.
+        handover_radius_m: Radius of the front at which the grid takes over: the distance to the
+            first structure, to the ground below a charge in the air, or to the build zone, with or
+            without a barrier in it; at least `least_clearance_m`. It is the same for all layouts
+            of a scenario with the same charge.
+        table: The faces on which loads are recorded.
+        loads: The loads on them.
+        gauges: The gauges, `None` without any.
+        response_s: Minimum duration of the run after the last load has arrived, for facades to
+            peak and rebound.
+        limit_s: Time limit of the run.
+        end_reason: Reason for the end of the run; `None` before it.
+        notes: Reasons to distrust the result, one sentence each.
+    """
+
+    def __init__(
+        self,
+        settings: GasSettings,
+        site: BlastSite,
+        recorders: Recorders = _none,
+        response_s: float = 0.0,
+    ) -> None:
+        self.settings, self.site, self.response_s = settings, site, response_s
+        watched = watched_structures(site, settings.until)
+        self.cost = cost_of_run(settings, site, response_s)
+        self.cost.check(settings)
+        self.grid = _grid(settings, site)
+        self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
+        reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
+        self.handover_radius_m = largest_radius_m(self.grid, self.charge, reserved)
+        self.notes = self._notes()
+        self.table = face_table_of(self.grid, site)
+        self.loads = FaceLoads(len(self.table.faces))
+        self.gauges = _gauges(self.grid, site)
+        scale = self._scale = cbrt(self.charge.mass_kg / 100.0)
+        own = [self.loads] if self.gauges is None else [self.loads, self.gauges]
+        solver = GasSolver(
+            self.grid,
+            faces=self.table.faces,
+            recorders=(*own, *recorders(self.grid)),
+            with_fuel=True,
+            burning=self.charge.burning,
+            settling=Settling(settings.settled_s * scale, _HOTTEST),
+            threads=settings.threads,
+        )
+        set_charge(solver, self.charge, self.handover_radius_m)
+        doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
+        self.solver: Gas = DoublingSolver(solver, doubled_s) if doubled_s else solver
+        if self.gauges is not None:
+            _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
+        self.end_reason: EndReason | None = None
+        self._groups = _groups(self.table, site, settings.until, watched)
+        self._watches_gauges = settings.until == "gauges" and self.gauges is not None
+        places_m = [each.position_m for each in site.gauges] if self._watches_gauges else []
+        self._travel_s = sound_s(site, [*corners_m(site, watched), *places_m])
+        self._end_s: float | None = None
+        asked_s = settings.until_s
+        self.limit_s = limit_s(site, self._travel_s) + response_s if asked_s is None else asked_s
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time."""
+        return self.solver.time_s
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return self.solver.steps
+
+    def record(self, recorder: Recorder) -> None:
+        """Add a recorder before the first step.
+
+        Raises:
+            ValueError: If the run has begun.
+        """
+        if self.solver.steps:
+            raise ValueError(f"the run is at step {self.solver.steps}: record before the first")
+        self.solver.recorders = (*self.solver.recorders, recorder)
+
+    def advance(self, until_s: float) -> None:
+        """Continue until the simulated time is at least `until_s`, or the run has ended.
+
+        The division of a run into calls does not change its results.
+        """
+        while self.end_reason is None and self.solver.time_s < until_s:
+            self.solver.step()
+            asked = self.settings.until_s is not None
+            if self.solver.time_s >= self.limit_s:
+                self.end_reason = EndReason.TIME_ASKED if asked else EndReason.TIME_LIMIT
+            elif not asked and self.solver.steps % _LOOK_EVERY == 0:
+                self._look()
+
+    def has_come(self, index: int) -> bool:
+        """Return whether sound has reached all corners of a structure in plan, by its index."""
+        return self.solver.time_s >= sound_s(self.site, corners_m(self.site, [index]))
+
+    def is_known(self, index: int) -> bool:
+        """Return whether the loads on the counted walls of a structure are known, by its index.
+
+        With `until` of "walls", all its faces are included.
+        """
+        groups = _groups(self.table, self.site, self.settings.until, [index])
+        return not groups or (self.has_come(index) and self._are_known(groups))
+
+    @property
+    def gauges_known(self) -> NDArray[np.bool_]:
+        """Whether the load of each gauge is known (n,)."""
+        if self.gauges is None:
+            return np.empty(0, dtype=bool)
+        come_s = np.array([sound_s(self.site, [each.position_m]) for each in self.site.gauges])
+        known = is_known(self.gauges.impulse_pa_s, self.gauges.net_impulse_pa_s)
+        return known & (self.solver.time_s >= come_s)
+
+    def _look(self) -> None:
+        """End the run if its loads are known and facades have had the time to respond."""
+        if self._end_s is None and self.solver.time_s >= self._travel_s:
+            gauges = not self._watches_gauges or bool(self.gauges_known.all())
+            if gauges and self._are_known(self._groups):
+                self._end_s = self._reached_s() + self.response_s
+        if self._end_s is not None and self.solver.time_s >= self._end_s:
+            self.end_reason = EndReason.LOADS_KNOWN
+
+    def _reached_s(self) -> float:
+        """Return the time of the last known load on the walls that the run waits for, s."""
+        known = is_known(self.loads.impulse_pa_s, self.loads.net_impulse_pa_s)
+        reached_s = np.where(known, self.loads.impulse_time_s, 0.0)
+        return max((float(reached_s[faces].max()) for faces in self._groups), default=0.0)
+
+    def _are_known(self, walls: Sequence[NDArray[np.int64]]) -> bool:
+        """Return whether the loads on all walls are known, given the faces of each."""
+        on_faces = is_known(self.loads.impulse_pa_s, self.loads.net_impulse_pa_s)
+        return all(on_faces[faces].mean() >= AREA for faces in walls)
+
+    def _notes(self) -> tuple[str, ...]:
+        """Return the reasons why this blast is outside the validated range of the source."""
+        clear, least = (
+            clearance_m(self.grid, self.charge),
+            least_clearance_m(self.grid, self.charge),
+        )
+        notes = []
+        if clear < least:
+            notes.append(
+                f"the charge is {clear:.2g} m from a solid, below the {least:.2g} m "
+                "that its source needs"
+            )
+        cells = cbrt(self.charge.mass_kg) / self.settings.smallest_m
+        if cells < CHECKED_CELLS:
+            notes.append(
+                f"{cells:.2g} cells per m/kg^(1/3) of the charge, checked from {CHECKED_CELLS:g}: "
+                "take smaller cells"
+            )
+        return tuple(notes)
+
+
+def scaled_distance(site: BlastSite, structure: StructureOutline) -> float:
+    """Return the scaled distance of a structure, m/kg^(1/3).
+
+    The distance is that of its nearest point: in plan, and below its base or above its top.
+    """
+    distance_m = min(box.distance_to(site.charge.position_m) for box in structure.boxes_m)
+    height_m, top_m = site.charge.height_m, structure.height_m or site.air_height_m
+    up_m = max(structure.base_m - height_m, height_m - top_m, 0.0)
+    return hypot(distance_m, up_m) / cbrt(site.charge.tnt_kg)
+
+
+def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
+    """Return the grid with its solid cells."""
+    cell_m = settings.smallest_m
+    margin = ceil(settings.margin_m / cell_m)
+    low = np.array([site.site_m.left, site.site_m.bottom])
+    high = np.array([site.site_m.right, site.site_m.top])
+    plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
+    shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
+    skirt = layers_to(settings.border_m / cell_m)
+    shape = shape_to_double(shape, skirt, len(settings.doubled_m))
+    origin = low - margin * cell_m
+    grid = GasGrid(
+        cell_m,
+        np.broadcast_to(np.False_, shape),
+        (float(origin[0]), float(origin[1]), 0.0),
+        skirt=skirt,
+    )
+    grid = replace(grid, solid=np.zeros(shape, dtype=bool))
+    z_m = grid.centres_m(2)
+    for outline in site.structures:
+        row, column = _modules_at(outline, grid)
+        x, y = np.nonzero(row >= 0)
+        base_m, top_m = _ends_m(outline, site.air_height_m)[:, row[x, y], column[x, y], np.newaxis]
+        grid.solid[x, y] |= (base_m <= z_m) & (z_m < top_m)
+    return grid
+
+
+def _cells_of(outline: StructureOutline, grid: GasGrid, site: BlastSite) -> NDArray[np.bool_]:
+    """Return the cells that a structure fills (nx, ny, nz)."""
+    row, column = _modules_at(outline, grid)
+    base_m, top_m = _ends_m(outline, site.air_height_m)[:, row, column, np.newaxis]
+    z_m = grid.centres_m(2)
+    return np.asarray((row >= 0)[:, :, np.newaxis] & (base_m <= z_m) & (z_m < top_m))
+
+
+def _modules_at(
+    outline: StructureOutline, grid: GasGrid
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return row and column of the module at each column of cells (nx, ny), -1 for none."""
+    x_m, y_m = grid.centres_m(0), grid.centres_m(1)
+    left, bottom = outline.corner_m
+    column = np.floor((x_m - left) / MODULE_SIDE_M).astype(np.int64)[:, np.newaxis]
+    row = np.floor((y_m - bottom) / MODULE_SIDE_M).astype(np.int64)[np.newaxis, :]
+    here = (column >= 0) & (column < outline.columns) & (row >= 0) & (row < outline.rows)
+    if outline.cells is not None:
+        present = np.zeros((outline.rows, outline.columns), dtype=bool)
+        present[tuple(np.array(outline.cells).T)] = True
+        here &= present[np.clip(row, 0, outline.rows - 1), np.clip(column, 0, outline.columns - 1)]
+    return np.where(here, row, -1), np.where(here, column, -1)
+
+
+def _ends_m(outline: StructureOutline, air_height_m: float) -> FloatArray:
+    """Return the heights of the base and the top of each module of an outline (2, rows, columns).
+
+    Values without a module are arbitrary.
+    """
+    ends_m = np.empty((2, outline.rows, outline.columns))
+    both = (outline.base_m, outline.bases_m), (outline.height_m, outline.heights_m)
+    for end_m, (whole_m, of_cells_m) in zip(ends_m, both, strict=True):
+        end_m[...] = air_height_m if whole_m is None else whole_m
+        if outline.cells is not None and of_cells_m is not None:
+            known_m = [air_height_m if each is None else each for each in of_cells_m]
+            end_m[tuple(np.array(outline.cells).T)] = known_m
+    return ends_m
+
+
+def face_table_of(grid: GasGrid, site: BlastSite) -> FaceTable:
+    """Return the cell faces of the structures and the barrier of a site."""
+    faces = exposed_faces(grid, grid.solid)
+    behind = tuple(faces.solid.T)
+    z_m = grid.centres_m(2)[behind[2]]
+    structure, row, column = np.full((3, len(faces)), -1)
+    for index, outline in enumerate(site.structures):
+        rows, columns = _modules_at(outline, grid)
+        here = np.flatnonzero(rows[behind[:2]] >= 0)
+        of_row, of_column = (each[behind[0][here], behind[1][here]] for each in (rows, columns))
+        base_m, top_m = _ends_m(outline, site.air_height_m)[:, of_row, of_column]
+        inside = (base_m <= z_m[here]) & (z_m[here] < top_m)
+        own = here[inside]
+        structure[own] = index
+        row[own], column[own] = of_row[inside], of_column[inside]
+    # West, east, south, north by axis and side; upward faces are roofs, downward ones undersides.
+    upright = 2 * faces.axis + (faces.side > 0)
+    face = np.where(faces.axis == 2, len(WALLS) + (faces.side < 0), upright)
+    table = FaceTable(
+        faces=faces,
+        structure=structure,
+        row=row,
+        column=column,
+        face=face,
+        centre_m=faces.centres_m(grid),
+        wall=np.full(len(faces), -1),
+        share=np.ones(len(faces)),
+        outward=np.array([*OUTWARDS.values(), (0.0, 0.0), (0.0, 0.0)])[face],
+    )
+    for index, outline in enumerate(site.structures):
+        if outline.footprint is not None:
+            _assign_walls(table, index, outline.footprint)
+    return table
+
+
+def _assign_walls(table: FaceTable, index: int, footprint: "Footprint") -> None:
+    """Assign the upright faces of a structure to the walls of its polygon."""
+    own = np.flatnonzero((table.structure == index) & (table.face < len(WALLS)))
+    places_m = table.centre_m[own, :2]
+    table.wall[own], table.share[own] = footprint.walls_of(places_m, table.outward[own])
+    sides = np.array([WALLS.index(each.side) for each in footprint.walls])
+    table.face[own] = sides[table.wall[own]]
+    table.outward[own] = np.array([each.normal for each in footprint.walls])[table.wall[own]]
+
+
+def _groups(
+    table: FaceTable, site: BlastSite, until: str | float, watched: Sequence[int]
+) -> list[NDArray[np.int64]]:
+    """Return the faces of each wall that a run waits for: counted walls, or all of them."""
+    groups = (
+        np.flatnonzero((table.structure == index) & (table.face == FACE_NAMES.index(name)))
+        for index in watched
+        for name in (FACE_NAMES if until == "walls" else site.structures[index].faces)
+    )
+    return [members for members in groups if len(members)]
+
+
+def _gauges(grid: GasGrid, site: BlastSite) -> Gauges | None:
+    """Return the gauges, each in the nearest cell of air."""
+    if not site.gauges:
+        return None
+    return Gauges(grid, [_air_cell(grid, each.name, each.position_m) for each in site.gauges])
+
+
+def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge, radius_m: float) -> None:
+    """Add the histories of gauges within a radius before the grid took over."""
+    centres_m = np.array(grid.origin_m) + grid.cell_m * (gauges.cells + 0.5)
+    x_m, y_m, z_m = charge.position_m
+    centre_m = np.array([x_m, y_m, 0.0 if charge.on_ground else z_m])
+    distance_m = np.sqrt(((centres_m - centre_m) ** 2).sum(axis=1))
+    if distance_m.min() < radius_m:
+        opening = opening_of(charge, radius_m)
+        gauges.add_before(opening.time_s, opening.overpressures_pa(distance_m))
+
+
+def _air_cell(
+    grid: GasGrid, name: str, position_m: tuple[float, float, float]
+) -> tuple[int, int, int]:
+    cell = grid.cell_at(position_m)
+    if not grid.solid[cell]:
+        return cell
+    near = [slice(max(at - 1, 0), at + 2) for at in cell]
+    air = np.argwhere(~grid.solid[tuple(near)]) + [part.start for part in near]
+    if len(air) == 0:
+        raise BlastEnvError(
+            f"gauge {name!r} at {position_m} is inside a solid, more than a cell from the air"
+        )
+    centres = np.array(grid.origin_m) + grid.cell_m * (air + 0.5)
+    nearest = air[np.argmin(((centres - position_m) ** 2).sum(axis=1))]
+    return int(nearest[0]), int(nearest[1]), int(nearest[2])

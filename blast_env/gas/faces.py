@@ -1,0 +1,104 @@
+"""Faces between air and solid, on which loads are recorded."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.errors import BlastEnvError
+from blast_env.gas.grid import GasGrid
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Faces of solid cells that touch air.
+
+    Attributes:
+        air: The air cell before each face (n, 3).
+        axis: Axis that the face is normal to (n,).
+        side: Direction along the axis from the solid to the air: -1 or 1 (n,).
+    """
+
+    air: NDArray[np.int64]
+    axis: NDArray[np.int64]
+    side: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.axis)
+
+    @property
+    def solid(self) -> NDArray[np.int64]:
+        """The solid cell behind each face (n, 3), outside the grid for the ground."""
+        solid = self.air.copy()
+        solid[np.arange(len(self)), self.axis] -= self.side
+        return solid
+
+    def centres_m(self, grid: GasGrid) -> NDArray[np.float64]:
+        """Return the centres of the faces (n, 3)."""
+        middle = 0.5 * (self.air + self.solid) + 0.5
+        return np.asarray(grid.origin_m) + grid.cell_m * middle
+
+    def kernel_table(self, grid: GasGrid) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the faces in the order of the kernels, line by line.
+
+        A face is indexed by the cell on its high side. A line is a row of cells along x. Lines of
+        faces normal to x come first, then those normal to y and z.
+
+        Args:
+            grid: The grid.
+
+        Returns:
+            Cell along x and index of the face (n, 2); first entry of each line (lines + 1,).
+        """
+        nx, ny, nz = grid.array_shape
+        high = np.maximum(self.air, self.solid) + grid.lead
+        line = (self.axis * nz + high[:, 2]) * ny + high[:, 1]
+        order = np.argsort(line * nx + high[:, 0], kind="stable")
+        table = np.stack((high[order, 0], order), axis=1).astype(np.int32)
+        first = np.searchsorted(line[order], np.arange(3 * nz * ny + 1)).astype(np.int32)
+        return np.ascontiguousarray(table), first
+
+
+NO_FACES: Final = Faces(
+    np.empty((0, 3), dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+)
+
+
+def exposed_faces(grid: GasGrid, cells: NDArray[np.bool_]) -> Faces:
+    """Return the faces of chosen solid cells that touch air inside the grid.
+
+    Args:
+        grid: The grid.
+        cells: Mask of the chosen cells (nx, ny, nz), all solid.
+
+    Raises:
+        BlastEnvError: If `cells` has another shape than the grid, or holds cells of air.
+    """
+    if cells.shape != grid.shape:
+        raise BlastEnvError(f"cells has shape {cells.shape}, but the grid {grid.shape}")
+    if (cells & ~grid.solid).any():
+        raise BlastEnvError("cells holds cells of air, but only solid cells have faces")
+    air: list[NDArray[np.int64]] = []
+    axes: list[NDArray[np.int64]] = []
+    sides: list[NDArray[np.int64]] = []
+    for axis in range(3):
+        for side in (-1, 1):
+            step = np.zeros(3, dtype=np.int64)
+            step[axis] = side
+            chosen = np.argwhere(cells)
+            neighbour = chosen + step
+            inside = (neighbour[:, axis] >= 0) & (neighbour[:, axis] < grid.shape[axis])
+            neighbour = neighbour[inside]
+            neighbour = neighbour[~grid.solid[tuple(neighbour.T)]]
+            air.append(neighbour)
+            axes.append(np.full(len(neighbour), axis))
+            sides.append(np.full(len(neighbour), side))
+    return Faces(np.concatenate(air), np.concatenate(axes), np.concatenate(sides))
+
+
+def ground_faces(grid: GasGrid) -> Faces:
+    """Return the faces of the ground below air, for a grid with a mirror at the low end of z."""
+    columns = np.argwhere(~grid.solid[:, :, 0])
+    air = np.concatenate((columns, np.zeros((len(columns), 1), dtype=np.int64)), axis=1)
+    return Faces(air, np.full(len(air), 2), np.ones(len(air), dtype=np.int64))

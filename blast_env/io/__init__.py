@@ -1,0 +1,1 @@
+"""Files of other programs: maps and drawings in, drawings and tables out."""

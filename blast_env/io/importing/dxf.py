@@ -1,0 +1,422 @@
+"""Reading of DXF drawings."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
+from blast_env.io.importing.site_map import (
+    MOST_COORDINATE,
+    MOST_FEATURES,
+    MOST_POINTS,
+    DrawingCoordinates,
+    LostFeature,
+    MapFeature,
+    Remark,
+    SiteMap,
+    checked_file,
+    errors_of,
+    too_many,
+    too_many_points,
+)
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from ezdxf import recover, units
+    from ezdxf.disassemble import make_primitive
+    from ezdxf.document import Drawing
+    from ezdxf.entities.dxfentity import DXFEntity
+    from ezdxf.entities.insert import Insert
+    from ezdxf.entities.lwpolyline import LWPolyline
+    from ezdxf.entities.mesh import Mesh
+    from ezdxf.entities.mtext import MText
+    from ezdxf.entities.polygon import DXFPolygon as Polygonal
+    from ezdxf.entities.polyline import Polyline
+    from ezdxf.entities.spline import Spline
+    from ezdxf.entities.text import Text
+    from ezdxf.filemanagement import readfile
+    from ezdxf.lldxf.const import DXFError
+    from ezdxf.math import Vec2, Vec3
+    from ezdxf.path import Path as DrawnPath
+    from ezdxf.path import from_hatch, make_path
+    from ezdxf.protocols import SupportsVirtualEntities, virtual_entities
+    from ezdxf.render.mesh import MeshBuilder
+    from shapely.geometry import LineString, Point, Polygon
+    from shapely.geometry.base import BaseGeometry
+
+UNITS_M: Final[Mapping[str, float]] = MappingProxyType(
+    {"m": 1.0, "mm": 0.001, "cm": 0.01, "dm": 0.1, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
+)
+"""Lengths of units in metres, by the names that `--units` takes."""
+
+_CODES: Final = {
+    units.IN: "in",
+    units.FT: "ft",
+    units.MM: "mm",
+    units.CM: "cm",
+    units.M: "m",
+    units.KM: "km",
+    units.DM: "dm",
+}
+MOST_LINES: Final = 2_000_000
+"""Most lines of a file: each number of an entity takes one line, and its group code another."""
+
+MOST_ENTITIES: Final = 50_000
+"""Most entities of a drawing with all blocks expanded."""
+
+_MOST_NESTED: Final = 50
+_MOST_TEXT: Final = 1000
+_SAG_M: Final = 0.02  # largest deviation of the chords of an arc
+_ROUNDING: Final = 1e-9  # of the largest coordinate
+_NOWHERE: Final = Point()
+_FRAMES: Final = ("IMAGE", "WIPEOUT", "VIEWPORT")
+"""Entities whose outline is that of a picture."""
+
+_LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not add ever more points
+
+
+def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
+    """Return the content of the model space of a DXF file, blocks expanded.
+
+    Closed lines, hatches and footprints of meshes are outlines, texts are points. All have the tag
+    `layer`: entities on layer 0 of a block take that of the insert. Texts have the tag `text`,
+    entities with a thickness or an extent in z `height` and `min_height`, m. A damaged file is read
+    as far as `ezdxf.recover` can.
+
+    Args:
+        path: The file.
+        unit: One of `UNITS_M`; the unit of the file unless given.
+
+    Raises:
+        BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
+    """
+    lines = checked_file(path).read_bytes().count(b"\n")
+    if lines > MOST_LINES:
+        raise BlastEnvError(f"{path}: has {lines:,} lines, must have at most {MOST_LINES:,}")
+    remarks: list[Remark] = []
+    with errors_of("ezdxf", path, "DXF"):
+        document = _document(path, remarks)
+        remarks += _scaled(document)
+        _Unfolded(path, document).check()
+        metres = _metres_per_unit(path, document, unit)
+        found = list(islice(_Drawn(path, document, metres).features(), MOST_FEATURES + 1))
+    if len(found) > MOST_FEATURES:
+        raise too_many(path)
+    lost = tuple(each for each in found if isinstance(each, LostFeature))
+    features = tuple(each for each in found if not isinstance(each, LostFeature))
+    return SiteMap(path, DrawingCoordinates(metres), features, lost, tuple(remarks))
+
+
+def _document(path: Path, remarks: list[Remark]) -> Drawing:
+    """Return the drawing of a file; if it is damaged, as much as can be recovered."""
+    try:
+        return readfile(path)
+    except Exception as error:  # of many types: see `errors_of`
+        try:
+            document, auditor = recover.readfile(path)
+        except Exception:
+            raise error from None
+        kind = "damaged files, recovered as far as possible"
+        count = len(auditor.errors) + len(auditor.fixes)
+        faults = f"{count} faults mended or skipped" if count else ""
+        remarks.append((kind, path.name, faults))
+        return document
+
+
+def _scaled(document: Drawing) -> Iterator[Remark]:
+    """Set the scales of 0 of inserts to 1, which no block can be drawn with; yield a remark each.
+
+    CAD programs show such inserts with the scale 1.
+    """
+    for layout in (document.modelspace(), *document.blocks):
+        for insert in layout.query("INSERT"):
+            for name in ("xscale", "yscale", "zscale"):
+                if insert.dxf.get(name, 1.0) == 0.0:
+                    insert.dxf.set(name, 1.0)
+                    place = f"INSERT {insert.dxf.get('handle')}"
+                    yield "inserts with a scale of 0, taken as 1", place, name
+
+
+@dataclass(frozen=True)
+class _Unfolded:
+    """Counter of the entities of a drawing with all blocks expanded, without expanding them.
+
+    Attributes:
+        path: The file.
+        document: The drawing.
+        counts: Entities of the blocks counted so far, by their names in lower case.
+    """
+
+    path: Path
+    document: Drawing
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def check(self) -> None:
+        """Refuse a drawing with too many entities or a number out of bounds.
+
+        Raises:
+            BlastEnvError: If there are more than `MOST_ENTITIES` entities, a number is beyond
+                `MOST_COORDINATE`, or a block is nested too deeply or in itself.
+        """
+        count = self._count(self.document.modelspace(), ())
+        if count > MOST_ENTITIES:
+            raise BlastEnvError(
+                f"{self.path}: has {count:,} entities once its blocks are taken apart, must have "
+                f"at most {MOST_ENTITIES:,}"
+            )
+
+    def _count(self, entities: Iterable[DXFEntity], above: tuple[str, ...]) -> int:
+        """Return the number of entities, including those of the blocks that they insert."""
+        total = 0
+        for entity in entities:
+            self._check_numbers(entity)
+            total += 1
+            name, times = _block_of(entity)
+            block = self.document.blocks.get(name) if name else None
+            if block is None:
+                continue
+            if name in above or len(above) == _MOST_NESTED:
+                raise BlastEnvError(
+                    f"{self.path}: the block {value_text(name)} lies in itself, or in more than "
+                    f"{_MOST_NESTED} others, must do neither"
+                )
+            if name not in self.counts:
+                self.counts[name] = self._count(block, (*above, name))
+            total += times * (1 + self.counts[name])
+        return total
+
+    def _check_numbers(self, entity: DXFEntity) -> None:
+        for number in _numbers(entity):
+            if not abs(number) <= MOST_COORDINATE:
+                raise BlastEnvError(
+                    f"{self.path}: {entity.dxftype()} {entity.dxf.get('handle')}: has the number "
+                    f"{number:g}, must be within {MOST_COORDINATE:g}"
+                )
+
+
+def _block_of(entity: DXFEntity) -> tuple[str, int]:
+    """Return the name of the block that an entity inserts, or an empty string, and the count."""
+    if entity.dxftype() == "INSERT":
+        times = max(entity.dxf.row_count, 1) * max(entity.dxf.column_count, 1)
+        return str(entity.dxf.get("name", "")).lower(), times
+    if entity.dxftype() == "DIMENSION":
+        return str(entity.dxf.get("geometry", "")).lower(), 1
+    return "", 0
+
+
+def _numbers(entity: DXFEntity) -> Iterator[float]:
+    """Yield the numbers of an entity: coordinates, angles, bulges, factors, knots."""
+    for value in entity.dxf.all_existing_dxf_attribs().values():
+        if isinstance(value, float):
+            yield value
+        elif isinstance(value, Vec2 | Vec3):
+            yield from (float(each) for each in value)
+    if isinstance(entity, LWPolyline):
+        yield from np.ravel(entity.lwpoints.values).tolist()
+    elif isinstance(entity, Polyline):
+        for vertex in entity.vertices:
+            yield from _numbers(vertex)
+    elif isinstance(entity, Spline):
+        yield from (*entity.knots, *entity.weights)
+
+
+def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
+    if unit is None:
+        code = int(document.units)
+        if code == 0:
+            raise BlastEnvError(
+                f"{path}: does not say its unit ($INSUNITS is 0); say it with --units, one of "
+                f"{', '.join(UNITS_M)}"
+            )
+        if code not in _CODES:
+            raise BlastEnvError(
+                f"{path}: $INSUNITS is {code}, which is none of {', '.join(UNITS_M)}; say --units"
+            )
+        unit = _CODES[code]
+    if unit not in UNITS_M:
+        raise BlastEnvError(
+            f"units is {unit!r}{suggestion(unit, UNITS_M)}, must be one of {', '.join(UNITS_M)}"
+        )
+    return UNITS_M[unit]
+
+
+@dataclass
+class _Drawn:
+    """The entities of a drawing as features.
+
+    Attributes:
+        path: The file.
+        document: The drawing.
+        metres: Length of its unit, m.
+        left: Number of points that its lines may still have.
+        skipped: Entities that a block has, but ezdxf cannot place, with the reason.
+    """
+
+    path: Path
+    document: Drawing
+    metres: float
+    left: int = MOST_POINTS
+    skipped: list[tuple[DXFEntity, str]] = field(default_factory=list)
+
+    def features(self) -> Iterator[MapFeature]:
+        """Yield the features, also those that cannot be used."""
+        number = 0
+        for entity in self.document.modelspace():
+            for part, layer in self._parts(entity, "0"):
+                number += 1
+                handle = entity.dxf.get("handle") or f"no. {number}"
+                own = handle if part is entity else f"{handle}/{number}"
+                place = f"{part.dxftype()} {own} on the layer {layer}"
+                yield self._feature(part, layer, place)
+            for part, reason in self.skipped:
+                number += 1
+                place = f"{part.dxftype()} {entity.dxf.get('handle')}/{number}"
+                kind = f"entities of blocks that cannot be placed ({reason})"
+                layer = str(part.dxf.get("layer", "0"))
+                yield LostFeature(_NOWHERE, {"layer": layer}, place, kind)
+            self.skipped.clear()
+
+    def _parts(self, entity: DXFEntity, above: str) -> Iterator[tuple[DXFEntity, str]]:
+        """Yield the simple entities of an entity, with their layers.
+
+        Args:
+            entity: Any entity; blocks, dimensions and lines with many lines are taken apart.
+            above: Layer of the insert around it.
+        """
+        own = str(entity.dxf.get("layer", "0"))
+        layer = above if own == "0" else own
+        if isinstance(entity, Insert):
+            block = entity.block()
+            if block is None or block.block is None or block.block.is_xref:
+                yield entity, layer
+                return
+            for insert in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                for attribute in insert.attribs:
+                    yield from self._parts(attribute, layer)
+                found = insert.virtual_entities(skipped_entity_callback=self._skip)
+                for part in found:
+                    yield from self._parts(part, layer)
+        elif isinstance(entity, SupportsVirtualEntities):
+            for part in virtual_entities(entity):
+                yield from self._parts(part, layer)
+        else:
+            yield entity, layer
+
+    def _skip(self, entity: DXFEntity, reason: str) -> None:
+        self.skipped.append((entity, reason))
+
+    def _feature(self, entity: DXFEntity, layer: str, place: str) -> MapFeature:
+        tags: dict[str, str | float | bool] = {"layer": layer}
+        if isinstance(entity, Text | MText):
+            return _text(entity, tags, place)
+        if entity.dxftype() == "POINT":
+            return MapFeature(Point(entity.dxf.location.x, entity.dxf.location.y), tags, place)
+        try:
+            geometry, heights = self._geometry(entity, place)
+        except (TypeError, ValueError, DXFError) as error:
+            if isinstance(error, BlastEnvError):
+                raise
+            kind = "references to other files, or to blocks that are not there"
+            if not isinstance(entity, Insert):
+                kind = f"entities of the type {entity.dxftype()}"
+            return LostFeature(_NOWHERE, tags, place, kind)
+        if geometry.is_empty:
+            return LostFeature(_NOWHERE, tags, place, "entities without an extent in plan")
+        thickness = entity.dxf.get("thickness", 0.0) if entity.dxf.is_supported("thickness") else 0
+        base, top = heights[0], heights[1] if _is_mesh(entity) else heights[0] + abs(thickness)
+        if top > max(base, 0.0):
+            tags["height"] = self.metres * top
+            if base > 0.0:
+                tags["min_height"] = self.metres * base
+        return MapFeature(geometry, tags, place)
+
+    def _geometry(self, entity: DXFEntity, place: str) -> tuple[BaseGeometry, tuple[float, float]]:
+        """Return the outline or line of an entity, and its lowest and highest z.
+
+        Raises:
+            TypeError: If it has none.
+        """
+        if _is_mesh(entity):
+            return self._footprint(make_primitive(entity).mesh, place)
+        if isinstance(entity, Polygonal):
+            rings = [self._places(line, place) for line in from_hatch(entity)]
+            lines = [LineString([*ring[:, :2], ring[0, :2]]) for ring in rings if len(ring) > 2]
+            return shapely.build_area(shapely.GeometryCollection(lines)), (0.0, 0.0)
+        if entity.dxftype() in _FRAMES:
+            raise TypeError
+        points = self._places(make_path(entity), place)
+        if len(points) < 2:
+            return _NOWHERE, (0.0, 0.0)
+        heights = float(points[:, 2].min()), float(points[:, 2].max())
+        if len(points) > 3 and _closes(points[:, :2]):
+            return Polygon(points[:, :2]), heights
+        return LineString(points[:, :2]), heights
+
+    def _footprint(
+        self, mesh: MeshBuilder | None, place: str
+    ) -> tuple[BaseGeometry, tuple[float, float]]:
+        """Return the area below the faces of a mesh, and its lowest and highest z."""
+        if mesh is None or not mesh.vertices:
+            return _NOWHERE, (0.0, 0.0)
+        vertices = np.array([tuple(each) for each in mesh.vertices])
+        self._check(vertices, place)
+        faces = [vertices[list(face)][:, :2] for face in mesh.faces if len(face) > 2]
+        shadows = [Polygon(face) for face in faces]
+        footprint = shapely.union_all([each for each in shadows if each.is_valid and each.area])
+        return footprint, (float(vertices[:, 2].min()), float(vertices[:, 2].max()))
+
+    def _places(self, line: DrawnPath, place: str) -> FloatArray:
+        """Return the points of a line (n, 3), arcs as chords.
+
+        Raises:
+            BlastEnvError: If there are too many, or a coordinate is too large.
+        """
+        held = np.array([tuple(point) for point in line.control_vertices()]).reshape(-1, 3)
+        self._check(held, place)
+        largest = float(np.abs(held).max(initial=0.0))
+        straight = line.flattening(max(_SAG_M / self.metres, _LEAST_SAG * largest))
+        points = np.array([tuple(each) for each in islice(straight, self.left + 1)]).reshape(-1, 3)
+        if len(points) > self.left:
+            raise too_many_points(self.path)
+        self.left -= len(points)
+        return points
+
+    def _check(self, points: FloatArray, place: str) -> None:
+        largest = float(np.abs(points).max(initial=0.0))
+        if not largest <= MOST_COORDINATE:
+            raise BlastEnvError(
+                f"{self.path}: {place}: has, or its arcs have, the coordinate {largest:g}, "
+                f"must be within {MOST_COORDINATE:g}"
+            )
+
+
+def _is_mesh(entity: DXFEntity) -> bool:
+    """Return whether an entity has faces in space."""
+    if isinstance(entity, Polyline):
+        return entity.is_poly_face_mesh or entity.is_polygon_mesh
+    return isinstance(entity, Mesh)
+
+
+def _text(entity: Text | MText, tags: dict[str, str | float | bool], place: str) -> MapFeature:
+    """Return the middle of a text as a point."""
+    insert = entity.dxf.insert
+    if isinstance(entity, MText):
+        entity.text = entity.text[:_MOST_TEXT]
+    words = entity.plain_text()[:_MOST_TEXT]
+    if isinstance(entity, Text):
+        _, first, second = entity.get_placement()
+        insert = first if second is None else second
+    point = Point(float(insert[0]), float(insert[1]))
+    return MapFeature(point, {**tags, "text": " ".join(str(words).split())}, place)
+
+
+def _closes(places: FloatArray) -> bool:
+    """Return whether a line ends at its start, within rounding."""
+    size = float(np.abs(places).max()) or 1.0
+    return bool(np.abs(places[0] - places[-1]).max() <= _ROUNDING * size)

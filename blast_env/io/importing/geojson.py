@@ -1,0 +1,184 @@
+"""Reading of GeoJSON, RFC 7946 or the older form with a `crs` member."""
+
+import json
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
+from blast_env.io.importing.site_map import (
+    MOST_COORDINATE,
+    MOST_FEATURES,
+    DrawingCoordinates,
+    LostFeature,
+    MapCoordinates,
+    MapFeature,
+    SiteMap,
+    SourceCoordinates,
+    Tags,
+    checked_file,
+    too_many,
+)
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.errors import ShapelyError
+    from shapely.geometry import shape
+    from shapely.geometry.base import BaseGeometry
+
+MOST_VALUES: Final = 3_000_000
+"""Most numbers, arrays and tables of a file: each takes some hundred bytes in memory."""
+
+LOCAL: Final = "local"
+"""Reference system of coordinates in metres without a place on the Earth."""
+
+_DEFAULT_CRS: Final = "EPSG:4326"
+_LOCAL_WORDS: Final = "local site metres"  # in exports of a site without a georeference
+_KINDS: Final = (
+    *("Point", "MultiPoint", "LineString", "MultiLineString"),
+    *("Polygon", "MultiPolygon", "GeometryCollection"),
+)
+
+
+def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
+    """Return the map of a GeoJSON file.
+
+    Args:
+        path: The file.
+        crs: Reference system of the coordinates, `local` for metres without a place on the Earth;
+            that of the file unless given, or longitude and latitude (EPSG:4326) if it has none.
+
+    Raises:
+        BlastEnvError: If it cannot be read, or is not GeoJSON.
+    """
+    document = _parsed(checked_file(path))
+    listed = _listed_features(path, document)
+    if len(listed) > MOST_FEATURES:
+        raise too_many(path)
+    features, lost = [], []
+    for index in range(len(listed)):
+        item, listed[index] = listed[index], None  # free it: it takes more memory than its feature
+        feature = _feature(path, f"features[{index}]", item)
+        if isinstance(feature, LostFeature):
+            lost.append(feature)
+        else:
+            features.append(feature)
+    coordinates = _coordinates(path, document, crs)
+    return SiteMap(path, coordinates, tuple(features), tuple(lost))
+
+
+def _parsed(path: Path) -> Mapping[str, Any]:
+    try:
+        content = path.read_bytes()
+        values = sum(content.count(sign) for sign in (b",", b"[", b"{"))
+        if values > MOST_VALUES:
+            raise BlastEnvError(
+                f"{path}: has {values:,} commas and opening brackets, must have at most "
+                f"{MOST_VALUES:,}: cut a smaller extract"
+            )
+        document = json.loads(content)
+    except RecursionError as error:
+        raise BlastEnvError(f"{path}: is nested too deeply") from error
+    except BlastEnvError:
+        raise
+    except (ValueError, OSError) as error:
+        raise BlastEnvError(f"{path}: is not JSON: {shortened(str(error), 300)}") from error
+    if not isinstance(document, dict):
+        raise BlastEnvError(f"{path}: is {type(document).__name__}, must be a GeoJSON object")
+    return document
+
+
+def _listed_features(path: Path, document: Mapping[str, Any]) -> list[Any]:
+    """Return the features of a collection, a single feature, or a bare geometry."""
+    kind = document.get("type")
+    if kind == "FeatureCollection":
+        features = document.get("features")
+        if not isinstance(features, list):
+            raise BlastEnvError(f"{path}: features is missing or no array")
+        return features
+    if kind == "Feature":
+        return [document]
+    if kind in _KINDS:
+        return [{"type": "Feature", "geometry": document, "properties": {}}]
+    raise BlastEnvError(
+        f"{path}: type is {value_text(kind)}, must be 'FeatureCollection', 'Feature' or that of a "
+        f"geometry: "
+        "is it GeoJSON?"
+    )
+
+
+def _feature(path: Path, place: str, item: Any) -> MapFeature:
+    """Return a feature; one without a geometry, which GeoJSON allows, is lost."""
+    if not isinstance(item, dict) or item.get("type") != "Feature":
+        raise BlastEnvError(f"{path}: {place}: is not a Feature")
+    given = item.get("geometry")
+    geometry = shapely.Point() if given is None else _geometry(path, place, given)
+    if geometry.is_empty:
+        return LostFeature(geometry, _tags(item), place, "features without a geometry")
+    return MapFeature(geometry, _tags(item), place)
+
+
+def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
+    if not isinstance(document, dict) or document.get("type") not in _KINDS:
+        kind = document.get("type") if isinstance(document, dict) else document
+        raise BlastEnvError(
+            f"{path}: {place}.geometry: type is {value_text(kind)}, must be one of "
+            f"{', '.join(_KINDS)}"
+        )
+    _check_numbers(path, place, document)
+    try:
+        geometry = shapely.force_2d(shape(document))
+    except (ShapelyError, TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+        raise BlastEnvError(
+            f"{path}: {place}.geometry: is not usable: {shortened(str(error), 300)}"
+        ) from error
+    except RecursionError as error:
+        raise BlastEnvError(f"{path}: {place}.geometry: is nested too deeply") from error
+    return geometry
+
+
+def _check_numbers(path: Path, place: str, geometry: dict[str, Any]) -> None:
+    """Refuse a coordinate that is not finite or is beyond `MOST_COORDINATE`."""
+    left: list[Any] = [geometry]
+    while left:
+        value = left.pop()
+        if isinstance(value, dict):
+            left += [value.get("coordinates"), value.get("geometries")]
+        elif isinstance(value, list):
+            left += value
+        elif isinstance(value, int | float) and not abs(value) <= MOST_COORDINATE:
+            where = f"{path}: {place}.geometry: has"
+            if isinstance(value, float) and not isfinite(value):
+                raise BlastEnvError(f"{where} a coordinate that is no finite number")
+            bound = f"must be within {MOST_COORDINATE:g}"
+            raise BlastEnvError(f"{where} the coordinate {value_text(value)}, {bound}")
+
+
+def _tags(item: Mapping[str, Any]) -> Tags:
+    """Return the properties with plain values, and the identifier."""
+    properties = item.get("properties")
+    tags = dict(properties) if isinstance(properties, dict) else {}
+    if "id" in item:
+        tags.setdefault("id", item["id"])
+    return {str(key): value for key, value in tags.items() if isinstance(value, str | int | float)}
+
+
+def _coordinates(path: Path, document: Mapping[str, Any], crs: str | None) -> SourceCoordinates:
+    """Return the coordinates' system: the one given, or that of the file."""
+    if crs is None:
+        if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
+            return DrawingCoordinates(1.0)
+        crs = _named_crs(path, document.get("crs"))
+    return DrawingCoordinates(1.0) if crs == LOCAL else MapCoordinates(crs)
+
+
+def _named_crs(path: Path, member: Any) -> str:
+    """Return the reference system of the older form of GeoJSON."""
+    if member is None:
+        return _DEFAULT_CRS
+    properties = member.get("properties") if isinstance(member, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if not isinstance(name, str):
+        raise BlastEnvError(f"{path}: crs: has no properties.name; say --crs instead")
+    return name

@@ -1,0 +1,177 @@
+"""The ledger of an import: what became of every object of a map or drawing."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any, Final
+
+from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.io.importing.site_map import MapFeature
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+
+_MOST_PLACES: Final = 5
+_MOST_CUT_LINES: Final = 12
+_UNUSED: Final = "objects of no use to the site"
+
+
+class Deed(StrEnum):
+    """The fate of an object in an import."""
+
+    READ = "read"
+    MERGED = "merged"
+    CLOSED = "closed"
+    GUESSED = "guessed"
+    LEFT_OUT = "left out"
+    PASSED = "not of the site"
+
+
+_SHOWN: Final = (Deed.MERGED, Deed.CLOSED, Deed.GUESSED, Deed.LEFT_OUT)
+"""The deeds that change the site, which are notes of an import."""
+
+STRICT: Final = (Deed.GUESSED, Deed.LEFT_OUT)
+"""The deeds that `--strict` refuses."""
+
+_FATES: Final = (Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+"""The deeds that say where an object is; a guess is in addition to them."""
+
+
+@dataclass(frozen=True)
+class LedgerEntry:
+    """A line of the ledger.
+
+    Attributes:
+        deed: What was done.
+        kind: The kind of the object, or the reason.
+        place: The object's place in the file: `way 4711`.
+        name: Its name in the file.
+        detail: The value guessed, or the object that it was merged with.
+        position: A place in it, in the coordinates of the file.
+    """
+
+    deed: Deed
+    kind: str
+    place: str
+    name: str = ""
+    detail: str = ""
+    position: tuple[float, float] | None = None
+
+    @property
+    def words(self) -> str:
+        """The object with its name and detail, for texts."""
+        name = f" {shortened(self.name, 30)!r}" if self.name else ""
+        return f"{self.place}{name}: {self.detail}" if self.detail else f"{self.place}{name}"
+
+
+@dataclass
+class Ledger:
+    """The entries of an import; see `Deed`.
+
+    Every object of a file that is not used has an entry that says why.
+
+    Attributes:
+        entries: All entries, in the order of the deeds done.
+    """
+
+    entries: list[LedgerEntry] = field(default_factory=list)
+
+    def add(self, deed: Deed, kind: str, place: str, name: str = "", detail: str = "") -> None:
+        """Add an entry."""
+        self.entries.append(LedgerEntry(deed, kind, place, name, detail))
+
+    def of(self, *deeds: Deed) -> tuple[LedgerEntry, ...]:
+        """Return the entries of some deeds."""
+        return tuple(each for each in self.entries if each.deed in deeds)
+
+    def sums(self, *deeds: Deed) -> dict[tuple[Deed, str], int]:
+        """Return the number of entries by deed and kind, in the order of the deeds."""
+        return {key: len(entries) for key, entries in self._grouped(deeds or tuple(Deed)).items()}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A line for each kind of change to the site, with the first objects."""
+        return tuple(self._lines(_SHOWN, _MOST_PLACES))
+
+    @property
+    def text(self) -> str:
+        """All entries, by deed and kind."""
+        return "".join(f"{line}\n" for line in self._lines(tuple(Deed), None))
+
+    @property
+    def summary(self) -> str:
+        """The sums of the changes to the site in one sentence; empty if there are none."""
+        sums = [f"{deed} {count}: {kind}" for (deed, kind), count in self.sums(*_SHOWN).items()]
+        return "; ".join(sums)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The entries for JSON, by deed and kind."""
+        record: dict[str, dict[str, list[dict[str, Any]]]] = {str(deed): {} for deed in Deed}
+        for (deed, kind), entries in self._grouped(tuple(Deed)).items():
+            record[deed][kind] = [
+                {
+                    key: value
+                    for key in ("place", "name", "detail", "position")
+                    if (value := getattr(each, key))
+                }
+                for each in entries
+            ]
+        return record
+
+    def settle(self, features: Iterable[MapFeature], used: Mapping[str, str]) -> None:
+        """Complete the ledger, so that it has every object of the file; no guess about others.
+
+        Args:
+            features: All objects of the file, also those that could not be read whole.
+            used: The kinds of those used on the site, by their places in the file.
+        """
+        known = list(features)
+        bounds = shapely.bounds([each.geometry for each in known]).reshape(-1, 4)
+        middles = 0.5 * (bounds[:, :2] + bounds[:, 2:])
+        positions = {
+            each.place: (float(x), float(y))
+            for each, (x, y) in zip(known, middles, strict=True)
+            if x == x
+        }
+        fates = {each.place for each in self.of(*_FATES)}
+        for each in known:
+            if each.place in used:
+                self.add(Deed.READ, used[each.place], each.place)
+            elif each.place not in fates:
+                self.add(Deed.LEFT_OUT, _UNUSED, each.place)
+        elsewhere = {each.place for each in self.of(Deed.PASSED)}
+        self.entries = [
+            replace(each, position=positions.get(each.place))
+            for each in self.entries
+            if each.deed is not Deed.GUESSED or each.place not in elsewhere
+        ]
+
+    def check_strict(self, path: object) -> None:
+        """Refuse an import that guessed something or left something out.
+
+        Raises:
+            BlastEnvError: If it did; the message has all kinds.
+        """
+        lines = list(self._lines(STRICT, _MOST_PLACES))
+        if lines:
+            more = f"\n  and {len(lines) - _MOST_CUT_LINES} more kinds" * (
+                len(lines) > _MOST_CUT_LINES
+            )
+            listed = "".join(f"\n  {line}" for line in lines[:_MOST_CUT_LINES])
+            raise BlastEnvError(
+                f"{path}: --strict allows no guess and no omission, but there are:{listed}{more}"
+            )
+
+    def _grouped(self, deeds: Sequence[Deed]) -> dict[tuple[Deed, str], list[LedgerEntry]]:
+        groups: dict[tuple[Deed, str], list[LedgerEntry]] = {}
+        for deed in deeds:
+            for each in self.of(deed):
+                groups.setdefault((deed, each.kind), []).append(each)
+        return groups
+
+    def _lines(self, deeds: Sequence[Deed], most: int | None) -> Iterator[str]:
+        for (deed, kind), entries in self._grouped(deeds).items():
+            shown = [each.words for each in entries[:most]]
+            more = [f"and {len(entries) - len(shown)} more"] if len(entries) > len(shown) else []
+            yield f"{deed}: {kind}: {len(entries)} ({', '.join([*shown, *more])})"

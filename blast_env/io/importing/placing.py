@@ -1,0 +1,360 @@
+"""Placement of the site on a map: its rectangle, its direction and its objects.
+
+The site has the direction of most walls; the grid is aligned with as many walls as possible.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.io.importing.joining import closed, with_courtyards
+from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.options import MOST_SITE_M, ImportOptions
+from blast_env.io.importing.plane import Plane, plane_around, rotated
+from blast_env.io.importing.site_map import SiteMap
+from blast_env.io.importing.things import Role, Thing
+from blast_env.site.sections import AnyGeoreference
+from blast_env.units import MODULE_SIDE_M
+
+with import_extra("maps", "maps and drawings"):
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+_RIGHT_ANGLE_DEG: Final = 90.0
+_NEAR_DEG: Final = 4.0
+_NEAR_M: Final = 0.1
+_STRAIGHT_DEG: Final = 2.0
+_SHORTEST_M: Final = 1e-6
+
+
+def dominant_direction_deg(outlines: Sequence[BaseGeometry]) -> float:
+    """Return the direction of most walls, weighted by length, from the x axis: -45 to 45.
+
+    Walls at right angles count together. The result is the median over the walls near the most
+    frequent direction, so that a few houses in another direction have no influence.
+    """
+    starts, ends = _walls(outlines)
+    step = ends - starts
+    angles = np.degrees(np.arctan2(step[:, 1], step[:, 0]))
+    angle = _densest(angles, np.hypot(*step.T), _RIGHT_ANGLE_DEG, _NEAR_DEG)
+    return angle - _RIGHT_ANGLE_DEG if angle > _RIGHT_ANGLE_DEG / 2.0 else angle
+
+
+def grid_offset_m(outlines: Sequence[BaseGeometry]) -> tuple[float, float]:
+    """Return the offset in x and y, 0 to a module's side, at which most walls lie on grid lines.
+
+    Walls along the grid count, by their length.
+    """
+    starts, ends = _walls(outlines)
+    step = ends - starts
+    slope = np.tan(np.radians(_STRAIGHT_DEG))
+    offsets = []
+    for across in (0, 1):
+        along = 1 - across
+        straight = np.abs(step[:, across]) <= slope * np.abs(step[:, along])
+        places = 0.5 * (starts + ends)[straight, across]
+        lengths = np.abs(step[straight, along])
+        offsets.append(_densest(places, lengths, MODULE_SIDE_M, _NEAR_M))
+    return offsets[0], offsets[1]
+
+
+def _walls(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
+    """Return both ends of every wall of every outline (n, 2)."""
+    rings = shapely.get_rings(shapely.get_parts(list(outlines)))
+    places, ring = shapely.get_coordinates(rings, return_index=True)
+    same = ring[1:] == ring[:-1]
+    starts, ends = places[:-1][same], places[1:][same]
+    long = np.hypot(*(ends - starts).T) > _SHORTEST_M
+    return starts[long], ends[long]
+
+
+def _densest(values: FloatArray, weights: FloatArray, period: float, near: float) -> float:
+    """Return the position of most weight on a circle, 0 to `period`; 0 without values."""
+    if len(values) == 0:
+        return 0.0
+    values = values % period
+    kinds, where = np.unique(np.round(values / (0.1 * near)), return_inverse=True)
+    heaps = np.bincount(where, weights)
+    centres = kinds * 0.1 * near
+    gaps = np.abs((centres[:, np.newaxis] - centres + period / 2.0) % period - period / 2.0)
+    closeness = np.maximum(0.0, 1.0 - gaps / near)
+    best = centres[int(np.argmax(closeness @ heaps))]
+    offset = (values - best + period / 2.0) % period - period / 2.0
+    nearby = np.abs(offset) <= near
+    order = np.argsort(offset[nearby])
+    heap = np.cumsum(weights[nearby][order])
+    median = offset[nearby][order][np.searchsorted(heap, 0.5 * heap[-1])]
+    return float((best + median) % period)
+
+
+OUTSIDE: Final = "outside the site"
+_HAIR_M: Final = 0.01
+_ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
+
+
+@dataclass(frozen=True)
+class PlacedSite:
+    """A site on a map, with its objects in metres from the site's lower left corner.
+
+    Attributes:
+        path: The file.
+        plane: The plane in which the map is measured.
+        rotation_deg: From the plane's x axis to the site's, counterclockwise.
+        corner_m: The site's lower left corner in the turned plane.
+        shape: Rows and columns of modules.
+        things: Objects on the site or near it.
+        faulty: Objects on the site or of an unknown place that cannot be used.
+        layers: Layers of a drawing.
+    """
+
+    path: Path
+    plane: Plane
+    rotation_deg: float
+    corner_m: tuple[float, float]
+    shape: tuple[int, int]
+    things: tuple[Thing, ...]
+    faulty: tuple[Thing, ...] = ()
+    layers: tuple[str, ...] = ()
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Extents along x and y, m."""
+        return self.shape[1] * MODULE_SIDE_M, self.shape[0] * MODULE_SIDE_M
+
+    @cached_property
+    def box(self) -> BaseGeometry:
+        """The whole site."""
+        return shapely.box(0.0, 0.0, *self.size_m)
+
+    @property
+    def georeference(self) -> AnyGeoreference:
+        """The georeference of the site."""
+        corner = rotated(np.array([self.corner_m]), self.rotation_deg)[0]
+        return self.plane.georeference((float(corner[0]), float(corner[1])), self.rotation_deg)
+
+    def of_role(self, role: Role) -> tuple[Thing, ...]:
+        """Return the things of a role."""
+        return tuple(each for each in self.things if each.role is role)
+
+    def to_site(self, places: FloatArray) -> FloatArray:
+        """Return places of the map (n, 2) in metres of the site (n, 2)."""
+        turned = rotated(self.plane.to_metres(places), -self.rotation_deg)
+        return np.asarray(turned - np.array(self.corner_m))
+
+
+def place_site(
+    site_map: SiteMap, things: Sequence[Thing], options: ImportOptions, ledger: Ledger
+) -> PlacedSite:
+    """Return the site that the options specify, or one around all objects of the map.
+
+    Lines that close become outlines. The ledger gets the objects that are elsewhere or cannot be
+    used.
+
+    Raises:
+        BlastEnvError: If the map has no objects, the place is not on the Earth, or the site would
+            be too large.
+    """
+    faulty = [each for each in things if each.fault]
+    things = [each for each in things if not each.fault]
+    if not things:
+        raise _nothing(site_map, faulty, options)
+    plane = plane_around(site_map.coordinates, _reference(things, options))
+    near = closed(_near(site_map, things, plane, options, ledger), ledger)
+    if site_map.is_drawing:
+        near = with_courtyards(near, ledger)
+    open_lines = [each for each in near if each.fault]
+    near = [each for each in near if not each.fault]
+    if not near or (options.size_m is None and Role.BUILDING not in {each.role for each in near}):
+        raise _nothing(site_map, [*faulty, *open_lines], options)
+    rotation_deg = _rotation_deg(near, options)
+    turned = _moved(near, lambda places: rotated(places, -rotation_deg))
+    left, bottom, right, top = _bounds_m(turned, plane, rotation_deg, options)
+    size_m = np.array([right - left, top - bottom])
+    if size_m.max() > MOST_SITE_M:
+        raise BlastEnvError(
+            f"{site_map.path}: the site would be {size_m[0]:,.0f} x {size_m[1]:,.0f} m, must be at "
+            f"most {MOST_SITE_M:g} m long and wide: say --centre or --origin, and --size"
+        )
+    offsets = grid_offset_m(
+        [each.geometry for each in _outlines(turned, (left, bottom, right, top))]
+    )
+    asked = options.size_m is not None
+    corner = [
+        _on_grid(low, offset, asked) for low, offset in zip((left, bottom), offsets, strict=True)
+    ]
+    far = (corner[0] + size_m[0], corner[1] + size_m[1]) if asked else (right, top)
+    counts = [
+        int(np.ceil((high - low) / MODULE_SIDE_M - _ROUNDING))
+        for low, high in zip(corner, far, strict=True)
+    ]
+    layers = sorted({str(each.tags["layer"]) for each in site_map.features if "layer" in each.tags})
+    site = PlacedSite(
+        path=site_map.path,
+        plane=plane,
+        rotation_deg=rotation_deg,
+        corner_m=(corner[0], corner[1]),
+        shape=(counts[1], counts[0]),
+        things=tuple(_moved(turned, lambda places: places - np.array(corner))),
+        layers=tuple(layers),
+    )
+    lines = _moved(open_lines, lambda places: rotated(places, -rotation_deg) - np.array(corner))
+    found = [*lines, *_moved(faulty, site.to_site)]
+    box = None if options.size_m is None else site.box
+    return replace(site, faulty=tuple(_faults(found, box, ledger)))
+
+
+def _faults(faulty: Iterable[Thing], box: BaseGeometry | None, ledger: Ledger) -> Iterator[Thing]:
+    """Yield the faulty objects on a site or of an unknown place, and enter all in the ledger.
+
+    Args:
+        faulty: The objects, in site metres.
+        box: The site; `None` if it is the whole file.
+        ledger: The ledger of the import.
+    """
+    for each in faulty:
+        if box is None or each.geometry.is_empty or shapely.intersects(each.geometry, box):
+            ledger.add(Deed.LEFT_OUT, each.fault, each.place, each.name)
+            yield each
+        else:
+            ledger.add(Deed.PASSED, OUTSIDE, each.place, each.name)
+
+
+def _nothing(site_map: SiteMap, faulty: Sequence[Thing], options: ImportOptions) -> BlastEnvError:
+    """Return the error of a map without a building."""
+    faults = Counter(each.fault for each in faulty if each.role is Role.BUILDING)
+    reasons = "; ".join(f"{count} {fault}" for fault, count in faults.items())
+    if reasons:
+        return BlastEnvError(f"{site_map.path}: has no building that can be used, but {reasons}")
+    advice = "define them with --buildings-from and --charges-from"
+    if options.buildings_from:
+        advice = f"--buildings-from {' '.join(options.buildings_from)} chooses nothing"
+    return BlastEnvError(f"{site_map.path}: has no building that is marked as such; {advice}")
+
+
+def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, float]:
+    """Return a place of the map near the site: that of the options, or the objects' middle."""
+    asked = options.origin or options.centre
+    if asked is not None:
+        return asked
+    shown = _chief(things)
+    left, bottom, right, top = shapely.total_bounds([each.geometry for each in shown])
+    return float(left + right) / 2.0, float(bottom + top) / 2.0
+
+
+def _chief(things: Sequence[Thing]) -> Sequence[Thing]:
+    """Return the objects that fix the site: its outline, or all objects but streets and texts."""
+    own = [each for each in things if each.role is Role.SITE]
+    if own:
+        return own
+    fixed = [
+        each
+        for each in things
+        if each.role is not Role.NAME and not (each.role is Role.CHARGE and each.is_line)
+    ]
+    return fixed or things
+
+
+def _near(
+    site_map: SiteMap,
+    things: Sequence[Thing],
+    plane: Plane,
+    options: ImportOptions,
+    ledger: Ledger,
+) -> list[Thing]:
+    """Return the objects that may lie on the site, in metres of the plane."""
+    measured = _moved(things, plane.to_metres)
+    geometries = [each.geometry for each in measured]
+    if options.size_m is None:
+        bounds = shapely.bounds(geometries)
+        if not np.isfinite(bounds).all():
+            raise BlastEnvError(
+                f"{site_map.path}: reaches too far for one site: say --centre or --origin, and "
+                "--size"
+            )
+        return list(_joined(measured, ledger))
+    # The corner or the middle is the plane's reference; the site turns around it.
+    reference = options.origin or options.centre
+    middle = plane.to_metres(np.array([reference]))[0]
+    around = shapely.Point(middle).buffer(2.0 * float(np.hypot(*options.size_m)))
+    near = shapely.intersects(geometries, around)
+    for index in np.flatnonzero(~near):
+        ledger.add(Deed.PASSED, OUTSIDE, measured[int(index)].place, measured[int(index)].name)
+    return list(_joined((measured[index] for index in np.flatnonzero(near)), ledger))
+
+
+def _joined(things: Iterable[Thing], ledger: Ledger) -> Iterator[Thing]:
+    """Yield things, with the rectangles of an exported building joined again."""
+    buildings: dict[str, list[Thing]] = {}
+    for thing in things:
+        if thing.part_of:
+            buildings.setdefault(thing.part_of, []).append(thing)
+        else:
+            yield thing
+    for name, parts in buildings.items():
+        # Coordinates of a file are rounded: adjoining rectangles may have a tiny gap.
+        outline = shapely.union_all([each.geometry for each in parts], grid_size=_HAIR_M)
+        protected = any(each.protected for each in parts)
+        for each in parts[1:]:
+            kind, detail = "rectangles of a building", f"with {parts[0].place}"
+            ledger.add(Deed.MERGED, kind, each.place, each.name, detail)
+        yield replace(parts[0], geometry=outline, name=name, protected=protected)
+
+
+def _moved(things: Sequence[Thing], move: Callable[[FloatArray], FloatArray]) -> list[Thing]:
+    """Return things with all coordinates transformed in one call."""
+    geometries = shapely.transform([each.geometry for each in things], move)
+    return [replace(each, geometry=new) for each, new in zip(things, geometries, strict=True)]
+
+
+def _rotation_deg(things: Sequence[Thing], options: ImportOptions) -> float:
+    """Return the direction of the site: that of the options, or that of most walls."""
+    if options.rotation_deg is not None:
+        return options.rotation_deg
+    own = [each.geometry for each in things if each.role is Role.SITE]
+    walls = own or [each.geometry for each in things if each.role is Role.BUILDING]
+    return dominant_direction_deg(walls)
+
+
+def _bounds_m(
+    things: Sequence[Thing],
+    plane: Plane,
+    rotation_deg: float,
+    options: ImportOptions,
+) -> tuple[float, float, float, float]:
+    """Return the site's rectangle in the turned plane."""
+    if options.size_m is not None:
+        asked = options.origin or options.centre
+        place = rotated(plane.to_metres(np.array([asked])), -rotation_deg)[0]
+        size = np.array(options.size_m)
+        low = place - (0.0 if options.origin is not None else 0.5 * size)
+        far = low + size
+        return float(low[0]), float(low[1]), float(far[0]), float(far[1])
+    chief = _chief(things)
+    left, bottom, right, top = (
+        float(each) for each in shapely.total_bounds([each.geometry for each in chief])
+    )
+    margin_m = 0.0 if chief[0].role is Role.SITE else options.margin_m
+    return left - margin_m, bottom - margin_m, right + margin_m, top + margin_m
+
+
+def _outlines(things: Sequence[Thing], bounds_m: tuple[float, float, float, float]) -> list[Thing]:
+    """Return the outlines that fix the grid: the site's own, or the buildings on the site."""
+    box = shapely.box(*bounds_m)
+    own = [each for each in things if each.role is Role.SITE]
+    buildings = [each for each in things if each.role is Role.BUILDING]
+    on_site = shapely.intersects([each.geometry for each in buildings], box)
+    return own or [buildings[index] for index in np.flatnonzero(on_site)]
+
+
+def _on_grid(low_m: float, offset_m: float, nearest: bool) -> float:
+    """Return the grid line nearest to a place, or the last one before it."""
+    steps = (low_m - offset_m) / MODULE_SIDE_M
+    count = np.round(steps) if nearest else np.floor(steps + _ROUNDING)
+    return float(offset_m + count * MODULE_SIDE_M)

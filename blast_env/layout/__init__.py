@@ -1,0 +1,13 @@
+"""Layouts of barriers: legality, and layout files."""
+
+from blast_env.layout.files import LayoutFile, load_layout, write_layout
+from blast_env.layout.placement import Placement, check_layout, usable_cells
+
+__all__ = [
+    "LayoutFile",
+    "Placement",
+    "check_layout",
+    "load_layout",
+    "usable_cells",
+    "write_layout",
+]

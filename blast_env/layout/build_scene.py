@@ -1,0 +1,323 @@
+"""Conversion of a scenario to the site of one blast, and to the scene of a particle engine."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Element, Layout, Rectangle, standing
+from blast_env.layout import Placement, check_layout, usable_cells
+from blast_env.site import (
+    AnyCharge,
+    PointSource,
+    Problem,
+    Scenario,
+    ScenarioError,
+    VehicleCharge,
+    VehicleSource,
+)
+from blast_env.site.balls import Balls, air_lattice, explosion_fan
+from blast_env.site.boxes import TOLERANCE_M
+from blast_env.site.heights import highest_top_m
+from blast_env.site.models import AnyStructure, ConcreteSquareSection
+from blast_env.site.parameters import SimulationParameters, for_charge
+from blast_env.site.reach import Reach
+from blast_env.site.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
+from blast_env.site.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
+from blast_env.site.terraces import ground_below_m
+from blast_env.site.vehicles import NOTHING, Drive, Obstacles, obstacles_of
+from blast_env.site.worst_places import WorstPlaces
+from blast_env.site.zone import distance_m
+from blast_env.units import UNITS_PER_M, in_units
+from blast_env.values import checked_seed
+
+
+def random_streams(seed: int) -> tuple[np.random.Generator, ...]:
+    """Return independent generators for the charge, the fan and the air.
+
+    Separate streams keep fan and air unchanged if the charge is fixed.
+
+    Raises:
+        BlastEnvError: If the seed is not an integer, is negative or too large.
+    """
+    children = np.random.SeedSequence(checked_seed(seed)).spawn(3)
+    return tuple(np.random.default_rng(child) for child in children)
+
+
+def draw_charge(scenario: Scenario, seed: int, layout: Sequence[Element] = ()) -> Charge:
+    """Return the charge of a scenario for a seed.
+
+    Args:
+        scenario: The scenario.
+        seed: Seed of the random draw.
+        layout: The layout, on which the place of a vehicle's charge depends; see `worst_places`.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
+    return charge_against(scenario, layout, draw_threat(scenario, seed))
+
+
+def draw_threat(scenario: Scenario, seed: int) -> AnyCharge:
+    """Return the charge of `draw_charge` before its place against a layout is determined.
+
+    Raises:
+        ValueError: If the seed is negative.
+    """
+    return scenario.sample_charge(random_streams(seed)[0])
+
+
+def worst_places(
+    scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
+) -> WorstPlaces:
+    """Return the worst places of a vehicle's charge against a layout.
+
+    Args:
+        scenario: The scenario.
+        source: The vehicle.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+    """
+    return scenario.vehicle_ground(source, layout).worst_places(_obstacles(scenario, layout))
+
+
+def vehicle_reach(
+    scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
+) -> Reach:
+    """Return the reach of a vehicle; arguments as for `worst_places`."""
+    return scenario.vehicle_ground(source, layout).reach(_obstacles(scenario, layout))
+
+
+def vehicle_drive(
+    scenario: Scenario, source: VehicleSource, layout: Sequence[Element] = ()
+) -> Drive:
+    """Return the drive of a vehicle against a layout; arguments as for `worst_places`."""
+    return scenario.vehicle_ground(source, layout).drive(_obstacles(scenario, layout))
+
+
+def charge_against(scenario: Scenario, layout: Sequence[Element], charge: AnyCharge) -> Charge:
+    """Return a charge at its place, which for a vehicle depends on the layout.
+
+    Args:
+        scenario: The scenario.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+        charge: The charge; a `Charge` is returned unchanged.
+    """
+    if isinstance(charge, VehicleCharge):
+        return worst_places(scenario, charge.source, layout).charge(charge.rank)
+    return charge
+
+
+def _obstacles(scenario: Scenario, layout: Sequence[Element]) -> Obstacles:
+    if not layout:
+        return NOTHING
+    return obstacles_of(scenario.zone, layout, scenario.structures)
+
+
+def build_site(
+    scenario: Scenario,
+    layout: Sequence[Element] = (),
+    seed: int = 0,
+    charge: AnyCharge | None = None,
+) -> BlastSite:
+    """Return the site of one blast, for an engine without particles.
+
+    Args:
+        scenario: The scenario.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+        seed: Seed of the charge if the scenario has several; the same charge as for particles.
+        charge: The charge, instead of one drawn from the scenario.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone, or the charge.
+        ScenarioError: If the charge is not clear of a structure or the border.
+        ValueError: If the seed is negative.
+    """
+    placement = Placement.of(scenario, layout)
+    if isinstance(charge, Charge):  # a vehicle keeps clear of all obstacles
+        _check_clear(scenario.with_charge(charge), placement)
+    drawn = draw_threat(scenario, seed) if charge is None else charge
+    charge = charge_against(scenario, placement.layout, drawn)
+    structures = outlines(scenario, placement.layout)
+    barrier = standing(placement.layout)
+    if barrier:
+        structures += (barrier_outline(scenario, barrier),)
+    return BlastSite(
+        site_m=scenario.site.rectangle_m,
+        charge=charge,
+        structures=structures,
+        gauges=tuple(Gauge(each.name, each.position_m) for each in scenario.gauges),
+        air_height_m=scenario.air_height_m,
+        build_zone=None if scenario.build_zone is None else _whole(scenario),
+    )
+
+
+def build_scene(
+    scenario: Scenario,
+    layout: Sequence[Element] = (),
+    seed: int = 0,
+    charge: AnyCharge | None = None,
+) -> Scene:
+    """Return the scene of one blast of particles, which is two-dimensional.
+
+    Args:
+        scenario: The scenario.
+        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
+        seed: Seed of the charge (if the scenario has several), the fan's phase and the air's
+            jitter. None of them depends on the barrier.
+        charge: The charge, instead of one drawn from the scenario.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone, or the charge.
+        ScenarioError: If the charge is not clear of a structure or the border, or is over a roof:
+            without heights it would be inside the structure; or a structure begins above the
+            ground, or is a terrace.
+        BlastEnvError: If the mass of the charge is out of bounds of the parameters.
+        ValueError: If the seed is negative.
+    """
+    base = build_site(scenario, layout, seed, charge)
+    if any(each.base_m or each.carries for each in scenario.structures):
+        scenario.check_for_particles()
+    _check_not_over_a_roof(scenario, base.charge)
+    parameters = _parameters_for(scenario, base.charge)
+    _, fan_rng, air_rng = random_streams(seed)
+    centre = in_units(base.charge.position_m)
+    air = air_lattice(
+        parameters.air,
+        base.site_m.scaled(UNITS_PER_M),
+        _solid_rectangles(base.structures),
+        centre,
+        parameters.explosive.offset_units + parameters.explosive.radius_units,
+        air_rng,
+    )
+    fan = explosion_fan(parameters.explosive, centre, fan_rng)
+    return Scene(
+        site_m=base.site_m,
+        charge=base.charge,
+        balls=Balls.concatenate((air, fan)),
+        structures=base.structures,
+        gauges=base.gauges,
+        air_height_m=base.air_height_m,
+        build_zone=base.build_zone,
+        parameters=parameters,
+    )
+
+
+def _check_clear(scenario: Scenario, placement: Placement) -> None:
+    """Refuse a layout with a module on the charge, the only condition that a charge can break.
+
+    Raises:
+        LayoutError: If there is one.
+    """
+    usable = usable_cells(scenario)
+    if not all(usable[cell] for cell in placement.cells):
+        check_layout(scenario, placement.layout)
+
+
+def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParameters:
+    """Return the particles' parameters for a charge, whose mass has bounds."""
+    try:
+        return for_charge(scenario.parameters, charge.tnt_kg)
+    except BlastEnvError as error:
+        raise BlastEnvError(
+            f"{scenario.name}: charge: {error}; engine 'gas' takes this charge"
+        ) from error
+
+
+def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
+    """Refuse a raised charge that is inside a structure in plan.
+
+    Raises:
+        ScenarioError: If it is.
+    """
+    if charge.height_m == 0.0:
+        return
+    x_m, y_m = charge.position_m
+    place = PointSource.at(charge)
+    for structure in scenario.structures:
+        away_m = min(distance_m(place, box) for box in structure.boxes_m)
+        if away_m < scenario.charge_radius_m - TOLERANCE_M:
+            message = (
+                f"is at ({x_m:g}, {y_m:g}) m, {charge.height_m:g} m high, over {structure.name!r}"
+                f" of {structure.height_m:g} m: the particle engines know no heights and would put"
+                " it inside, must be clear of it in plan, or the engine one with heights"
+            )
+            raise ScenarioError(scenario.name, [Problem("charge", message)])
+
+
+def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
+    """Return rectangles that cover the modules, in simulation units."""
+    rectangles: list[Rectangle] = []
+    for outline in structures:
+        if not outline.is_barrier:
+            rectangles.extend(box.scaled(UNITS_PER_M) for box in outline.boxes_m)
+        else:
+            rectangles.extend(part.rectangle for part in outline.build().parts)
+    return rectangles
+
+
+def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:
+    """Return the outlines of the structures that remain with a layout."""
+    zone = scenario.build_zone
+    may_go = frozenset() if zone is None else zone.may_be_taken_away
+    return tuple(
+        _outline(each, is_lasting=each.name not in may_go)
+        for each in scenario.structures_with(layout)
+    )
+
+
+def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
+    is_square = isinstance(section, ConcreteSquareSection)
+    return StructureOutline(
+        kind=ConcreteSquare if is_square else ModularObstacle,
+        name=section.name,
+        corner_m=section.corner_m,
+        rows=section.rows,
+        columns=section.columns,
+        protected=section.protected,
+        weight=section.weight,
+        cells=section.cells,
+        capacity=section.module_capacity,
+        height_m=section.height_m,
+        faces=section.faces,
+        base_m=section.base_m,
+        is_lasting=is_lasting,
+        footprint=section.footprint,
+    )
+
+
+def _whole(scenario: Scenario) -> StructureOutline:
+    """Return a barrier that fills the whole zone, at the largest possible height."""
+    empty = barrier_outline(scenario, ())
+    return replace(empty, cells=None, heights_m=None, bases_m=None, pieces=None)
+
+
+def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
+    """Return the barrier of a layout in the build zone.
+
+    Raises:
+        BlastEnvError: If there is no build zone.
+        LayoutError: If the catalogue has no such item, or it cannot be turned.
+    """
+    zone, modules = scenario.zone, scenario.zone.modules(layout)
+    terraces = [each for each in scenario.structures if each.carries]
+    bases_m = [ground_below_m(terraces, zone.cell_rectangle_m(each.cell)) for each in modules]
+    tops_m = [
+        None if module.height_m is None else base_m + module.height_m
+        for module, base_m in zip(modules, bases_m, strict=True)
+    ]
+    return StructureOutline(
+        kind=ModularObstacle,
+        name=BARRIER_NAME,
+        corner_m=zone.corner_m,
+        rows=zone.rows,
+        columns=zone.columns,
+        protected=False,
+        weight=1.0,
+        cells=tuple(module.cell for module in modules),
+        capacity=zone.module_capacity,
+        height_m=highest_top_m(zone, scenario.structures),
+        heights_m=tuple(tops_m) if zone.items or any(bases_m) else None,
+        bases_m=tuple(bases_m) if any(bases_m) else None,
+        pieces=tuple(module.piece for module in modules) if zone.items else None,
+    )

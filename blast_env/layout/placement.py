@@ -1,0 +1,502 @@
+"""Placement of modules or pieces: legal places and legal layouts."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import fsum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.errors import LayoutError
+from blast_env.geometry import Cell, Element, Layout, Measure, Piece
+from blast_env.site.access_way import closing_places, is_open
+from blast_env.site.catalogue import Catalogue, PlacedModule, cell_text, element_text
+from blast_env.site.files import AnyScenario, find_scenario
+from blast_env.site.models import Scenario
+from blast_env.site.vehicles import obstacles_of
+from blast_env.site.zone import (
+    NO_ZONE,
+    BuildZone,
+    EmptyZone,
+    Surroundings,
+    empty_zone,
+    reason_against,
+)
+
+
+class CheckedLayout(tuple[Element, ...]):
+    """A layout that was checked against all conditions of a build zone.
+
+    It equals the plain tuple; see `Placement.checked`.
+
+    Attributes:
+        scenario: The scenario against which it was checked.
+    """
+
+    scenario: Scenario
+
+
+@dataclass(frozen=True)
+class Placement:
+    """An immutable partial layout; placing an element returns another placement.
+
+    The elements are single modules on cells or, if the build zone has a catalogue, pieces.
+
+    `Placement.empty`, `Placement.of` and `place` ensure all conditions of the build zone; the
+    constructor itself checks nothing. Legality does not depend on the order of the elements, and
+    every subset of a legal layout is legal.
+
+    Attributes:
+        scenario: The scenario.
+        layout: The modules' cells, or the pieces, in the order of placement.
+    """
+
+    scenario: Scenario
+    layout: Layout
+
+    @classmethod
+    def empty(cls, scenario: AnyScenario) -> "Placement":
+        """Return the empty placement.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
+        """
+        return cls(find_scenario(scenario), ())
+
+    @classmethod
+    def of(cls, scenario: AnyScenario, layout: Sequence[Element]) -> "Placement":
+        """Return the placement of a whole layout.
+
+        Args:
+            scenario: The scenario, or its bundled name or path.
+            layout: (row, column) of each module; with a catalogue, pieces (row, column, item,
+                turned). NumPy integers and arrays are accepted.
+
+        Raises:
+            LayoutError: If an element has another form, lies outside the build zone, is repeated,
+                or is not available after those before it.
+        """
+        empty = cls.empty(scenario)
+        whole = cls(empty.scenario, empty.catalogue.layout_from(layout))
+        return whole if whole._is_sound else _placed_one_by_one(empty, whole.layout)
+
+    @property
+    def checked(self) -> CheckedLayout:
+        """The layout, marked as checked by `of` and `place`."""
+        layout = CheckedLayout(self.layout)
+        layout.scenario = self.scenario
+        return layout
+
+    def place(self, element: Element) -> "Placement":
+        """Return the placement with one more module or piece.
+
+        Args:
+            element: (row, column), or a piece.
+
+        Raises:
+            LayoutError: If it is not available; the message is that of `explain`.
+        """
+        element = self.catalogue.element_from(element, self._word)
+        reason = self.explain(element)
+        if reason is not None:
+            raise LayoutError(reason)
+        placed = Placement(self.scenario, (*self.layout, element))
+        # Looking it up would double the time of a step of the environment.
+        vars(placed)["_empty_zone"] = self._empty_zone
+        return placed
+
+    def explain(self, element: Element) -> str | None:
+        """Return the reason why an element cannot be placed, as a sentence, or `None` if it can.
+
+        Args:
+            element: (row, column), or a piece, which need not exist in the catalogue.
+
+        Raises:
+            LayoutError: If it has neither form.
+        """
+        element = self.catalogue.element_from(element, self._word)
+        reason = self._reason_against_site(element) or self._reason_against_taken(element)
+        if reason is not None:
+            return f"{element_text(element)} {reason}"
+        reason = self._reason_against_stock(element)
+        if reason is not None:
+            return reason
+        reason = self._reason_against_cost(element) or self._reason_against_closing(element)
+        return None if reason is None else f"{element_text(element)} {reason}"
+
+    def explain_vehicles(self) -> tuple[str, ...]:
+        """Return a sentence per vehicle with its stand-off, way and speeds against the layout."""
+        obstacles = obstacles_of(self._zone, self.layout, self.scenario.structures)
+        return tuple(
+            self.scenario.vehicle_ground(source, self.layout).explain(obstacles)
+            for source in self.scenario.vehicles
+        )
+
+    @cached_property
+    def legal(self) -> BoolArray:
+        """Whether each variant may be placed at each lower left cell, read-only.
+
+        Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
+        (1, 0, 0) without a build zone.
+        """
+        cells = self._empty_zone
+        if self.stock_left <= 0:
+            legal = np.zeros(cells.fits.shape, dtype=bool)
+        else:
+            legal = cells.places(cells.usable & ~self._taken) & (cells.costs <= self._spendable)
+            if self._closing is not None:
+                legal &= ~self._closing
+        if self.catalogue.has_items:
+            left = np.array(self.stocks_left)
+            legal &= left[[each.item for each in self.catalogue.variants], None, None] > 0
+        legal.flags.writeable = False
+        return legal
+
+    @cached_property
+    def free(self) -> BoolArray:
+        """Whether each cell may take a module, shape (rows, columns), read-only.
+
+        With a catalogue: whether it may be the lower left cell of some piece. (0, 0) without a
+        build zone.
+        """
+        free: BoolArray = np.any(self.legal, axis=0) if len(self.legal) > 1 else self.legal[0]
+        free.flags.writeable = False
+        return free
+
+    @cached_property
+    def open_ground(self) -> BoolArray:
+        """Whether some legal piece could cover each cell (rows, columns), read-only."""
+        if not self.catalogue.has_items:
+            return self.free
+        ground = np.zeros(self._zone.shape, dtype=bool)
+        rows, columns = ground.shape
+        for legal, variant in zip(self.legal, self.catalogue.variants, strict=True):
+            for up, right in variant.cells_at(0, 0):
+                ground[up:, right:] |= legal[: rows - up, : columns - right]
+        ground.flags.writeable = False
+        return ground
+
+    def limited_to(self, possible: BoolArray) -> "Placement":
+        """Return the placement with `legal` restricted to a subset.
+
+        Args:
+            possible: A subset of `legal`, of the same shape.
+        """
+        limited = Placement(self.scenario, self.layout)
+        vars(limited).update(_empty_zone=self._empty_zone, legal=possible)
+        return limited
+
+    def places(self, cells: BoolArray) -> BoolArray:
+        """Return whether each variant at each lower left cell covers only the given cells.
+
+        Args:
+            cells: Mask of the cells (rows, columns).
+
+        Returns:
+            Shape (variants, rows, columns), without regard to the layout, stock and budget.
+        """
+        return self._empty_zone.places(cells)
+
+    @property
+    def usable(self) -> BoolArray:
+        """Whether each cell may take a module on the empty site, read-only.
+
+        Shape (rows, columns), without regard to layout, stock, budget and access way.
+        """
+        return self._empty_zone.usable
+
+    @property
+    def ground_m(self) -> FloatArray:
+        """Height of the ground of each cell, m (rows, columns), read-only."""
+        return self._empty_zone.ground_m
+
+    @property
+    def module_costs(self) -> NDArray[np.float64]:
+        """Cost of a module on each cell, shape (rows, columns), read-only.
+
+        With a catalogue, the factor of an item's cost there.
+        """
+        return self._empty_zone.module_costs
+
+    @property
+    def costs(self) -> NDArray[np.float64]:
+        """Cost of each variant by its lower left cell (variants, rows, columns), read-only."""
+        return self._empty_zone.costs
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """The catalogue, which numbers the actions."""
+        return self._empty_zone.catalogue
+
+    @property
+    def modules(self) -> tuple[PlacedModule, ...]:
+        """The modules with their heights, piece by piece."""
+        return self._zone.modules(self.layout)
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """The cells with a module, piece by piece."""
+        cells: list[Cell] = []
+        for element in self.layout:
+            cells += self.catalogue.cells(element) if isinstance(element, Piece) else (element,)
+        return tuple(cells)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no element can be placed."""
+        return not self.legal.any()
+
+    @property
+    def stock_left(self) -> int:
+        """Number of modules, or of pieces in all, that remain in the stock."""
+        return self._zone.stock - len(self.layout)
+
+    @property
+    def stocks_left(self) -> tuple[int, ...]:
+        """Number of pieces of each item that remain in the stock."""
+        return tuple(map(self._stock_left_of, range(len(self.catalogue.stocks))))
+
+    @cached_property
+    def cost(self) -> float:
+        """Total cost of the layout."""
+        # Summed exactly, so that the order of the layout does not matter.
+        costs = self._empty_zone.costs
+        number = self.catalogue.variant_number
+        return fsum(costs[number(each), each[0], each[1]] for each in self.layout)
+
+    @property
+    def budget_left(self) -> float | None:
+        """Remaining budget; `None` without one."""
+        budget = self._zone.budget
+        return None if budget is None else max(0.0, budget - self.cost)
+
+    @property
+    def _word(self) -> str:
+        """Word for an element in errors."""
+        return "piece" if self.catalogue.has_items else "cell"
+
+    @property
+    def _zone(self) -> BuildZone:
+        """The build zone; one without cells if the scenario has none."""
+        return self.scenario.build_zone or NO_ZONE
+
+    @property
+    def _spendable(self) -> float:
+        """Largest cost of the next element."""
+        return self._zone.cost_limit - self.cost
+
+    @cached_property
+    def _empty_zone(self) -> EmptyZone:
+        """The build zone without modules."""
+        return empty_zone(self._surroundings)
+
+    @property
+    def _surroundings(self) -> Surroundings:
+        scenario = self.scenario
+        return Surroundings(
+            self._zone,
+            scenario.structures,
+            scenario.charge,
+            scenario.charge_radius_m,
+            scenario.site,
+        )
+
+    @cached_property
+    def _taken(self) -> BoolArray:
+        """Whether each cell has a module (rows, columns)."""
+        taken = np.zeros(self._zone.shape, dtype=bool)
+        if self.cells:
+            taken[tuple(zip(*self.cells, strict=True))] = True
+        return taken
+
+    @cached_property
+    def _closing(self) -> BoolArray | None:
+        """Whether each variant would close the access way (variants, rows, columns)."""
+        way = self._zone.access_way
+        if way is None:
+            return None
+        passable = self._empty_zone.passable & ~self._taken
+        return np.stack([*closing_places(way, passable, self.catalogue.variants)])
+
+    @cached_property
+    def _placed_of(self) -> Counter[str]:
+        """Number of placed pieces by item; that of modules has the empty name."""
+        return Counter(each.item if isinstance(each, Piece) else "" for each in self.layout)
+
+    def _stock_left_of(self, item: int) -> int:
+        """Return the number of pieces of an item that remain in the stock."""
+        catalogue = self.catalogue
+        if not catalogue.has_items:
+            return self.stock_left
+        left = catalogue.stocks[item] - self._placed_of[catalogue.names[item]]
+        return min(left, self.stock_left)
+
+    @property
+    def _is_sound(self) -> bool:
+        """Whether the layout as a whole keeps every condition."""
+        zone, catalogue = self._zone, self.catalogue
+        if not self.layout:
+            return True
+        if any(catalogue.reason_against(each) is not None for each in self.layout):
+            return False
+        if any(isinstance(each, Measure) and each[:2] != (0, 0) for each in self.layout):
+            return False
+        if min(self.stock_left, *self.stocks_left) < 0 or len(set(self.cells)) < len(self.cells):
+            return False
+        if not all(map(zone.has, self.cells)):
+            return False
+        if self._spendable < 0.0 or not self._empty_zone.usable[self._taken].all():
+            return False
+        if len(self._empty_zone.levels) and any(map(self._straddles, self.layout)):
+            return False
+        passable = self._empty_zone.passable & ~self._taken
+        return zone.access_way is None or is_open(zone.access_way, passable)
+
+    def _reason_against_site(self, element: Element) -> str | None:
+        """Return the reason why an element is illegal even alone, or `None` if it is legal."""
+        zone = self._zone
+        if zone is NO_ZONE:
+            return "is not usable: the scenario has no build zone"
+        reason = self.catalogue.reason_against(element)
+        if reason is not None:
+            return reason
+        if isinstance(element, Measure):
+            return None if element[:2] == (0, 0) else "covers no cell: row and column must be 0"
+        size = f"the build zone of {zone.rows} rows and {zone.columns} columns"
+        if not zone.has((element[0], element[1])):
+            return f"is outside {size}"
+        cells = self.catalogue.cells(element)
+        if not zone.has(cells[-1]):
+            return f"sticks out of {size}"
+        for cell in cells:
+            if not self._empty_zone.usable[cell]:
+                reason = reason_against(self._surroundings, cell)
+                return _of_cell(element, cell, reason)
+        return "would straddle the edge of a terrace" if self._straddles(element) else None
+
+    def _straddles(self, element: Element) -> bool:
+        """Return whether the ground below an element has several heights."""
+        ground = self._empty_zone.ground_m
+        return len({ground[cell] for cell in self.catalogue.cells(element)}) > 1
+
+    def _reason_against_taken(self, element: Element) -> str | None:
+        """Return the conflict with a placed element, or `None` if there is none."""
+        if not isinstance(element, Piece):
+            return "is taken by a module" if element in self.layout else None
+        for cell in self.catalogue.cells(element):
+            if self._taken[cell]:
+                other = next(each for each in self.layout if cell in self.catalogue.cells(each))
+                return _of_cell(element, cell, f"is taken by {element_text(other)}")
+        return None
+
+    def _reason_against_stock(self, element: Element) -> str | None:
+        """Return the message of an exhausted stock, or `None` if it is not."""
+        if self.stock_left == 0:
+            what = "piece" if self.catalogue.has_items else "module"
+            return f"the stock of {_counted(len(self.layout), what)} is used up"
+        item = self.catalogue.variant(element).item
+        if self._stock_left_of(item) > 0:
+            return None
+        stock = _counted(self.catalogue.stocks[item], f"{self.catalogue.names[item]!r}", "")
+        return f"the stock of {stock} is used up"
+
+    def _reason_against_cost(self, element: Element) -> str | None:
+        """Return the message of an exceeded budget, or `None` if it is not."""
+        cost = self.costs[self.catalogue.variant_number(element), element[0], element[1]]
+        budget = self._zone.budget
+        if budget is None or cost <= self._spendable:
+            return None
+        return (
+            f"costs {cost:.10g}, but only {self.budget_left:.10g} of the budget of"
+            f" {budget:.10g} is left"
+        )
+
+    def _reason_against_closing(self, element: Element) -> str | None:
+        """Return the message of a closed access way, or `None` if it stays open."""
+        way, number = self._zone.access_way, self.catalogue.variant_number(element)
+        if way is None or self._closing is None or not self._closing[number, *element[:2]]:
+            return None
+        return f"would close the {way.description}"
+
+    def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
+        """Pickle scenario and layout alone: cached arrays would come back writeable."""
+        return Placement, (self.scenario, self.layout)
+
+
+def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
+    """Place a layout in order, or raise the error of the first illegal element."""
+    placement = empty
+    for element in layout:
+        if element in placement.layout:
+            raise LayoutError(f"{element_text(element)} is repeated")
+        if placement._reason_against_site(element) is None:
+            _check_stock(placement, layout, element)
+        placement = placement.place(element)
+    return placement
+
+
+def _check_stock(placement: Placement, layout: Layout, element: Element) -> None:
+    """Refuse an element beyond the stock (`LayoutError`)."""
+    catalogue, what = placement.catalogue, "modules"
+    asked, most = len(layout), len(placement.layout)
+    if isinstance(element, Piece):
+        what = "pieces"
+        if placement.stock_left > 0:
+            what = f"of {element.item!r}"
+            asked = sum(each.item == element.item for each in layout if isinstance(each, Piece))
+            most = catalogue.stocks[catalogue.variant(element).item]
+    if placement.stock_left == 0 or placement._reason_against_stock(element) is not None:
+        raise LayoutError(
+            f"{element_text(element)} is beyond the stock:"
+            f" the layout has {asked} {what}, must have at most {most}"
+        )
+
+
+def _of_cell(element: Element, cell: Cell, reason: str | None) -> str | None:
+    """Return a reason against a cell, worded for an element that covers it."""
+    if reason is None or not isinstance(element, Piece):
+        return reason
+    return f"would stand on {cell_text(cell)}, which {reason}"
+
+
+def _counted(count: int, word: str, plural: str = "s") -> str:
+    return f"1 {word}" if count == 1 else f"{count} {word}{plural}"
+
+
+def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
+    """Return whether each cell may have a module on the empty site.
+
+    Keep-outs, structures, their clearance and the charge exclude cells. `Placement` checks the
+    conditions that depend on the layout (stock, budget, access way).
+
+    Args:
+        scenario: The scenario, or its bundled name or path.
+
+    Returns:
+        An array of shape (rows, columns), read-only; (0, 0) without a build zone.
+    """
+    return Placement.empty(scenario).usable
+
+
+def met_by_blasts(layout: Iterable[Element]) -> Layout:
+    """Return the elements that affect loads: all but the measures that harden facades."""
+    return tuple(element for element in layout if type(element) is not Measure)
+
+
+def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
+    """Return a legal layout as plain values, in order.
+
+    Args:
+        scenario: The scenario of the layout, or its bundled name or path.
+        layout: (row, column) of each module, or pieces. NumPy integers and arrays are accepted.
+
+    Raises:
+        LayoutError: As `Placement.of`, if an element cannot be placed.
+    """
+    if isinstance(layout, CheckedLayout) and layout.scenario is scenario:
+        return layout
+    return Placement.of(scenario, layout).layout

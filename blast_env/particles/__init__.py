@@ -1,0 +1,1 @@
+"""The particle model of Martyniuk & Kochkarov: engines, collision tables and calibration."""

@@ -1,0 +1,472 @@
+"""Calibrations, from simulated impulse to impulse per area, stored with all their dependencies.
+
+The module also has the unit for displaying the loads of a blast of particles.
+"""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
+from hashlib import sha256
+from importlib.resources import files
+from math import hypot
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Final, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word
+from blast_env.files import write_atomically
+from blast_env.geometry import Rectangle
+from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
+from blast_env.site import Scenario
+from blast_env.site.balls import distance_to_rectangle
+from blast_env.site.parameters import SimulationParameters, parameters_digest
+from blast_env.site.scene import Charge
+from blast_env.site.structure import ModularObstacle
+from blast_env.units import MODULE_SIDE_M, PA_PER_PSI
+from blast_env.values import path_of
+
+SimulatedQuantity = Literal["impulse", "transferred_impulse"]
+"""The paper's sum of m |v|, or the momentum actually transferred along the normals."""
+
+LAWS: Final[Mapping[str, type[ScalingLaw]]] = MappingProxyType(
+    {"proportional": ProportionalLaw, "linear": LinearLaw, "power": PowerLaw}
+)
+
+
+class CalibrationError(BlastEnvError):
+    """A calibration that cannot be read, or does not belong to a simulation."""
+
+
+class ScaledImpulse(NamedTuple):
+    """A simulated impulse in the units of the reference.
+
+    Attributes:
+        pa_s: Impulse per area, Pa*s.
+        in_range: Whether distance and charge are within the calibration's range.
+        notes: Reasons why not, one sentence each.
+    """
+
+    pa_s: float
+    in_range: bool
+    notes: tuple[str, ...]
+
+    @property
+    def psi_s(self) -> float:
+        """Impulse per area in the paper's unit, psi*s."""
+        return self.pa_s / PA_PER_PSI
+
+
+Amount = Annotated[float, Field(ge=0.0)]
+
+
+class CalibrationSection(BaseModel):
+    """Base of the parts of a calibration file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ReferenceSection(CalibrationSection):
+    """The reference of a fit.
+
+    Attributes:
+        source: The paper's UFC column, or Kingery-Bulmash.
+        quantity: The quantity compared, e.g. `reflected_impulse`.
+        burst: `hemispherical` or `spherical`; `None` if the source does not state it.
+        charge_kg: TNT-equivalent mass; `None` if the source does not state it.
+    """
+
+    source: Literal["paper UFC column", "Kingery-Bulmash"]
+    quantity: str
+    burst: str | None = None
+    charge_kg: float | None = None
+
+
+class MetricsSection(CalibrationSection):
+    """Agreement of the law with the reference (`FitMetrics`), rmse in psi*s."""
+
+    mape_percent: float
+    rmse: float
+    integral_error_percent: float
+    leave_one_out_mape_percent: float
+
+
+class Calibration(CalibrationSection):
+    """A law from simulated impulse to psi*s, with all its dependencies.
+
+    Attributes:
+        schema_version: Version of the file format.
+        name: Name, as in `load_calibration("ballistic_ufc")`.
+        law: Kind of the law.
+        coefficients: Its coefficients, by their names in the paper.
+        coefficient_intervals: Their 95 % intervals (low, high) from the scatter between seeds.
+        reference: Reference of the fit.
+        preset: Preset of the simulations.
+        parameters_digest: Digest of all their parameters.
+        engine: Engine of the simulations.
+        engine_version: Version of that engine at the time.
+        blast_env_version: Version of the package at the time.
+        facade_width_m: Width of the reference structure's facade.
+        ball_radius_m: Radius of an air ball, by which the facade collects beyond either end.
+        simulated: The sum over the collisions that the law converts.
+        tnt_kg: TNT-equivalent mass of the simulated charge.
+        tnt_range_kg: Range of masses in which the law holds with Hopkinson-Cranz scaling
+            (`python -m studies.hopkinson_cranz`); `None` for `tnt_kg` only.
+        distances_m: Distances, ascending; the first and last are the range of validity.
+        seeds: Seeds at every distance.
+        i_sim: Mean simulated impulse at each distance.
+        i_sim_ci95: Half-width of its 95 % confidence interval.
+        i_reference_psi_s: Reference impulse at each distance.
+        metrics: Agreement of the law with the reference.
+    """
+
+    schema_version: Literal[1] = 1
+    name: str
+    law: Literal["proportional", "linear", "power"]
+    coefficients: dict[str, float]
+    coefficient_intervals: dict[str, tuple[float, float]]
+    reference: ReferenceSection
+    preset: str
+    parameters_digest: str
+    engine: str
+    engine_version: str
+    blast_env_version: str
+    facade_width_m: Annotated[float, Field(gt=0.0)]
+    ball_radius_m: Annotated[float, Field(gt=0.0)]
+    simulated: SimulatedQuantity = "impulse"
+    tnt_kg: Annotated[float, Field(gt=0.0)]
+    tnt_range_kg: tuple[float, float] | None = None
+    distances_m: Annotated[tuple[float, ...], Field(min_length=2)]
+    seeds: Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)]
+    i_sim: tuple[Amount, ...]
+    i_sim_ci95: tuple[Amount, ...]
+    i_reference_psi_s: tuple[Amount, ...]
+    metrics: MetricsSection
+
+    @model_validator(mode="after")
+    def _check_parts(self) -> "Calibration":
+        """Reject inconsistent parts."""
+        names = {field.name for field in fields(LAWS[self.law])}
+        for key in ("coefficients", "coefficient_intervals"):
+            if set(getattr(self, key)) != names:
+                raise ValueError(f"{key} must be {alternatives(sorted(names))} of a {self.law} law")
+        count = len(self.distances_m)
+        for key in ("i_sim", "i_sim_ci95", "i_reference_psi_s"):
+            if len(getattr(self, key)) != count:
+                raise ValueError(f"{key} must have {count} values, one for each of distances_m")
+        pairs = zip(self.distances_m, self.distances_m[1:], strict=False)
+        if self.distances_m[0] <= 0.0 or not all(before < after for before, after in pairs):
+            raise ValueError("distances_m must be above 0 and ascending")
+        low_kg, high_kg = self.tnt_range_kg or (self.tnt_kg, self.tnt_kg)
+        if not 0.0 < low_kg <= self.tnt_kg <= high_kg:
+            raise ValueError("tnt_range_kg must be around tnt_kg, and above 0")
+        self.scaling_law  # noqa: B018  # rejects invalid coefficients
+        return self
+
+    @property
+    def scaling_law(self) -> ScalingLaw:
+        """The law from i_sim on the reference facade to psi*s."""
+        return LAWS[self.law](**self.coefficients)
+
+    def check(self, parameters: SimulationParameters, engine: str) -> None:
+        """Reject a simulation for which the calibration was not made.
+
+        Raises:
+            CalibrationError: If the engine or any parameter of the blast model differs.
+        """
+        if engine != self.engine:
+            raise CalibrationError(
+                f"calibration {self.name!r} was made with engine {self.engine!r}, "
+                f"the simulation ran on {engine!r}"
+            )
+        digest = parameters_digest(parameters, engine)
+        if digest != self.parameters_digest:
+            raise CalibrationError(
+                f"calibration {self.name!r} was made with the parameters of preset "
+                f"{self.preset!r} ({self.parameters_digest[:12]}), the simulation has others "
+                f"({digest[:12]}): use that preset without overrides, or calibrate anew"
+            )
+
+    def convert(
+        self, impulse_sim: float, seen_width_m: float, distance_m: float, tnt_kg: float
+    ) -> ScaledImpulse:
+        """Convert the impulse on a structure.
+
+        The law holds for the impulse on the reference facade. The impulse of another structure is
+        first scaled by the ratio of the collecting widths, that of the reference over its own,
+        because more balls hit a wider building without loading it more per area. The collecting
+        width is the width seen from the charge plus a ball radius on either side.
+
+        With `tnt_range_kg`, distance and impulse are divided by the cube root of the charge's mass
+        over `tnt_kg` before the law, and the result is multiplied by it (Hopkinson-Cranz).
+
+        Args:
+            impulse_sim: The sum `simulated` on the structure, simulation units.
+            seen_width_m: Its width as seen from the charge; see `seen_width_m`.
+            distance_m: Distance from the charge's centre to the structure.
+            tnt_kg: TNT-equivalent mass of the charge.
+        """
+        margin_m = 2.0 * self.ball_radius_m
+        share = (self.facade_width_m + margin_m) / (seen_width_m + margin_m)
+        low_kg, high_kg = self.tnt_range_kg or (self.tnt_kg, self.tnt_kg)
+        scale = 1.0 if self.tnt_range_kg is None else (tnt_kg / self.tnt_kg) ** (1.0 / 3.0)
+        psi_s = scale * self.scaling_law(share * impulse_sim / scale)
+        notes = []
+        first_m, last_m = scale * self.distances_m[0], scale * self.distances_m[-1]
+        if not first_m <= distance_m <= last_m:
+            notes.append(f"distance {distance_m:.2f} m is outside {first_m:.4g} to {last_m:.4g} m")
+        if not low_kg <= tnt_kg <= high_kg:
+            bounds = (
+                f"{low_kg:g} kg" if low_kg == high_kg else f"between {low_kg:g} and {high_kg:g} kg"
+            )
+            notes.append(f"charge {tnt_kg:g} kg TNT is not {bounds}")
+        return ScaledImpulse(psi_s * PA_PER_PSI, not notes, tuple(notes))
+
+    def convert_load(self, obstacle: ModularObstacle, charge: Charge) -> ScaledImpulse:
+        """Convert the load on a structure; see `convert`.
+
+        Args:
+            obstacle: The structure, after a blast.
+            charge: The charge.
+        """
+        centre_m = np.array([charge.position_m])
+        boxes_m = obstacle.boxes_m
+        distance_m = min(float(distance_to_rectangle(centre_m, box)[0]) for box in boxes_m)
+        width_m = _seen_width_m(obstacle, charge.position_m)
+        impulse_sim: float = getattr(obstacle, self.simulated)
+        return self.convert(impulse_sim, width_m, distance_m, charge.tnt_kg)
+
+
+def _seen_width_m(obstacle: ModularObstacle, charge_m: tuple[float, float]) -> float:
+    """Return the `seen_width_m` of a structure of any shape, m."""
+    if obstacle.cells is None:
+        return seen_width_m(obstacle.rectangle_m, charge_m)
+    (x0, y0), (x1, y1) = charge_m, obstacle.rectangle_m.centre
+    left, bottom, right, top = np.array(obstacle.boxes_m).T
+    x_m, y_m = (
+        np.concatenate((left, right, left, right)),
+        np.concatenate((bottom, bottom, top, top)),
+    )
+    across_m = ((x_m - x0) * (y1 - y0) - (y_m - y0) * (x1 - x0)) / hypot(x1 - x0, y1 - y0)
+    return float(np.ptp(across_m))
+
+
+def seen_width_m(structure_m: Rectangle, charge_m: tuple[float, float]) -> float:
+    """Return a structure's width perpendicular to the line from the charge to its centre, m."""
+    (x0, y0), (x1, y1) = charge_m, structure_m.centre
+    along_x, along_y = x1 - x0, y1 - y0
+    length = hypot(along_x, along_y)
+    width, height = structure_m.right - structure_m.left, structure_m.top - structure_m.bottom
+    return (abs(along_y) * width + abs(along_x) * height) / length
+
+
+SUFFIX: Final = ".json"
+
+
+def stored_calibrations() -> tuple[str, ...]:
+    """Return the names of the calibrations in the package."""
+    return tuple(sorted({name for name, _ in _stored_files()}))
+
+
+def calibrated_engines(name: str) -> tuple[str, ...]:
+    """Return the engines for which the package has a calibration of that name."""
+    return tuple(sorted(engine for stored, engine in _stored_files() if stored == name))
+
+
+def calibration_file(name: str, engine: str) -> str:
+    """Return the name of the file of a calibration for an engine."""
+    return f"{name}.{engine}{SUFFIX}"
+
+
+def load_calibration(name_or_path: str | Path, engine: str | None = None) -> Calibration:
+    """Return a calibration by its name in the package, or from a `.json` file.
+
+    Args:
+        name_or_path: The name, or the file.
+        engine: With a name: the engine of the calibration. By default the reference engine,
+            pymunk, if it has one, else the first in alphabetical order.
+
+    Raises:
+        UnknownNameError: If there is none of that name.
+        CalibrationError: If there is none for that engine, or the file cannot be read, is
+            truncated or was edited.
+    """
+    path = path_of(name_or_path)
+    if path.suffix != SUFFIX:
+        name, known = str(name_or_path), stored_calibrations()
+        if name not in known:
+            raise UnknownNameError("calibration", name, known)
+        engines = calibrated_engines(name)
+        engine = engine or ("pymunk" if "pymunk" in engines else engines[0])
+        if engine not in engines:
+            raise CalibrationError(
+                f"calibration {name!r} was not made for engine {engine!r}, only for "
+                f"{', '.join(engines)}"
+            )
+        return _of_the_package(name, engine).model_copy(deep=True)
+    try:
+        return _parsed(read_text(path))
+    except DocumentError as error:
+        raise CalibrationError(f"{path}: {error}") from error
+
+
+@cache
+def _of_the_package(name: str, engine: str) -> Calibration:
+    entry = files("blast_env.particles.calibration") / "stored" / calibration_file(name, engine)
+    return _parsed(entry.read_text(encoding="utf-8"))
+
+
+def scenario_calibration(scenario: Scenario, engine: str) -> Calibration:
+    """Return the calibration of a scenario, checked against its parameters.
+
+    Args:
+        scenario: The scenario.
+        engine: Name of the engine that runs its blasts.
+
+    Raises:
+        CalibrationError: If the scenario has no calibration, or one made with other parameters or
+            for another engine.
+        UnknownNameError: If there is no calibration of that name.
+    """
+    if scenario.calibration is None:
+        raise CalibrationError(
+            f"scenario {scenario.name!r} names no calibration: set calibration to one of "
+            f"{', '.join(stored_calibrations())}"
+        )
+    calibration = load_calibration(scenario.calibration, engine)
+    calibration.check(scenario.parameters, engine)
+    return calibration
+
+
+def save_calibration(calibration: Calibration, path: Path) -> None:
+    """Write a calibration to a file, with a checksum that detects later edits.
+
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    content = calibration.model_dump(mode="json")
+    document = {**content, "checksum": _checksum(content)}
+    with write_atomically(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+@cache
+def _stored_files() -> tuple[tuple[str, str], ...]:
+    """Return name and engine of the calibrations in the package."""
+    folder = files("blast_env.particles.calibration") / "stored"
+    stems = (entry.name.removesuffix(SUFFIX) for entry in folder.iterdir())
+    pairs = (stem.rpartition(".") for stem in stems)
+    return tuple((name, engine) for name, _, engine in pairs if name)
+
+
+def _parsed(text: str) -> Calibration:
+    document = parse_json(text)
+    if not isinstance(document, dict):
+        raise DocumentError("", f"is {type_word(document)}, must be a calibration, a table")
+    checksum = document.pop("checksum", None)
+    if checksum != _checksum(document):
+        raise DocumentError(
+            "", "the checksum does not match: the file was edited after it was made"
+        )
+    return checked_as(Calibration, document)
+
+
+def _checksum(content: dict[str, Any]) -> str:
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+LOAD_LABEL: Final = "impulse per module (simulation units)"
+
+
+@dataclass(frozen=True)
+class LoadUnit:
+    """Unit for displaying the loads of a blast of particles: Pa s with a calibration.
+
+    A calibration converts the load on a whole structure. A module's load is its share of that by
+    m|v| per metre of facade, with the factor of the protected structure of the largest load.
+
+    Attributes:
+        factor: Factor from a module's m|v| to the unit.
+        label: Label of a module's load, with the unit.
+        of_structures: The loads on the structures that were hit, by name.
+    """
+
+    factor: float = 1.0
+    label: str = LOAD_LABEL
+    of_structures: Mapping[str, "CalibratedLoad"] = field(default_factory=dict)
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether the unit is Pa s."""
+        return bool(self.of_structures)
+
+    @classmethod
+    def of(
+        cls,
+        obstacles: Sequence[ModularObstacle],
+        charge: Charge,
+        convert: Callable[[ModularObstacle], ScaledImpulse],
+    ) -> "LoadUnit":
+        """Return the unit for a blast and the blasts compared with it.
+
+        Simulation units if no structure was hit.
+
+        Args:
+            obstacles: The obstacles after the blast; barriers are ignored.
+            charge: The charge.
+            convert: Returns the impulse per area on a structure.
+        """
+        structures = [obstacle for obstacle in obstacles if not obstacle.is_barrier]
+        protected = [obstacle for obstacle in structures if obstacle.protected] or structures
+        main = max(protected, key=lambda obstacle: obstacle.impulse)
+        if main.impulse == 0.0:
+            return cls()
+        loads = {
+            each.name: CalibratedLoad(each.impulse, convert(each))
+            for each in structures
+            if each.impulse > 0.0
+        }
+        width_m = _seen_width_m(main, charge.position_m)
+        factor = loads[main.name].factor * width_m / MODULE_SIDE_M
+        return cls(factor, f"impulse per module (Pa s, calibrated on {main.name})", loads)
+
+    def with_loads_of(self, other: "LoadUnit") -> "LoadUnit":
+        """Return this unit for modules with the loads on structures of another blast.
+
+        A law need not be linear, so that the factors of a structure's load differ between blasts.
+        """
+        return replace(self, of_structures={**self.of_structures, **other.of_structures})
+
+    def factor_of(self, structure: str) -> float | None:
+        """Return the factor from m|v| on a structure to Pa s; `None` without a calibrated load."""
+        load = self.of_structures.get(structure)
+        return None if load is None else load.factor
+
+    def of_structure(self, obstacle: ModularObstacle) -> str:
+        """Return the current load on a structure as text, with the unit."""
+        factor = self.factor_of(obstacle.name)
+        if factor is None:
+            return f"{obstacle.impulse:,.0f} (sim)"
+        return f"{factor * obstacle.impulse:,.0f} Pa s"
+
+
+@dataclass(frozen=True)
+class CalibratedLoad:
+    """The calibrated load on a structure.
+
+    Attributes:
+        impulse_sim: Sum of m |v|, simulation units.
+        scaled: Impulse per area, and whether it is within the calibration's range.
+    """
+
+    impulse_sim: float
+    scaled: ScaledImpulse
+
+    @property
+    def factor(self) -> float:
+        """Factor from m |v| to Pa s."""
+        return self.scaled.pa_s / self.impulse_sim

@@ -1,0 +1,417 @@
+"""The event-driven engine: the paper's model with hard discs and without time steps.
+
+It consists of a compiled loop from collision to collision, and the run that calls it.
+"""
+
+import logging
+from collections.abc import Callable
+from hashlib import sha256
+from math import inf, sqrt
+from pathlib import Path
+from threading import Lock
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+from numba.core import event
+from numpy.typing import NDArray
+
+from blast_env.particles.event.contacts import collide_balls, collide_with_module
+from blast_env.particles.event.prediction import (
+    cell_at,
+    cross,
+    enter_cell,
+    leave_cell,
+    look_ahead,
+    unschedule,
+)
+from blast_env.particles.event.state import (
+    BORDER,
+    CHANGED,
+    FIRST_SURFACE,
+    NEW,
+    RECORD_COLUMNS,
+    RUNNING,
+    Record,
+    RecordArray,
+    World,
+    with_walls,
+    world_of,
+)
+from blast_env.particles.run import COLLISION_DTYPE, BallStates, CollisionLog, EndReason
+from blast_env.site.scene import Scene
+
+# Reasons why the loop returns.
+UNTIL: Final = 0
+RECORD_FULL: Final = 1
+OUT_OF_REACH: Final = 2
+EVENT_LIMIT: Final = 3
+MODULE_DESTROYED: Final = 4
+PAUSED: Final = 5
+_COLLISIONS_BETWEEN_CHECKS: Final = 512
+
+_EVENTS_PER_CALL: Final = 10_000
+"""Events after which the loop returns, to respond to Ctrl-C: an event takes 1 to 10 us."""
+
+_NUMBER: Final[Any] = np.int64
+"""Type of a ball's number, as in loops over them: a second integer type would compile twice."""
+
+
+@njit(error_model="numpy")
+def run_until(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    modules: NDArray[np.int32],
+    loads: RecordArray,
+    targets: NDArray[np.float64],
+    rules: Record,
+    progress: Record,
+    record: NDArray[np.float64],
+    until_s: float,
+) -> int:
+    """Continue until a time, or until the caller has to act.
+
+    Returns:
+        The reason, one of the constants above.
+    """
+    if progress.stage == NEW:
+        _begin(balls, cells, heap, surfaces, rules)
+    elif progress.stage == CHANGED and not _look_again(
+        balls, cells, heap, surfaces, rules, progress
+    ):
+        return PAUSED
+    progress.stage = RUNNING
+    events = 0
+    while True:
+        if events == _EVENTS_PER_CALL:
+            return PAUSED
+        events += 1
+        if progress.collisions >= progress.next_check:
+            progress.next_check = progress.collisions + _COLLISIONS_BETWEEN_CHECKS
+            if not _can_reach(balls, heap, targets, rules.time_limit_s, progress.time_s):
+                return OUT_OF_REACH
+        if progress.collisions >= rules.most_collisions:
+            return EVENT_LIMIT
+        if progress.records == len(record):
+            return RECORD_FULL
+        if heap[0].ball == 0 or heap[1].time_s == inf:
+            return OUT_OF_REACH  # no further event
+        if heap[1].time_s > until_s:
+            return UNTIL
+        ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
+        if balls[ball].contact_s > time_s:
+            progress.crossings += 1
+            cross(balls, cells, heap, surfaces, rules, ball)
+            continue
+        partner = _NUMBER(balls[ball].partner)
+        if partner >= 0 and balls[partner].collisions != balls[ball].partner_collisions:
+            progress.outdated += 1
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+            continue
+        progress.collisions += 1
+        progress.time_s = time_s
+        if partner >= 0:
+            one, other = min(ball, partner), max(ball, partner)  # for a fixed order
+            collide_balls(balls[one], balls[other], time_s, rules)
+            _go_on(balls, cells, heap, surfaces, rules, ball)
+            _go_on(balls, cells, heap, surfaces, rules, partner)
+        elif partner == BORDER:
+            _remove(balls, cells, heap, ball)
+        else:
+            row = record[progress.records]
+            progress.records += 1
+            row[1] = ball
+            surface = surfaces[FIRST_SURFACE - partner]
+            module = collide_with_module(balls[ball], surface, modules, loads, time_s, rules, row)
+            _go_on(balls, cells, heap, surfaces, rules, ball)
+            if loads[module].impulse > loads[module].capacity:
+                progress.stage = CHANGED
+                return MODULE_DESTROYED
+
+
+@njit(error_model="numpy")
+def _begin(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+) -> None:
+    """Put every ball into its cell, and predict the next events of moving balls."""
+    for ball in range(len(balls)):
+        enter_cell(balls, cells, ball, cell_at(rules, balls[ball].x, balls[ball].y))
+    for ball in range(len(balls)):
+        if balls[ball].vx != 0.0 or balls[ball].vy != 0.0:
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _look_again(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    progress: Record,
+) -> bool:
+    """Predict the next events of scheduled balls again; return whether all are done."""
+    looked = 0
+    for ball in range(progress.looked_again, len(balls)):
+        if looked == _EVENTS_PER_CALL:
+            progress.looked_again = ball
+            return False
+        if heap[ball].place > 0:
+            look_ahead(balls, cells, heap, surfaces, rules, ball)
+            looked += 1
+    progress.looked_again = 0
+    return True
+
+
+@njit(error_model="numpy")
+def _go_on(
+    balls: RecordArray,
+    cells: RecordArray,
+    heap: RecordArray,
+    surfaces: RecordArray,
+    rules: Record,
+    ball: int,
+) -> None:
+    """Predict the next event of a ball after a collision, or remove it if it is too small."""
+    if balls[ball].explosive and balls[ball].radius < rules.minimum_radius:
+        _remove(balls, cells, heap, ball)
+    else:
+        look_ahead(balls, cells, heap, surfaces, rules, ball)
+
+
+@njit(error_model="numpy")
+def _remove(balls: RecordArray, cells: RecordArray, heap: RecordArray, ball: int) -> None:
+    leave_cell(balls, cells, ball)
+    unschedule(heap, balls, ball)
+    balls[ball].alive = 0
+    balls[ball].collisions += 1  # invalidates events with it
+
+
+@njit(error_model="numpy")
+def _can_reach(
+    balls: RecordArray,
+    heap: RecordArray,
+    targets: NDArray[np.float64],
+    time_limit_s: float,
+    time_s: float,
+) -> bool:
+    """Return whether a moving ball can still act on a structure; see `engine.can_reach`.
+
+    All moving balls are in the heap, so that air at rest takes no time here.
+    """
+    for place in range(1, heap[0].ball + 1):
+        ball = balls[heap[place].ball]
+        if ball.vx == 0.0 and ball.vy == 0.0:
+            continue
+        passed = time_s - ball.since_s
+        x, y = ball.x + ball.vx * passed, ball.y + ball.vy * passed
+        speed = sqrt(ball.vx * ball.vx + ball.vy * ball.vy)
+        reach = 2.0 * speed * (time_limit_s - time_s) + ball.radius
+        for target in range(len(targets)):
+            dx = max(targets[target, 0] - x, x - targets[target, 2], 0.0)
+            dy = max(targets[target, 1] - y, y - targets[target, 3], 0.0)
+            if dx * dx + dy * dy <= reach * reach:
+                return True
+    return False
+
+
+_LOGGER: Final = logging.getLogger("blast_env")
+_FIRST_CALL: Final = Lock()
+
+
+class _CompilationNotice(event.Listener):
+    """Logs that Numba compiles, which it does if its disk cache is empty."""
+
+    def __init__(self) -> None:
+        self.given = False
+
+    def on_start(self, _event: Any) -> None:
+        if not self.given:
+            self.given = True
+            _LOGGER.warning("compiling the event engine, once per installation: some 10 s ...")
+
+    def on_end(self, _event: Any) -> None:
+        pass
+
+
+def _source_digest() -> int:
+    """Return a number that changes with the source of the compiled code."""
+    digest = sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return int.from_bytes(digest.digest()[:6])
+
+
+def _compiled(source_digest: int) -> Callable[..., int]:
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def run(
+        balls: RecordArray,
+        cells: RecordArray,
+        heap: RecordArray,
+        surfaces: RecordArray,
+        modules: NDArray[np.int32],
+        loads: RecordArray,
+        targets: NDArray[np.float64],
+        rules: Record,
+        progress: Record,
+        record: NDArray[np.float64],
+        until_s: float,
+    ) -> int:
+        # Numba's disk cache is invalidated by changes of this file only. As a constant of this
+        # function, the digest of all files invalidates it too.
+        progress.source_digest = source_digest
+        return run_until(
+            balls,
+            cells,
+            heap,
+            surfaces,
+            modules,
+            loads,
+            targets,
+            rules,
+            progress,
+            record,
+            until_s,
+        )
+
+    function: Callable[..., int] = run
+    return function
+
+
+_RUN: Final = _compiled(_source_digest())
+
+
+def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
+    """Continue until a time, or until the caller has to act; see `run_until`.
+
+    The first call in a new installation compiles, with a warning of the logger `blast_env`. Other
+    threads can run meanwhile, and Ctrl-C takes effect within half a second.
+    """
+    answer = PAUSED
+    while answer == PAUSED:
+        if _RUN.signatures:  # type: ignore[attr-defined]
+            answer = int(_RUN(*world, record, until_s))
+        else:
+            with _FIRST_CALL, event.install_listener("numba:compile", _CompilationNotice()):
+                answer = int(_RUN(*world, record, until_s))
+    return answer
+
+
+_RECORD_ROWS: Final = 4096
+
+MOST_RECORDS: Final = 20_000_000
+"""Hits on modules after which a run ends, as at `most_collisions`: they take some 2 GB."""
+
+_END_REASONS: Final = {
+    OUT_OF_REACH: EndReason.OUT_OF_REACH,
+    EVENT_LIMIT: EndReason.EVENT_LIMIT,
+}
+
+
+class EventRun:
+    """One blast in progress; see `BlastRun` for the attributes. A step is a collision."""
+
+    def __init__(self, scene: Scene, cell_units: float | None = None) -> None:
+        self.scene, self._cell_units = scene, cell_units
+        self.obstacles = scene.obstacles()
+        self.log = CollisionLog()
+        self.time_s = 0.0
+        self.steps = 0
+        self.end_reason: EndReason | None = None
+        self._parts = [part for obstacle in self.obstacles for part in obstacle.parts]
+        self._world = world_of(scene, self._parts, cell_units)
+        self._record = np.empty((_RECORD_ROWS, len(RECORD_COLUMNS)))
+        self._recorded = 0
+
+    def __reduce__(
+        self,
+    ) -> tuple[Callable[..., "EventRun"], tuple[Scene, float | None, float]]:
+        """Pickle the scene and the time, because parts of the state share memory."""
+        until_s = self.time_s if self.end_reason is None else np.inf
+        return _run_again, (self.scene, self._cell_units, until_s)
+
+    @property
+    def crossings(self) -> int:
+        """Number of moves of balls between cells, which take time as collisions do."""
+        return int(self._world.progress["crossings"])
+
+    @property
+    def outdated(self) -> int:
+        """Number of predicted collisions that did not happen, because a partner was hit before."""
+        return int(self._world.progress["outdated"])
+
+    def advance(self, until_s: float) -> None:
+        """Continue until the simulated time is `until_s`, or the run has ended."""
+        if self.end_reason is not None or self.time_s >= until_s:
+            return
+        limit_s = self.scene.parameters.stepping.time_limit_s
+        target_s = min(until_s, limit_s)
+        answer = RECORD_FULL
+        while answer in (RECORD_FULL, MODULE_DESTROYED):
+            answer = run_world(self._world, self._record, target_s)
+            self._read_record()
+            if self._recorded >= MOST_RECORDS:
+                answer = EVENT_LIMIT
+            elif answer == MODULE_DESTROYED:
+                self._world = with_walls(self._world, self.scene, self._parts)
+        self.time_s = target_s
+        if answer in _END_REASONS:
+            self.end_reason = _END_REASONS[answer]
+            self.time_s = float(self._world.progress["time_s"])
+        elif target_s >= limit_s:
+            self.end_reason = EndReason.TIME_LIMIT
+        self.steps = int(self._world.progress["collisions"])
+        self._load_parts()
+
+    def balls(self) -> BallStates:
+        """Return the remaining balls."""
+        balls = self._world.balls
+        index = np.flatnonzero(balls["alive"])
+        balls = balls[index]
+        velocity = np.stack((balls["vx"], balls["vy"]), axis=1)
+        passed = self.time_s - balls["since_s"]
+        position = np.stack((balls["x"], balls["y"]), axis=1) + velocity * passed[:, None]
+        return BallStates(
+            index=index,
+            kind=self.scene.balls.kind[index],
+            position=position,
+            velocity=velocity,
+            mass=balls["mass"].copy(),
+            radius=balls["radius"].copy(),
+        )
+
+    def _read_record(self) -> None:
+        """Move the records of the compiled loop to the log."""
+        rows = self._record[: self._world.progress["records"]]
+        self._world.progress["records"] = 0
+        self._recorded += len(rows)
+        if not len(rows):
+            return
+        collisions = np.empty(len(rows), dtype=COLLISION_DTYPE)
+        for name, column in zip(RECORD_COLUMNS, rows.T, strict=True):
+            collisions[name] = column
+        ball: Any = collisions["ball"]  # with its true type, mypy takes seconds to index with it
+        collisions["kind"] = self.scene.balls.kind[ball]
+        self.log.extend(collisions)
+
+    def _load_parts(self) -> None:
+        """Copy the loads of the modules to the parts."""
+        for part, (hits, impulse, transferred, first_hit_s, _) in zip(
+            self._parts, self._world.loads.tolist(), strict=True
+        ):
+            if hits:
+                part.hits, part.impulse, part.transferred_impulse = hits, impulse, transferred
+                part.first_hit_s = first_hit_s
+
+
+def _run_again(scene: Scene, cell_units: float | None, until_s: float) -> EventRun:
+    """Return a run of a scene up to the time of another run of it."""
+    run = EventRun(scene, cell_units)
+    run.advance(until_s)
+    return run

@@ -1,1 +1,0 @@
-"""The blast model: parameters, particles, structures, collisions and engines."""

@@ -1,0 +1,467 @@
+"""Figures of evaluations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, isnan
+from typing import Final
+
+import numpy as np
+
+from blast_env.evaluation.cases import Case
+from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.grid_error import points
+from blast_env.evaluation.report import LayoutEvaluation
+from blast_env.geometry import Layout, layout_counts
+from blast_env.layout.build_scene import build_site, charge_against
+from blast_env.plots.plan import (
+    EXPLOSIVE,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    Feature,
+    Kinds,
+    charge_feature,
+    site_features,
+    stand_off_text,
+    vehicle_features,
+    without,
+    without_counts,
+)
+from blast_env.plots.site_plan import (
+    add_bar,
+    draw_enlarged,
+    draw_plan,
+    legend_of,
+    load_colours,
+    write_heading,
+    write_legend,
+    write_names,
+)
+from blast_env.plots.style import (
+    charge_text,
+    count_of,
+    nice_ceiling,
+    render_extra,
+    unit_interval,
+)
+from blast_env.site import Scenario
+from blast_env.site.scene import BlastSite, Charge
+from blast_env.statistics import Estimate
+
+with render_extra():
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+
+_PERCENT = 100.0
+
+
+def _shown(scenario: Scenario, layout: Layout, charge: Charge | None = None) -> list[Feature]:
+    """Return the features of the site with a layout, without charges but with vehicle entries."""
+    features = (*site_features(scenario, layout, charge), *vehicle_features(scenario, layout))
+    entries = [each for each in features if each.kind is Kinds.CHARGE_PLACE and scenario.vehicles]
+    return [*without(features, Kinds.CHARGE_PLACE, Kinds.CHARGE), *entries]
+
+
+def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
+    # The smallest reduction last, on top.
+    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -np.nan_to_num(outcome.reduction))
+    reduction = _PERCENT * np.array([outcome.reduction for outcome in outcomes])
+    scale = Normalize(0.0, _PERCENT)
+    for marker, in_range in (("o", True), ("s", False)):
+        chosen = np.array([outcome.in_range is in_range for outcome in outcomes])
+        places = np.array([outcome.charge.position_m for outcome in outcomes])[chosen]
+        axes.scatter(
+            places[:, 0],
+            places[:, 1],
+            c=reduction[chosen],
+            norm=scale,
+            s=62.0,
+            marker=marker,
+            edgecolor=unit_interval(INK),
+            linewidth=0.6,
+            zorder=5,
+        )
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    below = "min" if np.nanmin(reduction, initial=0.0) < 0.0 else "neither"
+    mappable = ScalarMappable(scale)
+    bar = figure.colorbar(mappable, ax=axes, location="bottom", shrink=0.8, pad=0.02, extend=below)
+    bar.set_label("charges: reduction of the impulse on the protected structures (%)")
+
+
+def _charge_legend(evaluation: LayoutEvaluation) -> list[Artist]:
+    handles: list[Artist] = [_charge_handle("o", "charge")]
+    if not evaluation.in_range:
+        handles.append(_charge_handle("s", "charge outside the validated range"))
+    return [*handles, _worst_ring()]
+
+
+def _charge_handle(marker: str, label: str) -> Line2D:
+    return Line2D(
+        [],
+        [],
+        marker=marker,
+        linestyle="none",
+        markersize=8.0,
+        markerfacecolor="white",
+        markeredgecolor=unit_interval(INK),
+        label=label,
+    )
+
+
+def _worst_ring(*position_m: float) -> Line2D:
+    """Return the ring around the worst charge; without a position, one for the legend."""
+    return Line2D(
+        position_m[:1],
+        position_m[1:],
+        marker="o",
+        markersize=15.0,
+        markerfacecolor="none",
+        markeredgecolor=unit_interval(EXPLOSIVE),
+        markeredgewidth=2.2,
+        linestyle="none",
+        label="charge with the largest impulse",
+        zorder=6,
+    )
+
+
+# Okabe and Ito's colours, distinct for any colour vision.
+_WITHOUT, _WITH = "#D55E00", "#0072B2"
+_HEIGHT_IN, _RIGHT_IN = 8.4, 7.2
+_PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 5.6, (4.8, 8.4)
+_MOST_NAMED_THREATS = 40
+_MOST_UPRIGHT_NAMES = 16
+_MOST_UPRIGHT_LETTERS = 64
+
+
+def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
+    """Return a figure of an evaluation.
+
+    On the left the site with the layout and all charges, coloured by the reduction of their
+    impulse. On the right the load of each threat without and with the barrier, and below it the
+    mean load on every module of the protected building with the largest load without a barrier.
+
+    Args:
+        evaluation: The evaluation.
+    """
+    site = evaluation.scenario.site
+    least_in, most_in = _PLAN_WIDTHS_IN
+    plan_in = min(max(_PLAN_HEIGHT_IN * site.width_m / site.height_m, least_in), most_in)
+    figure = Figure(figsize=(plan_in + _RIGHT_IN, _HEIGHT_IN), layout="constrained")
+    halves = figure.add_gridspec(1, 2, width_ratios=(plan_in, _RIGHT_IN))
+    plan = figure.add_subplot(halves[0])
+    right = halves[1].subgridspec(2, 1, height_ratios=(1.0, 1.05))
+    threats = figure.add_subplot(right[0])
+    lower = right[1].subgridspec(1, 2)
+    modules = [figure.add_subplot(lower[column]) for column in range(2)]
+    threat = evaluation.threats[0]
+    scene = build_site(evaluation.scenario, evaluation.layout, threat.seed, threat.charge)
+    features = _shown(evaluation.scenario, evaluation.layout)
+    draw_plan(plan, features)
+    plan.set_title("Site, layout and charges", fontsize=11)
+    _draw_charges(plan, evaluation)
+    plan.add_line(_worst_ring(*evaluation.worst.charge.position_m))
+    _draw_threats(threats, evaluation)
+    _draw_modules(modules, evaluation, scene)
+    handles = [*_charge_legend(evaluation), *legend_of(features)]
+    write_legend(figure, handles)
+    write_heading(figure, _title(evaluation), _subtitle(evaluation))
+    charges = [charge_feature(each.charge, "charge") for each in evaluation.outcomes]
+    write_names(plan, [*features, *charges])
+    return figure
+
+
+def _title(evaluation: LayoutEvaluation) -> str:
+    layout = evaluation.layout
+    barrier = layout_counts(layout, "barrier") if layout else "no barrier"
+    noun = evaluation.scenario.objective.noun
+    share, error = evaluation.mean_reduction, evaluation.reduction_error
+    reduction = f"reduction of the {noun} {_with_error(share, error)}"
+    return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
+
+
+def _subtitle(evaluation: LayoutEvaluation) -> str:
+    stand_off = stand_off_text(evaluation.scenario, evaluation.layout)
+    law = f"calibration {evaluation.calibration}, " if evaluation.engine.needs_calibration else ""
+    range_note = "" if evaluation.in_range else "; partly outside the validated range"
+    return (
+        f"{count_of('threat', len(evaluation.threats))}; worst: "
+        f"{charge_text(evaluation.worst.charge)}, {_load_text(evaluation, evaluation.worst.load)}; "
+        f"{stand_off and f'{stand_off}; '}"
+        f"{law}engine {evaluation.engine.words}{range_note}"
+    )
+
+
+def _percent(share: float) -> str:
+    return "-" if isnan(share) else f"{_PERCENT * share:.0f} %"
+
+
+def _with_error(share: float, error: float) -> str:
+    """Return a reduction with its error of the cells, if there is one."""
+    if isnan(error):
+        return _percent(share)
+    return f"{_PERCENT * share:.1f} % \N{PLUS-MINUS SIGN} {points(error)} (cells)"
+
+
+def _interval(reduction: Estimate) -> str:
+    """Return the interval in words; nothing for a single threat."""
+    if np.isnan(reduction.low):
+        return ""
+    return f" (95 %: {_percent(reduction.low)} to {_percent(reduction.high)})"
+
+
+def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
+    """Draw the load of each threat without and with the barrier, the worst first."""
+    outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.load)
+    place = np.arange(1, len(outcomes) + 1)
+    bare = np.array([outcome.unprotected_load for outcome in outcomes])
+    load = np.array([outcome.load for outcome in outcomes])
+    objective, comparison = evaluation.scenario.objective, evaluation.comparison
+    axes.vlines(place, load, bare, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
+    for values, estimate, colour, words in (
+        (bare, comparison.unprotected_mean, _WITHOUT, "without"),
+        (load, comparison.mean, _WITH, "with"),
+    ):
+        label = f"{words} barrier, mean {_load_text(evaluation, estimate.value)}"
+        axes.plot(place, values, "o", color=colour, markersize=5.5, label=label, zorder=3)
+        axes.axhline(estimate.value, color=colour, linewidth=1.2, zorder=1)
+        if not np.isnan(estimate.low):
+            axes.axhspan(estimate.low, estimate.high, color=colour, alpha=0.15, linewidth=0.0)
+    worst = _percent(1.0 - evaluation.cvar_level)
+    label = f"mean of the worst {worst} with barrier, {_load_text(evaluation, comparison.cvar)}"
+    axes.axhline(comparison.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
+    axes.set_xlim(0.3, len(outcomes) + 0.7)
+    axes.set_ylim(0.0, 1.32 * max(bare.max(), load.max()))  # room for the legend
+    unit = f" ({objective.unit.replace(' ', '·')})" if objective.unit else ""
+    axes.set_ylabel(f"{_load_name(evaluation)}\nprotected structures{unit}")
+    axes.set_title("Every threat, the worst with the barrier first", fontsize=11)
+    axes.legend(loc="upper center", ncols=2, fontsize=8.5, frameon=False)
+    axes.grid(axis="y", alpha=0.3)
+    if evaluation.engine.has_noise:
+        _name_threats(axes, "seed of the threat", [str(each.threat.seed) for each in outcomes])
+    else:  # the seed determines only the charge
+        places = (each.charge.position_m for each in outcomes)
+        names = [f"({x_m:.1f}, {y_m:.1f})" for x_m, y_m in places]
+        _name_threats(axes, "charge of the threat (m)", names)
+
+
+def _load_text(evaluation: LayoutEvaluation, load: float) -> str:
+    """Return a load with its unit, in the notation of figures."""
+    return evaluation.scenario.objective.text(load).replace("Pa s", "Pa·s")
+
+
+def _load_name(evaluation: LayoutEvaluation) -> str:
+    """Return the name of the loads: that of one structure, or a weighted sum."""
+    noun = evaluation.scenario.objective.noun
+    protected = evaluation.loads[0].protected
+    weighted = len(protected) > 1 or protected[0].weight != 1.0
+    return f"weighted sum of the {noun} on the" if weighted else f"{noun} on the"
+
+
+def _name_threats(axes: Axes, what: str, names: Sequence[str]) -> None:
+    bands = "; bands: 95 % intervals of the means" if len(names) > 1 else ""
+    if len(names) > _MOST_NAMED_THREATS:
+        axes.set_xlabel(f"rank of the threat{bands}")
+        return
+    upright = len(names) <= _MOST_UPRIGHT_NAMES and sum(map(len, names)) <= _MOST_UPRIGHT_LETTERS
+    axes.set_xticks(
+        range(1, len(names) + 1),
+        names,
+        fontsize=8,
+        rotation=0.0 if upright else 90.0,
+    )
+    axes.set_xlabel(f"{what}{bands}")
+
+
+def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: BlastSite) -> None:
+    """Draw the mean load on the modules of one building, without and with the barrier.
+
+    Of a building of several parts the impulse is that of the building, as rewards count it.
+    """
+    table = evaluation.table.set_index("structure")
+    protected = table[table.protected]
+    names = evaluation.scenario.building_names
+    owners = np.array([names[each] for each in protected.index])
+    counted = protected.weight * protected.unprotected_impulse_pa_s
+    name = str(counted.groupby(owners).sum().idxmax())
+    parts = protected[owners == name]
+    building = evaluation.building_table.set_index("structure").loc[name]
+    modules = evaluation.module_table
+    own = modules[modules.structure.isin(parts.index)]
+    outlines = [each for each in scene.structures if each.name in parts.index]
+    columns = ("unprotected_impulse_sim", "impulse_sim")
+    highest = float(own[list(columns)].to_numpy().max())
+    scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
+    for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
+        obstacles = [outline.build() for outline in outlines]
+        for obstacle in obstacles:
+            impulses = own[own.structure == obstacle.name][column]
+            for part, impulse in zip(obstacle.parts, impulses, strict=True):
+                part.impulse, part.hits = float(impulse), int(impulse > 0.0)
+        draw_enlarged(axes, obstacles, scale, 0.4)
+        pa_s = building[column.replace("_sim", "_pa_s")]
+        axes.set_title(
+            f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",
+            fontsize=11,
+            color=unit_interval(PROTECTED),
+        )
+    figure = panels[0].get_figure(root=True)
+    assert figure is not None
+    is_scaled = evaluation.engine.needs_calibration
+    words = "impulse per module\n(simulation units)" if is_scaled else "momentum per module\n(N·s)"
+    label = f"mean {words}; white: not hit"
+    add_bar(figure, panels, ScalarMappable(scale, load_colours()), label, shrink=0.9, pad=0.03)
+
+
+MOST_SHOWN: Final = 12
+"""Most cases in a figure: the first ones."""
+
+_COLUMNS: Final = 4
+_PANEL_IN: Final = 3.2
+_LEAST_WIDTH_IN: Final = 9.6  # for the heading
+_PANEL_HEIGHTS_IN: Final = (2.0, 4.8)
+_THREAT_PT: Final = 29.0  # of the lines between title and panel
+_TITLE_IN: Final = 0.95  # of a panel, with the numbers along x
+_NUMBERS_IN: Final = 0.4  # along y
+_FRAME_IN: Final = 1.8  # heading and legend
+_OUT_OF_RANGE: Final = " ~"
+
+
+@dataclass(frozen=True, eq=False)
+class _Panel:
+    """One case of a comparison.
+
+    Attributes:
+        case: The case.
+        layout: Its layout.
+        reduction: Its reduction, as a share; NaN if there is no load without it.
+        in_range: Whether all threats are within the checked range.
+    """
+
+    case: Case
+    layout: Layout
+    reduction: float
+    in_range: bool
+
+    @property
+    def charge(self) -> Charge:
+        """The first charge, at the place of its detonation."""
+        return charge_against(self.case.scenario, self.layout, self.case.threats[0].charge)
+
+    def features(self) -> list[Feature]:
+        """Return the site with the layout and the first charge."""
+        charge = charge_feature(self.charge, "charge")
+        return [*_shown(self.case.scenario, self.layout), charge]
+
+
+def comparison_figure(comparison: Comparison) -> Figure:
+    """Return a picture of layouts with their reductions, four in a row.
+
+    The first `MOST_SHOWN` cases are drawn, numbered from 1; a note mentions further ones.
+
+    Args:
+        comparison: The comparison, with one layout per case.
+    """
+    panels = [
+        _Panel(case, layout, float(reduction), bool(in_range.all()))
+        for case, layout, reduction, in_range in zip(
+            comparison.cases,
+            comparison.layouts,
+            comparison.case_reductions,
+            comparison.in_range,
+            strict=True,
+        )
+    ]
+    shown = panels[:MOST_SHOWN]
+    columns = min(len(shown), _COLUMNS)
+    figure, all_axes = _empty_panels(shown, columns)
+    is_one_site = len({panel.case.scenario.content_hash for panel in panels}) == 1
+    features: list[Feature] = []
+    for number, (axes, panel) in enumerate(zip(all_axes, shown, strict=True), start=1):
+        of_panel = panel.features()
+        features += of_panel
+        _draw_case(axes, panel, of_panel, f"case {number}")
+        _write_threat(axes, panel, "" if is_one_site else f"{panel.case.scenario.name}, ")
+        axes.set_xlabel("x (m)" if number > len(shown) - columns else "")
+        axes.set_ylabel("y (m)" if number % columns == 1 or columns == 1 else "")
+    write_legend(figure, legend_of(without_counts(features)))
+    place = panels[0].case.scenario.name if is_one_site else "different sites"
+    write_heading(
+        figure,
+        f"{place}: {_headline(comparison)}",
+        _cases_subtitle(panels),
+    )
+    return figure
+
+
+def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[Axes]]:
+    """Return a figure with one panel per case, high enough for the highest site."""
+    rows = ceil(len(shown) / columns)
+    width_in = max(columns * _PANEL_IN, _LEAST_WIDTH_IN)
+    sites = [panel.case.scenario.site for panel in shown]
+    slenderness = max(site.height_m / site.width_m for site in sites)
+    least_in, most_in = _PANEL_HEIGHTS_IN
+    plan_in = slenderness * (width_in / columns - _NUMBERS_IN)
+    panel_in = min(max(plan_in, least_in), most_in) + _TITLE_IN
+    figure = Figure(figsize=(width_in, rows * panel_in + _FRAME_IN), layout="constrained")
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in panels[len(shown) :]:
+        axes.set_visible(False)
+    return figure, panels[: len(shown)]
+
+
+def _draw_case(axes: Axes, panel: _Panel, features: Sequence[Feature], name: str) -> None:
+    draw_plan(axes, features)
+    axes.tick_params(labelsize=7.5)
+    mark = "" if panel.in_range else _OUT_OF_RANGE
+    axes.set_title(
+        f"{name}: reduction {_percent(panel.reduction)}{mark}",
+        fontsize=10.5,
+        fontweight="bold",
+        color=unit_interval(INK),
+        pad=_THREAT_PT,
+    )
+
+
+def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
+    (x_m, y_m), tnt_kg = panel.charge.position_m, panel.charge.tnt_kg
+    charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
+    axes.annotate(
+        f"{site}{layout_counts(panel.layout)}\n{charge}",
+        (0.5, 1.0),
+        xycoords="axes fraction",
+        xytext=(0.0, 2.0),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=9,
+        color=unit_interval(QUIET_INK),
+    )
+
+
+def _headline(comparison: Comparison) -> str:
+    reduction, error = comparison.reduction, comparison.reduction_error
+    if comparison.has_one_case:
+        return f"reduction {_with_error(reduction.value, error)}"
+    mean = f"a layout for each case, mean reduction {_with_error(reduction.value, error)}"
+    return f"{mean}{_interval(reduction)}"
+
+
+def _cases_subtitle(panels: Sequence[_Panel]) -> str:
+    """Return the meaning of the numbers, the count of cases, and the mark of unchecked ones."""
+    noun = panels[0].case.scenario.objective.noun
+    parts = [f"reduction of the {noun} on the protected structures"]
+    if len(panels) > MOST_SHOWN:
+        parts.append(
+            f"mean over all {len(panels)} cases, of which the first {MOST_SHOWN} are shown"
+        )
+    else:
+        parts.append(count_of("case", len(panels)))
+    if not all(panel.in_range for panel in panels):
+        parts.append("~ outside the validated range")
+    return "; ".join(parts)

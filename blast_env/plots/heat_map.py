@@ -1,0 +1,300 @@
+"""The impulse on every module, in its place on the site."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isqrt
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import BlastResult
+from blast_env.geometry import Rectangle
+from blast_env.particles.calibration import LoadUnit
+from blast_env.plots.plan import (
+    BARRIER,
+    INK,
+    PROTECTED,
+    STANDING,
+    Feature,
+    Kinds,
+    blast_features,
+    without,
+)
+from blast_env.plots.site_plan import (
+    add_bar,
+    draw_enlarged,
+    draw_loads,
+    draw_outlines,
+    draw_plan,
+    legend_of,
+    load_colours,
+    write_heading,
+    write_legend,
+    write_names,
+)
+from blast_env.plots.style import (
+    blast_title,
+    count_of,
+    nice_ceiling,
+    render_extra,
+    short_number,
+    unit_interval,
+)
+from blast_env.site.sections import buildings_of
+from blast_env.site.structure import ModularObstacle, ModularPart
+from blast_env.units import MODULE_SIDE_M
+
+with render_extra():
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+_HEIGHT_IN = 6.6
+_PLAN_HEIGHT_IN, _PLAN_WIDTHS_IN = 4.6, (4.0, 8.0)
+_PANELS_HEIGHT_IN, _PANELS_WIDTHS_IN = 4.9, (2.2, 6.0)
+_PLAN_LABELS_IN, _PANEL_LABELS_IN, _COLOUR_BAR_IN = 1.0, 0.7, 1.3
+_MOST_PANELS = 4
+_POINTS_PER_IN = 72.0
+_LARGEST_NUMBER_PT, _SMALLEST_NUMBER_PT = 9.0, 5.5
+_DARK_SHARE = 0.55  # of the scale; numbers turn white there
+
+
+@dataclass(frozen=True)
+class LoadScale:
+    """The colour scale of a heat map.
+
+    Attributes:
+        full: The load of a module at the end of the scale, in the unit.
+        unit: Unit of the loads shown.
+    """
+
+    full: float
+    unit: LoadUnit
+
+    @property
+    def norm(self) -> Normalize:
+        """The scale for matplotlib."""
+        return Normalize(0.0, self.full)
+
+
+def heat_map(
+    result: BlastResult, structure: str | None = None, scale: LoadScale | None = None
+) -> Figure:
+    """Return the impulse on every module, on the site plan and enlarged.
+
+    Args:
+        result: The blast.
+        structure: The structure or building to enlarge. By default the protected buildings, or
+            all if none is protected; at most four, those with the largest impulses.
+        scale: The colour scale, for comparisons of maps; see `common_scale`. By default it ends
+            at the largest load in the enlarged buildings, rounded up.
+
+    Raises:
+        UnknownNameError: If there is no structure or building of that name.
+    """
+    chosen = _chosen(result, structure)
+    if scale is None:
+        scale = common_scale([result], structure)
+    columns = isqrt(len(chosen) - 1) + 1
+    rows = -(-len(chosen) // columns)
+    widths_in = _widths_in(result, chosen, columns, rows)
+    layout = ConstrainedLayoutEngine(h_pad=0.08)
+    figure = Figure(figsize=(sum(widths_in), _HEIGHT_IN), layout=layout)
+    halves = figure.add_gridspec(1, 2, width_ratios=widths_in)
+    overview = figure.add_subplot(halves[0])
+    _draw_overview(overview, result, scale)
+    places = halves[1].subgridspec(rows, columns)
+    panels = [figure.add_subplot(places[index]) for index in range(len(chosen))]
+    room_in = (
+        (widths_in[1] - _COLOUR_BAR_IN) / columns - _PANEL_LABELS_IN,
+        _PANELS_HEIGHT_IN / rows,
+    )
+    for axes, building in zip(panels, chosen, strict=True):
+        _draw_panel(axes, result, building, scale, room_in)
+    _add_colour_bar(figure, panels, scale, result)
+    _add_legend(figure, result)
+    title, subtitle = blast_title(result.blast)
+    write_heading(figure, f"{title}: impulse per module", subtitle)
+    write_names(overview, _features(result), inside=False)
+    return figure
+
+
+def common_scale(results: Sequence[BlastResult], structure: str | None = None) -> LoadScale:
+    """Return one colour scale for the heat maps of several results.
+
+    Args:
+        results: The results; the unit is that of the one with the largest load.
+        structure: As for `heat_map`.
+
+    Raises:
+        UnknownNameError: If there is no structure of that name.
+    """
+    loads = [
+        max(part.impulse for each in _chosen(result, structure) for part in each.modules)
+        for result in results
+    ]
+    largest = max(loads)
+    unit = results[loads.index(largest)].load_unit
+    return LoadScale(nice_ceiling(unit.factor * largest) if largest > 0.0 else 1.0, unit)
+
+
+@dataclass(frozen=True, eq=False)
+class _Building:
+    """A building, or a structure, to enlarge.
+
+    Attributes:
+        name: Its name.
+        obstacles: Its structures.
+    """
+
+    name: str
+    obstacles: tuple[ModularObstacle, ...]
+
+    @property
+    def protected(self) -> bool:
+        """Whether the load of at least one structure counts."""
+        return any(each.protected for each in self.obstacles)
+
+    @property
+    def impulse(self) -> float:
+        """Sum over the structures, simulation units."""
+        return sum(each.impulse for each in self.obstacles)
+
+    @property
+    def modules(self) -> tuple[ModularPart, ...]:
+        """The modules of the structures."""
+        return tuple(part for each in self.obstacles for part in each.parts)
+
+    @property
+    def size_modules(self) -> tuple[float, float]:
+        """Columns and rows of modules in the rectangle around the structures."""
+        left, bottom, right, top = Rectangle.around([each.rectangle_m for each in self.obstacles])
+        return (right - left) / MODULE_SIDE_M, (top - bottom) / MODULE_SIDE_M
+
+
+def _chosen(result: BlastResult, structure: str | None) -> list[_Building]:
+    scenario = result.blast.scenario
+    together = buildings_of(scenario.structures_with(result.blast.layout))
+    if structure is not None and structure not in together:
+        return [_Building(structure, (result.obstacle(structure),))]
+    buildings = [
+        _Building(name, tuple(result.obstacle(each.name) for each in parts))
+        for name, parts in together.items()
+    ]
+    if structure is not None:
+        return [each for each in buildings if each.name == structure]
+    protected = [each for each in buildings if each.protected]
+    by_impulse = sorted(protected or buildings, key=lambda each: -each.impulse)
+    return by_impulse[:_MOST_PANELS]
+
+
+def _widths_in(
+    result: BlastResult, chosen: list[_Building], columns: int, rows: int
+) -> tuple[float, float]:
+    """Return widths for plan and panels that leave little empty space beside them."""
+    site = result.blast.scene.site
+    plan = _PLAN_HEIGHT_IN * (site.right - site.left) / (site.top - site.bottom)
+    widest = max(across / along for across, along in (each.size_modules for each in chosen))
+    panels = _PANELS_HEIGHT_IN / rows * widest * columns
+    plan, panels = (
+        min(max(width, least), most)
+        for width, (least, most) in ((plan, _PLAN_WIDTHS_IN), (panels, _PANELS_WIDTHS_IN))
+    )
+    return plan + _PLAN_LABELS_IN, panels + columns * _PANEL_LABELS_IN + _COLOUR_BAR_IN
+
+
+def _draw_overview(axes: Axes, result: BlastResult, scale: LoadScale) -> None:
+    # Modules are filled with the colours of their loads.
+    draw_plan(axes, without(_features(result), *STANDING))
+    for obstacle in result.obstacles:
+        draw_loads(axes, obstacle, scale.norm, 0.25, scale.unit.factor)
+    draw_outlines(axes, result.obstacles)
+    axes.set_title("Site", fontsize=11)
+
+
+def _features(result: BlastResult) -> tuple[Feature, ...]:
+    blast = result.blast
+    return blast_features(blast.scenario, blast.layout, blast.scene.charge)
+
+
+def _total(result: BlastResult, building: _Building) -> str:
+    """Return the load on a building in words: in Pa s for a single part with a calibration."""
+    if len(building.obstacles) == 1:
+        try:
+            return f"{result.impulse(building.obstacles[0].name).pa_s:,.0f} Pa s"
+        except BlastEnvError:
+            pass
+    return f"{building.impulse:,.0f} in all"
+
+
+def _draw_panel(
+    axes: Axes,
+    result: BlastResult,
+    building: _Building,
+    scale: LoadScale,
+    room_in: tuple[float, float],
+) -> None:
+    draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor)
+    hits = sum(part.hits for part in building.modules)
+    axes.set_title(
+        f"{building.name}{' (protected)' if building.protected else ''}\n"
+        f"{_total(result, building)} from {count_of('hit', hits)}",
+        fontsize=11,
+        color=unit_interval(PROTECTED if building.protected else INK),
+    )
+    columns, rows = building.size_modules
+    cell_pt = _POINTS_PER_IN * min(room_in[0] / (columns + 1.0), room_in[1] / (rows + 1.0))
+    _write_numbers(axes, building, scale, min(0.34 * cell_pt, _LARGEST_NUMBER_PT))
+
+
+def _write_numbers(axes: Axes, building: _Building, scale: LoadScale, size_pt: float) -> None:
+    """Write the impulse into every module that was hit, if the text size is legible."""
+    if size_pt < _SMALLEST_NUMBER_PT:
+        return
+    for part in building.modules:
+        if part.hits:
+            load = scale.unit.factor * part.impulse
+            dark = load > _DARK_SHARE * scale.full
+            centre = part.rectangle_m.centre
+            number = axes.text(
+                *centre,
+                short_number(load),
+                ha="center",
+                va="center",
+                fontsize=size_pt,
+                color="white" if dark else unit_interval(INK),
+                zorder=4,
+            )
+            if part.destroyed:  # keep the cross off the number
+                ground = load_colours()(scale.norm(load))
+                number.set_bbox({"facecolor": ground, "edgecolor": "none", "pad": 1.5})
+
+
+def _add_legend(figure: Figure, result: BlastResult) -> None:
+    features = _features(result)
+    handles = legend_of(without(features, Kinds.BARRIER))
+    if any(each.kind is Kinds.BARRIER for each in features):
+        edge = unit_interval(BARRIER)
+        handles.insert(0, Patch(fill=False, edgecolor=edge, label="barrier module"))
+    if any(obstacle.capacity is not None for obstacle in result.obstacles):
+        ink = unit_interval(INK)
+        handles.append(Line2D([], [], marker="x", linestyle="none", color=ink, label="destroyed"))
+    write_legend(figure, handles)
+
+
+def _add_colour_bar(
+    figure: Figure, panels: list[Axes], scale: LoadScale, result: BlastResult
+) -> None:
+    beyond = any(
+        scale.unit.factor * part.impulse > scale.full
+        for obstacle in result.obstacles
+        for part in obstacle.parts
+    )
+    colours, label = (
+        ScalarMappable(scale.norm, load_colours()),
+        f"{scale.unit.label}; white: not hit",
+    )
+    extend = "max" if beyond else "neither"
+    add_bar(figure, panels, colours, label, extend=extend, shrink=0.85, pad=0.03)

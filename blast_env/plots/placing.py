@@ -1,0 +1,186 @@
+"""Pictures of an episode of placing, and of the blast at its end."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import Blast, BlastResult
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import build_site
+from blast_env.plots.canvas import Frame, SiteSheet
+from blast_env.plots.film import paint_at, plan_film
+from blast_env.plots.frames import FramePainter
+from blast_env.plots.plan import (
+    Feature,
+    Kinds,
+    barrier_features,
+    cell_features,
+    in_order,
+    site_features,
+    source_features,
+    vehicle_features,
+    without,
+    without_counts,
+)
+from blast_env.plots.site_plan import draw_features, legend_of, write_names
+from blast_env.plots.style import charge_text, nice_ceiling, render_extra
+from blast_env.site import AnySource, PointSource, Scenario, VehicleSource
+from blast_env.site.scene import Charge
+
+with render_extra():
+    from matplotlib.artist import Artist
+
+
+class PlacingPainter:
+    """Draws the layouts of one episode, all on the same ground.
+
+    The site has the same position as in the frames of `FramePainter`, and the height is at least
+    that of those frames, so that both fit into one film.
+
+    Args:
+        scenario: The scenario; it has a build zone.
+        sources: The place of the charge, if a single point, or its possible places.
+        width_px: Width of the frames, as for `FramePainter`.
+    """
+
+    def __init__(
+        self, scenario: Scenario, sources: Sequence[AnySource], width_px: int = 960
+    ) -> None:
+        self._scenario = scenario
+        self._has_vehicles = any(isinstance(source, VehicleSource) for source in sources)
+        given = without(site_features(scenario), Kinds.SITE, Kinds.CHARGE_PLACE)
+        self._features = (*given, *source_features(sources))
+        blast_px = _particle_frames_px(scenario, width_px)
+        site_m = build_site(scenario).site_m
+        self._sheet = SiteSheet(site_m, width_px, self._handles(), False, blast_px)
+        if scenario.build_zone is not None:
+            self._sheet.draw_grid(scenario.build_zone.rectangle_m)
+        self._sheet.write((scenario.name, sources_text(sources)))
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self._sheet.size_px
+
+    def paint(self, placement: Placement, lines: Sequence[str] = ()) -> Frame:
+        """Return a frame, uint8 (height, width, 3).
+
+        Args:
+            placement: The modules placed so far.
+            lines: At most two lines of text for the upper right corner.
+        """
+        axes, features = self._sheet.axes, self._of(placement)
+        moving = [*draw_features(axes, features), *write_names(axes, features)]
+        frame = self._sheet.frame(lines, moving)
+        for artist in moving:
+            artist.remove()
+        return frame
+
+    def _of(self, placement: Placement) -> tuple[Feature, ...]:
+        """Return all features of a frame, the lowest first."""
+        scenario, layout = placement.scenario, placement.layout
+        found = [*self._features]
+        if self._has_vehicles:
+            found += vehicle_features(scenario, layout)
+        zone = scenario.build_zone
+        if zone is not None:
+            found += cell_features(zone, placement.open_ground)
+            found += barrier_features(scenario, layout)
+        return in_order(found)
+
+    def _handles(self) -> list[Artist]:
+        """Return the entries of the legend, one per item, since items differ in colour."""
+        placement = Placement.empty(self._scenario)
+        catalogue = placement.catalogue
+        numbers = {each.name: number for number, each in enumerate(catalogue.variants)}
+        one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
+        zone = self._scenario.zone
+        full = cell_features(zone, np.zeros(zone.shape, dtype=bool))
+        barrier = barrier_features(self._scenario, one_each)
+        return legend_of(without_counts((*self._of(placement), *full, *barrier)))
+
+
+def sources_text(sources: Sequence[AnySource]) -> str:
+    """Return the known properties of a charge, in words."""
+    first = sources[0]
+    if len(sources) == 1 and isinstance(first, PointSource):
+        return f"charge {charge_text(Charge(first.position_m, first.tnt_kg))}"
+    masses = sorted({source.tnt_kg for source in sources})
+    bounds = dict.fromkeys((masses[0], masses[-1]))
+    vehicles = all(isinstance(source, VehicleSource) for source in sources)
+    what = "vehicle with" if vehicles else "hidden charge of"
+    return f"{what} {' to '.join(f'{mass:g}' for mass in bounds)} kg TNT"
+
+
+def _particle_frames_px(scenario: Scenario, width_px: int) -> int:
+    """Return the height of frames of particles; 0 if particles cannot run the scenario."""
+    try:
+        return FramePainter(_fullest_blast(scenario), width_px=width_px).size_px[1]
+    except BlastEnvError:
+        return 0
+
+
+def _fullest_blast(scenario: Scenario) -> Blast:
+    """Return a blast with all legend entries that the scenario can have: it needs most room."""
+    empty = Placement.empty(scenario)
+    legal = np.flatnonzero(empty.legal)
+    return Blast(scenario, [empty.catalogue.element(int(action)) for action in legal[:1]])
+
+
+_LEAST_FULL_IMPULSE: Final = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class BlastScreening:
+    """Shows one blast, with a text about its outcome.
+
+    The blast is simulated again, since assessments of layouts keep only its loads.
+
+    Attributes:
+        blast: The blast.
+        outcome: Its outcome in words, shown in every frame.
+        remark: Remark about the blast, after the scenario's name.
+        size_px: Width and least height of the frames, as for `FramePainter`.
+    """
+
+    blast: Blast
+    outcome: str
+    remark: str = ""
+    size_px: tuple[int, int] = (960, 0)
+
+    def last_frame(self) -> Frame:
+        """Return the state at the end, uint8 (height, width, 3)."""
+        result = self.blast.run()
+        painter = self._painter(result)
+        balls, obstacles = result.final_balls, result.obstacles
+        return painter.paint(balls, obstacles, result.time_s, self.outcome)
+
+    def frames(self, frames_per_s: float) -> Iterator[Frame]:
+        """Yield the frames of a film of 8 to 12 s, as `write_film` plans it.
+
+        Args:
+            frames_per_s: Frames per second of the film.
+        """
+        result = self.blast.run()
+        plan = plan_film(result, frames_per_s)
+        painter = self._painter(result)
+        note = f"{self.outcome}; {plan.real_time_factor}"
+        run = self.blast.start()
+        for frame in range(plan.frame_count):
+            time_s = plan.time_s(frame)
+            yield paint_at(run, painter, time_s, note)
+
+    def _painter(self, result: BlastResult) -> FramePainter:
+        loads = [part.impulse for each in result.obstacles if each.protected for part in each.parts]
+        return FramePainter(
+            self.blast,
+            title=f"{self.blast.scenario.name}{self.remark}",
+            subtitle=f"charge {charge_text(self.blast.scene.charge)}",
+            width_px=self.size_px[0],
+            height_px=self.size_px[1],
+            full_impulse=nice_ceiling(max(*loads, _LEAST_FULL_IMPULSE)),
+            remark="",
+        )

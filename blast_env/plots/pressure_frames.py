@@ -1,0 +1,506 @@
+"""Frames of overpressure in the air: in plan at a height, and in a vertical section.
+
+They begin at the detonation, with the spherical stage of the blast before the grid takes over.
+"""
+
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from types import MappingProxyType
+from typing import Any, Final, Literal, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import UnknownNameError
+from blast_env.evaluation.engines.gas import GasResult
+from blast_env.gas.engine import GasRun
+from blast_env.gas.opening import Opening
+from blast_env.gas.probes import Snapshot
+from blast_env.geometry import Rectangle
+from blast_env.plots.canvas import BAR_LABELS_PX, Frame, Sheet
+from blast_env.plots.gas import (
+    MINUS,
+    gas_subtitle,
+)
+from blast_env.plots.plan import (
+    BARRIER,
+    BORDER,
+    FAINT,
+    INK,
+    PROTECTED,
+    QUIET_INK,
+    STANDING,
+    STRUCTURE,
+    Feature,
+    Kinds,
+    area_feature,
+    blast_features,
+    without,
+)
+from blast_env.plots.site_plan import (
+    draw_features,
+    legend_of,
+    outline_path,
+)
+from blast_env.plots.style import barrier_text, render_extra, unit_interval
+from blast_env.site.scene import BlastSite, Block, StructureOutline
+from blast_env.units import MS_PER_S, PA_PER_KPA
+
+with render_extra():
+    from matplotlib import colormaps
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import AsinhNorm
+    from matplotlib.image import AxesImage
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import PathPatch
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+_FINER: Final = 4  # pixels along a cell
+_COLOURS: Final = "RdBu_r"  # darker to both sides; red and blue suit any colour vision
+_LINEAR_SHARE: Final = 0.1  # of the scale
+_TICKS: Final = (1.0, 0.5, 0.2, 0.05)
+_CUT_STYLE: Final[Mapping[str, Any]] = MappingProxyType(
+    {"color": unit_interval(INK), "linewidth": 0.8, "linestyle": (0, (6, 3, 1, 3))}
+)
+
+
+@dataclass(frozen=True)
+class VerticalSection:
+    """A vertical section: the plane x = `at_m` or y = `at_m`.
+
+    Attributes:
+        axis: The axis normal to it.
+        at_m: Its coordinate; pictures show the layer of cells around it.
+    """
+
+    axis: Literal["x", "y"]
+    at_m: float
+
+    def __post_init__(self) -> None:
+        """Check the axis.
+
+        Raises:
+            UnknownNameError: If it is neither x nor y.
+        """
+        if self.axis not in ("x", "y"):
+            raise UnknownNameError("axis", self.axis, ("x", "y"))
+
+    @property
+    def normal(self) -> int:
+        """Index of the axis normal to it."""
+        return "xy".index(self.axis)
+
+
+def default_section(site: BlastSite) -> VerticalSection:
+    """Return the section through the charge that is best aligned with the protected structures."""
+    x_m, y_m = site.charge.position_m
+    solids = [each for each in site.structures if not each.is_barrier]
+    chosen = [each for each in solids if each.protected] or solids
+    centres = [each.rectangle_m.centre for each in chosen]
+    if not centres:
+        return VerticalSection("y", y_m)
+    across = sum(abs(centre[0] - x_m) for centre in centres)
+    along = sum(abs(centre[1] - y_m) for centre in centres)
+    return VerticalSection("y", y_m) if across >= along else VerticalSection("x", x_m)
+
+
+class Plane(Protocol):
+    """Pictures of the overpressure in a plane of cells, as in `Snapshots`.
+
+    Attributes:
+        axis: Axis normal to the plane.
+        layer: The layer of cells along it.
+        frames: The pictures, by time.
+    """
+
+    axis: int
+    layer: int
+
+    @property
+    def frames(self) -> Sequence[Snapshot]:
+        """The pictures, by time."""
+
+
+class PlaneNow:
+    """A plane of a blast in progress, with a single picture: that of the present state.
+
+    Args:
+        run: The blast.
+        axis: Axis normal to the plane.
+        layer: The layer of cells along it.
+    """
+
+    def __init__(self, run: GasRun, axis: int, layer: int) -> None:
+        self.axis, self.layer = axis, layer
+        self._solver = run.solver
+        self._solid = np.take(run.grid.solid, layer, axis=axis)
+
+    @property
+    def frames(self) -> Sequence[Snapshot]:
+        """The picture of the present state."""
+        plane = self._solver.overpressure_in(self.axis, self.layer)
+        pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
+        return [Snapshot(self._solver.time_s, pressure)]
+
+
+@dataclass(frozen=True, eq=False)
+class PressureShot:
+    """A blast with pictures of the overpressure in two planes.
+
+    Attributes:
+        result: The blast.
+        section: The section.
+        opening: Its stage before the grid.
+        planes: Pictures in plan and in the section.
+    """
+
+    result: GasResult
+    section: VerticalSection
+    opening: Opening
+    planes: tuple[Plane, Plane]
+
+    def at(self, time_s: float, plane: int) -> FloatArray | None:
+        """Return the overpressure in a plane at a time, Pa, along its two axes; NaN in solids.
+
+        It is that of the nearest picture; None before the grid takes over.
+        """
+        frames = self.planes[plane].frames
+        if time_s < self.opening.end_s or not frames:
+            return None
+        times_s = [frame.time_s for frame in frames]
+        after = min(bisect_left(times_s, time_s), len(frames) - 1)
+        before = max(after - 1, 0)
+        nearest = min((before, after), key=lambda k: abs(times_s[k] - time_s))
+        return frames[nearest].overpressure_pa.astype(np.float64)
+
+    def layer_m(self, plane: int) -> float:
+        """Return the coordinate of a plane along its normal axis, m."""
+        snapshots = self.planes[plane]
+        return float(self.result.run.grid.centres_m(snapshots.axis)[snapshots.layer])
+
+    def distances_m(self, plane: int, finer: int) -> FloatArray:
+        """Return the distances of the parts of cells in a plane from the centre of the blast, m.
+
+        Args:
+            plane: Index of the plane.
+            finer: Number of parts along each side of a cell.
+        """
+        grid, normal = self.result.run.grid, self.planes[plane].axis
+        first, second = (
+            grid.origin_m[axis]
+            + grid.cell_m / finer * (np.arange(finer * grid.shape[axis]) + 0.5)
+            - self.opening.centre_m[axis]
+            for axis in range(3)
+            if axis != normal
+        )
+        away_m = self.layer_m(plane) - self.opening.centre_m[normal]
+        return np.asarray(np.sqrt(first[:, np.newaxis] ** 2 + second**2 + away_m**2))
+
+
+class Smooth:
+    """Interpolates cell values linearly to pixels, from air cells only.
+
+    Args:
+        air: Mask of the air cells (nx, ny).
+    """
+
+    def __init__(self, air: NDArray[np.bool_]) -> None:
+        self._air = air
+        self._weights = [self._along(count) for count in air.shape]
+        self._inside = np.repeat(np.repeat(air, _FINER, axis=0), _FINER, axis=1)
+        self._shares = np.maximum(self._spread(air.astype(np.float64)), 1e-12)
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return the pixels (n nx, n ny) of values (nx, ny), 0 in solids; n is 4."""
+        known = np.where(self._air, values, 0.0)
+        return np.where(self._inside, self._spread(known) / self._shares, 0.0)
+
+    def _spread(self, values: FloatArray) -> FloatArray:
+        across, along = self._weights
+        return np.asarray((along @ (across @ values).T).T)
+
+    @staticmethod
+    def _along(count: int) -> csr_matrix:
+        """Return the weights of the cells in the pixels along an axis (n count, count)."""
+        place = np.clip((np.arange(_FINER * count) + 0.5) / _FINER - 0.5, 0.0, count - 1.0)
+        return csr_matrix(np.maximum(1.0 - np.abs(place[:, np.newaxis] - np.arange(count)), 0.0))
+
+
+class _Picture(NamedTuple):
+    """The picture of a plane of a blast, with the distances of its pixels from the charge."""
+
+    shot: int
+    plane: int
+    image: AxesImage
+    smooth: Smooth
+    distances_m: FloatArray
+
+
+# Lengths in pixels.
+_LEFT_PX, _GAP_PX, _RIGHT_PX = 66, 40, 22
+_HEADER_PX, _TITLE_PX, _TITLES_PX, _AXIS_PX, _BETWEEN_PX = 62, 22, 46, 48, 26
+_BAR_PX, _LEGEND_PX = 14, 30
+_LEGEND_ENTRY_PX: Final = 155
+_MOST_HIGH: Final = 0.8  # of a panel's width
+_SHARE_OF_TITLES: Final = 0.74  # of the width; the clock has the rest
+
+
+class PressurePainter:
+    """Paints moments of blasts side by side, all on one colour scale.
+
+    Args:
+        shots: The blasts, from left to right.
+        full_kpa: Overpressure at the end of the scale.
+        width_px: Width of the frames, even.
+        most_high_px: Largest height of the frames, to which panels shrink if need be.
+
+    Attributes:
+        sheet: The page; its moving parts show the last moment painted.
+        scale: The colour scale, kPa.
+    """
+
+    def __init__(
+        self,
+        shots: Sequence[PressureShot],
+        full_kpa: float,
+        width_px: int,
+        most_high_px: float = inf,
+    ) -> None:
+        self.shots = tuple(shots)
+        self.scale = AsinhNorm(_LINEAR_SHARE * full_kpa, -full_kpa, full_kpa)
+        self._per_unit = 0.5 / float(np.arcsinh(1.0 / _LINEAR_SHARE))
+        self._colours: Frame = colormaps[_COLOURS](np.arange(256), bytes=True)
+        site = shots[0].result.run.site
+        self._site_m = site.site_m
+        along = 1 - shots[0].section.normal
+        low, high = site.site_m[along], site.site_m[along + 2]
+        self._section_m = Rectangle(low, 0.0, high, site.air_height_m)
+        self._images: list[_Picture] = []
+        handles = self._handles()
+        self.sheet, self._axes, bar_px = self._arrange(width_px, most_high_px, len(handles))
+        for number in range(len(shots)):
+            self._draw_plan(number)
+            self._draw_section(number)
+        self._draw_bar(bar_px)
+        self.sheet.add_legend(handles, max(width_px // _LEGEND_ENTRY_PX, 2))
+        blasts = [shot.result.blast for shot in shots]
+        barrier = "" if len(shots) > 1 else f", {barrier_text(blasts[0].layout)}"
+        title = f"{blasts[-1].scenario.name}: overpressure{barrier}"
+        self.sheet.write_heading((title, gas_subtitle(blasts)), _SHARE_OF_TITLES)
+        self.sheet.add_clock(1.0 - _SHARE_OF_TITLES)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the frames."""
+        return self.sheet.size_px
+
+    def paint(self, time_s: float, note: str = "") -> Frame:
+        """Return a frame, uint8 (height, width, 3).
+
+        Args:
+            time_s: Simulated time.
+            note: A remark under the time.
+        """
+        for each in self._images:
+            shot = self.shots[each.shot]
+            values = shot.at(time_s, each.plane)
+            if values is None:
+                pixels = shot.opening.at(time_s, each.distances_m)
+            else:
+                pixels = each.smooth(values)
+            each.image.set_data(self.colours(pixels.T / PA_PER_KPA))
+        return self.sheet.frame((f"{time_s * MS_PER_S:.1f} ms", note))
+
+    def colours(self, overpressure_kpa: FloatArray) -> Frame:
+        """Return the colours of overpressures, uint8 (..., 4)."""
+        # The same as the scale, but much faster.
+        share = np.arcsinh(overpressure_kpa * (1.0 / self.scale.linear_width)) * self._per_unit
+        last = len(self._colours) - 1
+        index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
+        return self._colours[index]
+
+    def _arrange(
+        self, width_px: int, most_high_px: float, legend_entries: int
+    ) -> tuple[Sheet, list[list[Axes]], float]:
+        """Return the page, a plan and a section per blast, and the bottom of the colour bar, px."""
+        count = len(self.shots)
+        plan, section = self._site_m, self._section_m
+        panel_px = (width_px - _LEFT_PX - _RIGHT_PX - (count - 1) * _GAP_PX) / count
+        widest_m = max(plan.right - plan.left, section.right - section.left)
+        lines = -(-legend_entries // max(width_px // _LEGEND_ENTRY_PX, 2))
+        below_px = round(_BAR_PX + BAR_LABELS_PX + 12 + lines * _LEGEND_PX * 0.66)
+        first_px = _HEADER_PX + (_TITLES_PX if count > 1 else _TITLE_PX)
+        around_px = first_px + 2 * _AXIS_PX + _BETWEEN_PX + below_px
+        heights_m = [each.top - each.bottom for each in (plan, section)]
+        per_m = min(
+            panel_px / widest_m,
+            _MOST_HIGH * width_px / heights_m[0],
+            (most_high_px - 2.0 - around_px) / sum(heights_m),
+        )
+        heights_px = [per_m * height_m for height_m in heights_m]
+        height_px = round(around_px + sum(heights_px))
+        sheet = Sheet(width_px, height_px + height_px % 2)
+        panels = []
+        for number in range(count):
+            middle_px = _LEFT_PX + number * (panel_px + _GAP_PX) + panel_px / 2.0
+            top_px = float(first_px)
+            pair = []
+            for each, high_px in zip((plan, section), heights_px, strict=True):
+                wide_px = per_m * (each.right - each.left)
+                axes = sheet.panel(middle_px - wide_px / 2.0, top_px + high_px, wide_px, high_px)
+                axes.set(xlim=(each.left, each.right), ylim=(each.bottom, each.top))
+                pair.append(axes)
+                top_px += high_px + _AXIS_PX + _BETWEEN_PX
+            panels.append(pair)
+        return sheet, panels, sheet.size_px[1] - below_px + _BAR_PX
+
+    def _draw_plan(self, number: int) -> None:
+        axes, shot = self._axes[number][0], self.shots[number]
+        site, height_m = shot.result.run.site, shot.layer_m(0)
+        self._add_image(number, 0)
+        for outline, blocks in _wholes(shot):
+            is_cut = blocks[0].base_m < height_m < _top_m(site, blocks[0])
+            self._add_solid(axes, [each.rectangle_m for each in blocks], outline, is_cut=is_cut)
+        self.sheet.let_move(draw_features(axes, _on_ground(shot)))
+        line = axes.axhline if shot.section.axis == "y" else axes.axvline
+        self.sheet.let_move([line(shot.layer_m(1), **_CUT_STYLE)])
+        self.sheet.frame_axes(axes, ("x (m)", "y (m)" if number == 0 else ""), BORDER)
+        axes.set_title(f"plan at z = {height_m:g} m", fontsize=9, loc="left")
+        if len(self.shots) > 1:
+            axes.annotate(
+                barrier_text(shot.result.blast.layout),
+                (0.5, 1.0),
+                (0.0, 20.0),
+                xycoords="axes fraction",
+                textcoords="offset points",
+                ha="center",
+                fontsize=10.5,
+                fontweight="bold",
+            )
+
+    def _draw_section(self, number: int) -> None:
+        axes, shot = self._axes[number][1], self.shots[number]
+        site, at_m = shot.result.run.site, shot.layer_m(1)
+        along = 1 - shot.section.normal
+        self._add_image(number, 1)
+        for outline, blocks in _wholes(shot):
+            cut = []
+            for block in blocks:
+                part, top_m = block.rectangle_m, _top_m(site, block)
+                if part[shot.section.normal] < at_m < part[shot.section.normal + 2]:
+                    cut.append(Rectangle(part[along], block.base_m, part[along + 2], top_m))
+            if cut:
+                self._add_solid(axes, cut, outline, is_cut=True)
+        charge = site.charge
+        if abs(charge.position_m[shot.section.normal] - at_m) <= shot.result.run.grid.cell_m:
+            place_m = (charge.position_m[along], charge.height_m)
+            star = Feature(Kinds.CHARGE, (place_m,), "charge")
+            self.sheet.let_move(draw_features(axes, [star]))
+        self.sheet.let_move([axes.axhline(shot.layer_m(0), **_CUT_STYLE)])
+        labels = (f"{'xy'[along]} (m)", "z (m)" if number == 0 else "")
+        self.sheet.frame_axes(axes, labels, QUIET_INK)
+        axes.set_title(f"section at {shot.section.axis} = {at_m:g} m", fontsize=9, loc="left")
+
+    def _add_image(self, number: int, plane: int) -> None:
+        axes, shot = self._axes[number][plane], self.shots[number]
+        grid = shot.result.run.grid
+        normal = shot.planes[plane].axis
+        first, second = (axis for axis in range(3) if axis != normal)
+        air = ~np.take(grid.solid, shot.planes[plane].layer, axis=normal)
+        low, high = (
+            [grid.origin_m[axis] + grid.cell_m * end * grid.shape[axis] for axis in (first, second)]
+            for end in (0, 1)
+        )
+        image = AxesImage(
+            axes,
+            interpolation="nearest",
+            origin="lower",
+            extent=(low[0], high[0], low[1], high[1]),
+        )
+        image.set_clip_path(axes.patch)
+        image.set_data(self.colours(np.zeros((2, 2))))
+        axes.add_artist(image)
+        self.sheet.let_move([image])
+        distances_m = shot.distances_m(plane, _FINER)
+        self._images.append(_Picture(number, plane, image, Smooth(air), distances_m))
+
+    def _add_solid(
+        self, axes: Axes, parts: Sequence[Rectangle], outline: StructureOutline, *, is_cut: bool
+    ) -> None:
+        """Draw a solid: filled if the plane cuts it, its outline alone if not."""
+        patch = PathPatch(outline_path(parts))
+        if outline.is_barrier:
+            patch.set(edgecolor=unit_interval(BARRIER), linewidth=0.8)
+            colour = unit_interval(BARRIER)
+        else:
+            edge = PROTECTED if outline.protected else STRUCTURE
+            patch.set(edgecolor=unit_interval(edge), linewidth=2.0)
+            colour = unit_interval(FAINT)
+        patch.set(facecolor=colour if is_cut else "none")
+        self.sheet.let_move([axes.add_patch(patch)])
+
+    def _draw_bar(self, bottom_px: float) -> None:
+        colours = ScalarMappable(self.scale, _COLOURS)
+        label = "overpressure (kPa), the same scale everywhere"
+        bar = self.sheet.add_bar(colours, bottom_px, label, FuncFormatter(_signed), "both")
+        full = float(self.scale.vmax or 0.0)
+        marks = [sign * share * full for share in _TICKS for sign in (-1.0, 1.0)]
+        bar.ax.xaxis.set_major_locator(FixedLocator(sorted({*marks, 0.0})))
+        bar.ax.xaxis.set_minor_locator(NullLocator())
+
+    def _handles(self) -> list[Artist]:
+        features = [
+            feature
+            for shot in self.shots
+            for feature in (*_on_ground(shot), *_solids(shot.result.run.site))
+        ]
+        handles = legend_of(features)
+        for handle in handles:
+            if isinstance(handle, Line2D) and handle.get_marker() == "*":
+                handle.set_markersize(10.0)
+        return [*handles, Line2D([], [], **_CUT_STYLE, label="cut of the other view")]
+
+
+def _signed(value: float, position: int | None) -> str:  # noqa: ARG001
+    """Return the number at a tick, with a minus sign if negative."""
+    return f"{value:g}".replace("-", MINUS)
+
+
+def _on_ground(shot: PressureShot) -> tuple[Feature, ...]:
+    blast = shot.result.blast
+    features = blast_features(blast.scenario, (), shot.result.run.site.charge)
+    return without(features, Kinds.SITE, *STANDING)
+
+
+def _wholes(shot: PressureShot) -> list[tuple[StructureOutline, list[Block]]]:
+    """Return solids with their blocks, the lowest first; blocks of a barrier are apart."""
+    found: list[tuple[StructureOutline, list[Block]]] = []
+    for outline in shot.result.run.site.structures:
+        if outline.is_barrier:
+            found += ((outline, [block]) for block in outline.blocks)
+        else:
+            found.append((outline, list(outline.blocks)))
+    return sorted(found, key=lambda each: each[1][0].base_m)
+
+
+def _solids(site: BlastSite) -> list[Feature]:
+    """Return the solids as features, in their colours in a cut."""
+    found = []
+    for outline in site.structures:
+        if outline.is_barrier:
+            kind, fill = Kinds.BARRIER, BARRIER
+        else:
+            kind, fill = Kinds.PROTECTED_STRUCTURE if outline.protected else Kinds.STRUCTURE, FAINT
+        feature = area_feature(kind, outline.rectangle_m, outline.name)
+        found.append(replace(feature, fill=fill, words="barrier" if fill is BARRIER else ""))
+    return found
+
+
+def _top_m(site: BlastSite, block: Block) -> float:
+    return site.air_height_m if block.height_m is None else block.height_m

@@ -1,0 +1,460 @@
+"""The plan of a site in matplotlib: features, loads, names, legends and headings."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.geometry import Rectangle, outlines
+from blast_env.plots.labels import labels_of, settled_labels
+from blast_env.plots.plan import (
+    BARRIER,
+    INK,
+    PAGE,
+    PROTECTED,
+    QUIET_INK,
+    STRUCTURE,
+    Feature,
+    FeatureKind,
+    Kinds,
+    Look,
+    area_feature,
+    outlines_of,
+)
+from blast_env.plots.style import number_on_axis, render_extra, unit_interval
+from blast_env.site.scene import StructureOutline
+from blast_env.site.sections import PointM
+from blast_env.site.structure import LoadColours, ModularObstacle
+
+with render_extra():
+    from matplotlib import patheffects
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import FancyArrowPatch, Patch, PathPatch
+    from matplotlib.patches import Rectangle as RectanglePatch
+    from matplotlib.path import Path
+    from matplotlib.text import Text
+    from matplotlib.ticker import FuncFormatter
+    from matplotlib.transforms import Bbox
+
+
+Obstacle = ModularObstacle | StructureOutline
+
+
+class View(Protocol):
+    """A projection from places on a site to positions in a picture."""
+
+    def places(self, points_m: FloatArray) -> FloatArray:
+        """Return positions in the picture (n, 2) of x, y and height (n, 3), m."""
+
+
+class PlanView:
+    """The view from above, which ignores heights."""
+
+    def places(self, points_m: FloatArray) -> FloatArray:
+        """Return x and y (n, 2) of x, y and height (n, 3), m."""
+        return np.asarray(points_m, dtype=np.float64)[:, :2]
+
+
+PLAN: Final = PlanView()
+
+
+def load_colours() -> Colormap:
+    """Return the colours of `LoadColours` as a colour map, white for missing loads.
+
+    Their lightness decreases throughout, so that the order shows without colour vision.
+    """
+    colours = [unit_interval(colour) for colour in LoadColours()]
+    colour_map = LinearSegmentedColormap.from_list("load", colours)
+    return colour_map.with_extremes(bad=unit_interval(PAGE))
+
+
+def add_bar(
+    figure: Figure, panels: Sequence[Axes], colours: ScalarMappable, label: str, **style: Any
+) -> Colorbar:
+    """Add a colour bar beside panels; `style` is passed to matplotlib."""
+    form = FuncFormatter(number_on_axis)
+    bar = figure.colorbar(colours, ax=list(panels), format=form, **style)
+    bar.set_label(label)
+    return bar
+
+
+def rectangle_patch(rectangle: Rectangle) -> RectanglePatch:
+    """Return a rectangle as a patch without a style."""
+    left, bottom, right, top = rectangle
+    return RectanglePatch((left, bottom), right - left, top - bottom)
+
+
+def add_outline(axes: Axes, rectangle: Rectangle, **style: object) -> Artist:
+    """Add the outline of a rectangle in metres; `style` is passed to matplotlib."""
+    patch = rectangle_patch(rectangle)
+    patch.set(**({"fill": False} | style))
+    return axes.add_patch(patch)
+
+
+def draw_site(axes: Axes, site_m: Rectangle, margin: float = 0.03) -> None:
+    """Set up axes in metres with equal scales and draw ground and border."""
+    draw_plan(axes, [area_feature(Kinds.SITE, site_m, "site")], margin)
+
+
+def draw_plan(axes: Axes, features: Sequence[Feature], margin: float = 0.03) -> None:
+    """Set up axes in metres with equal scales for a site, and draw its features."""
+    (site_m,) = (each.bounds_m for each in features if each.kind is Kinds.SITE)
+    reach = margin * max(site_m.right, site_m.top)
+    axes.set_xlim(site_m.left - reach, site_m.right + reach)
+    axes.set_ylim(site_m.bottom - reach, site_m.top + reach)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.spines[:].set_visible(False)
+    draw_features(axes, features)
+
+
+def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) -> list[Artist]:
+    """Draw features by their geometry and their look.
+
+    Args:
+        axes: The axes, in metres.
+        features: The features to draw; points with a height are drawn above the ground.
+        view: The projection of the picture.
+
+    Returns:
+        The artists drawn, the lowest first.
+    """
+    drawn: list[Artist] = []
+    areas: dict[tuple[FeatureKind, Look, object], list[Feature]] = {}
+    for feature in features:
+        if len(feature.places_m) > 2:
+            areas.setdefault((feature.kind, feature.look, feature.colour), []).append(feature)
+        elif len(feature.places_m) == 2:
+            drawn.append(_line(feature, _places(feature, view)))
+        else:
+            drawn += _sign(feature, _places(feature, view), view)
+    for (kind, look, fill), alike in areas.items():
+        # One patch, so that there is no seam between neighbours.
+        patch = PathPatch(_path_of(outlines_of(alike), view))
+        patch.set(**area_style(look, fill), zorder=kind.level)
+        drawn.append(patch)
+    drawn.sort(key=lambda artist: artist.get_zorder())
+    for artist in drawn:
+        axes.add_artist(artist)
+    return drawn
+
+
+def _places(feature: Feature, view: View) -> FloatArray:
+    height_m = feature.above_ground_m if len(feature.places_m) == 1 else 0.0
+    return view.places(_at_height(feature.places_m, height_m))
+
+
+def _at_height(places_m: Iterable[PointM], height_m: float = 0.0) -> FloatArray:
+    return np.array([(*place_m, height_m) for place_m in places_m])
+
+
+def area_style(look: Look, fill: object) -> dict[str, Any]:
+    """Return the matplotlib style of areas with a look and a fill, which may be None."""
+    line = QUIET_INK if look.line is None else look.line
+    style: dict[str, Any] = {
+        "facecolor": (*unit_interval(fill), look.opacity) if isinstance(fill, tuple) else "none",
+        "edgecolor": (*unit_interval(line), 0.4 if look.hatched else 1.0),
+        "linewidth": 0.0 if look.line is None else look.width,
+        "linestyle": "--" if look.dashed else "-",
+    }
+    return style | {"hatch": "////"} if look.hatched else style
+
+
+def _line(feature: Feature, places: FloatArray) -> Artist:
+    look, (start, end) = feature.look, places.tolist()
+    colour = unit_interval(look.line or INK)
+    if look.arrows:
+        arrow = FancyArrowPatch(start, end, arrowstyle="<->", shrinkA=0, shrinkB=0)
+        arrow.set(color=colour, linewidth=look.width, mutation_scale=14.0)
+        arrow.set_zorder(feature.kind.level)
+        return arrow
+    line = Line2D(*places.T, color=colour, linewidth=look.width, linestyle=_dashes(look))
+    line.set(solid_capstyle="butt", zorder=feature.kind.level)
+    return line
+
+
+def _dashes(look: Look) -> tuple[float, Sequence[float]] | None:
+    return (0.0, (3.0, 1.5)) if look.dashed else None
+
+
+def _sign(feature: Feature, places: FloatArray, view: View) -> list[Artist]:
+    """Return the sign of a single point, on a stem if the view shows its height."""
+    sign = Line2D(*places.T, **_sign_style(feature.kind))
+    sign.set_zorder(Kinds.CHARGE.level)
+    on_ground = view.places(np.array([(*feature.places_m[0], 0.0)]))
+    if (on_ground == places).all():
+        return [sign]
+    stem = Line2D(*np.vstack([on_ground, places]).T, color=unit_interval(INK), linewidth=0.8)
+    stem.set_zorder(Kinds.CHARGE.level - 0.05)
+    return [stem, sign]
+
+
+def _sign_style(kind: FeatureKind) -> dict[str, Any]:
+    colour = unit_interval(kind.look.line or INK)
+    if kind.look.sign == "ring":
+        style: dict[str, Any] = {"marker": "o", "markersize": 0.55 * _SIGN_PT}
+        return style | {"color": "white", "markeredgecolor": colour, "linestyle": "none"}
+    style = {"marker": "*", "markersize": _SIGN_PT, "color": colour, "linestyle": "none"}
+    return style | {"markeredgecolor": unit_interval(INK), "markeredgewidth": 0.6}
+
+
+def legend_of(features: Iterable[Feature]) -> list[Artist]:
+    """Return one legend entry per distinct feature, the topmost first."""
+    shown = {(feature.title, min(len(feature.places_m), 3)): feature for feature in features}
+    ordered = sorted(shown.values(), key=lambda feature: -feature.kind.level)
+    return [_legend_entry(feature) for feature in ordered]
+
+
+def _legend_entry(feature: Feature) -> Artist:
+    kind, look = feature.kind, feature.look
+    entry: Artist
+    if len(feature.places_m) > 2:
+        entry = Patch(**area_style(look, feature.colour))
+    elif len(feature.places_m) == 1:
+        entry = Line2D([], [], **_sign_style(kind))
+    else:
+        colour = unit_interval(look.line or INK)
+        entry = Line2D([], [], color=colour, linewidth=look.width, linestyle=_dashes(look))
+        if look.arrows:
+            entry.set(marker="D", markersize=4.0)
+    entry.set_label(feature.title)
+    return entry
+
+
+_LETTER_IN: Final = 0.075  # width of a letter in a legend; sign and gaps take that of seven
+
+
+def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
+    """Write a legend below a figure, in as many columns as fit; return its number of lines."""
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    columns = max(int(figure.get_figwidth() / (_LETTER_IN * (longest + 7))), 1)
+    lines = -(-len(handles) // columns)
+    columns = -(-len(handles) // lines)  # as few as these lines need
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
+    )
+    return lines
+
+
+def outline_path(rectangles: Sequence[Rectangle], view: View = PLAN) -> Path:
+    """Return the common outline of rectangles that do not overlap."""
+    return _path_of(outlines(rectangles), view)
+
+
+def _path_of(rings: Iterable[Sequence[PointM]], view: View) -> Path:
+    places = [view.places(_at_height(ring)) for ring in rings]
+    closed = (Path(np.vstack([each, each[:1]]), closed=True) for each in places)
+    return Path.make_compound_path(*closed)
+
+
+def draw_outlines(axes: Axes, obstacles: Iterable[Obstacle]) -> list[Artist]:
+    """Draw the outlines of structures in the colours of their roles; barriers get none."""
+    drawn: list[Artist] = []
+    for each in obstacles:
+        if not each.is_barrier:
+            patch = PathPatch(outline_path(each.boxes_m), fill=False, zorder=3.0)
+            patch.set_edgecolor(unit_interval(PROTECTED if each.protected else STRUCTURE))
+            patch.set_linewidth(2.4 if each.protected else 1.6)
+            drawn.append(axes.add_patch(patch))
+    return drawn
+
+
+def draw_loads(
+    axes: Axes,
+    obstacle: ModularObstacle,
+    scale: Normalize,
+    linewidth: float = 0.4,
+    factor: float = 1.0,
+) -> tuple[PolyCollection, LineCollection]:
+    """Draw modules in the colours of their loads; those that were not hit are white.
+
+    Args:
+        axes: The axes.
+        obstacle: The structure or barrier.
+        scale: The colour scale.
+        linewidth: Width of the modules' edges, points.
+        factor: Conversion from impulses to the unit of the scale.
+
+    Returns:
+        The modules, and the crosses on destroyed ones.
+    """
+    is_barrier = obstacle.is_barrier
+    left, bottom, right, top = np.array([part.rectangle_m for part in obstacle.parts]).T
+    corners = np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
+    modules = PolyCollection(
+        np.moveaxis(corners, 2, 0).tolist(),
+        cmap=load_colours(),
+        norm=scale,
+        edgecolor=unit_interval(BARRIER if is_barrier else STRUCTURE),
+        linewidth=2.0 * linewidth if is_barrier else linewidth,
+    )
+    crosses = LineCollection([], colors=[unit_interval(INK)], linewidths=2.0 * linewidth)
+    show_loads((modules, crosses), obstacle, factor)
+    for each in (modules, crosses):
+        axes.add_collection(each, autolim=False)
+    return modules, crosses
+
+
+def draw_enlarged(
+    axes: Axes,
+    obstacles: Sequence[ModularObstacle],
+    scale: Normalize,
+    linewidth: float,
+    factor: float = 1.0,
+) -> None:
+    """Draw the loads on the modules of structures so that they fill the axes; see `draw_loads`."""
+    for each in obstacles:
+        draw_loads(axes, each, scale, linewidth, factor)
+    draw_outlines(axes, obstacles)
+    left, bottom, right, top = Rectangle.around([each.rectangle_m for each in obstacles])
+    reach = 0.25
+    axes.set(xlim=(left - reach, right + reach), ylim=(bottom - reach, top + reach))
+    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    axes.spines[:].set_visible(False)
+
+
+def show_loads(
+    drawn: tuple[PolyCollection, LineCollection], obstacle: ModularObstacle, factor: float = 1.0
+) -> None:
+    """Update the artists of `draw_loads` to the present loads."""
+    modules, crosses = drawn
+    impulse = [factor * part.impulse for part in obstacle.parts]
+    modules.set_array(np.ma.masked_array(impulse, [part.hits == 0 for part in obstacle.parts]))
+    destroyed = [part.rectangle_m for part in obstacle.parts if part.destroyed]
+    crosses.set_segments(
+        [
+            line
+            for left, bottom, right, top in destroyed
+            for line in (((left, bottom), (right, top)), ((left, top), (right, bottom)))
+        ]
+    )
+
+
+_GAP_PT: Final = 4.0
+_SIGN_PT: Final = 13.0
+_STAR_PT: Final = 15.0
+_FAR_PT: Final = 7.0  # distance beyond which a line joins a name to its feature
+
+
+def write_names(
+    axes: Axes, features: Sequence[Feature], view: View = PLAN, *, inside: bool = True
+) -> list[Artist]:
+    """Write the labels of features inside or beside them, without overlap if possible.
+
+    Call it last: positions depend on the final layout of the figure.
+
+    Args:
+        axes: The picture of the site.
+        features: Its features, which are labelled and not to be covered.
+        view: The projection of the picture.
+        inside: Whether labels may cover their features; not if these show loads by colour.
+
+    Returns:
+        The labels, and the lines that join them to their features.
+    """
+    figure = axes.get_figure(root=True)
+    labels = labels_of(features)[::-1]  # the topmost has the first choice
+    if figure is None or not labels:
+        return []
+    texts = [_text(axes, label.text, label.feature.kind) for label in labels]
+    _lay_out(figure)
+    pixels_per_pt = figure.dpi / 72.0
+    extents = [text.get_window_extent() for text in texts]
+    settled = settled_labels(
+        features,
+        labels,
+        [(extent.width, extent.height) for extent in extents],
+        lambda each: _boxes(axes, each, view, pixels_per_pt)[0],
+        lambda each: _boxes(axes, each, view, pixels_per_pt)[1] if inside else None,
+        Rectangle(*axes.get_window_extent().extents),
+        gap=_GAP_PT * pixels_per_pt,
+        far=_FAR_PT * pixels_per_pt,
+        others=_other_texts(axes, texts),
+    )
+    to_data, written = axes.transData.inverted(), list[Artist](texts)
+    for text, each in zip(texts, settled, strict=True):
+        x, y = to_data.transform(each.place.centre).tolist()
+        text.set_position((x, y))
+        if each.leader is not None:
+            ends = to_data.transform(each.leader)
+            leader = Line2D(*ends.T, color=text.get_color(), linewidth=0.6, zorder=5.9)
+            written.append(axes.add_line(leader))
+    return written
+
+
+def _text(axes: Axes, words: str, kind: FeatureKind) -> Text:
+    protected = kind is Kinds.PROTECTED_STRUCTURE
+    colour = unit_interval(INK if kind.look.line is None else kind.look.line)
+    if kind is Kinds.STRUCTURE:
+        colour = unit_interval(INK)
+    text = axes.text(0.0, 0.0, words, ha="center", va="center", fontsize=9, color=colour, zorder=6)
+    text.set(fontweight="bold" if protected else "normal", clip_on=True)
+    text.set_path_effects([patheffects.withStroke(linewidth=3, foreground="white")])
+    text.set_in_layout(False)
+    return text
+
+
+def _lay_out(figure: Figure) -> None:
+    """Position the axes as in drawing, without the cost of drawing."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+    for axes in figure.axes:
+        axes.apply_aspect()
+
+
+def _other_texts(axes: Axes, names: Sequence[Text]) -> list[Rectangle]:
+    others = [text for text in axes.texts if text not in names and text.get_text()]
+    boxes: list[Bbox] = [text.get_window_extent() for text in others]
+    return [Rectangle(*box.extents) for box in boxes]
+
+
+def _boxes(
+    axes: Axes, feature: Feature, view: View, pixels_per_pt: float
+) -> tuple[Rectangle, Rectangle]:
+    """Return the solid part of a feature, its roof or its sign, and its bounding box, pixels."""
+    height_m = feature.properties.get("height_m", feature.above_ground_m)
+    places = view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
+    pixels = axes.transData.transform(places)
+    (left, bottom), (right, top) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+    around = Rectangle(left, bottom, right, top)
+    if len(feature.places_m) == 1:
+        around = around.grown(_STAR_PT / 2.0 * pixels_per_pt)
+    if len(feature.places_m) < 3 or view is PLAN:
+        return around, around
+    # A roof in the oblique view fills only the middle of its bounding box.
+    width, height = (right - left) / 4.0, (top - bottom) / 4.0
+    return Rectangle(left + width, bottom + height, right - width, top - height), around
+
+
+_HEADING_SHARE: Final = 0.97  # of the width of a figure
+
+
+def write_heading(figure: Figure, title: str, subtitle: str) -> None:
+    """Write the title of a figure and a subtitle."""
+    # The empty line reserves room for the subtitle, which the layout ignores.
+    heading = figure.suptitle(f"{title}\n", fontsize=14, fontweight="bold", linespacing=1.5)
+    share = heading.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
+    heading.set_fontsize(14 / max(share, 1.0))
+    line = figure.axes[0].annotate(
+        subtitle,
+        xy=(0.5, 0.12),
+        xycoords=heading,
+        ha="center",
+        va="bottom",
+        fontsize=10,
+        color=unit_interval(QUIET_INK),
+        annotation_clip=False,
+    )
+    line.set_in_layout(False)
+    share = line.get_window_extent().width / (_HEADING_SHARE * figure.bbox.width)
+    line.set_fontsize(10 / max(share, 1.0))

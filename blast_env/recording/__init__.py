@@ -1,1 +1,0 @@
-"""Tables of a blast, and their export to Excel and Parquet."""

@@ -1,0 +1,331 @@
+"""Loads by building and wall, with their durations, and the units of a report."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import UnknownNameError
+from blast_env.evaluation.engines.contract import counted_parts
+from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
+from blast_env.evaluation.engines.gas_tables import means_by_wall
+from blast_env.gas.probes import ARRIVAL_PA
+from blast_env.gas.solver import Gas
+from blast_env.geometry import Rectangle
+from blast_env.report.peaks import CountedPeak, counted_peak
+from blast_env.site import AnyStructure, Scenario
+from blast_env.site.scene import WALLS, BlastSite, WallName
+from blast_env.site.sections import buildings_of
+from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
+
+
+@dataclass(frozen=True)
+class UnitSystem:
+    """Units of loads; lengths are metres and masses kilograms in both.
+
+    Attributes:
+        name: Its name on the command line.
+        impulse: Unit of impulses.
+        pressure: Unit of overpressures.
+        pa_s_per_impulse: Pascal seconds in a unit of impulse.
+        pa_per_pressure: Pascals in a unit of pressure.
+    """
+
+    name: str
+    impulse: str
+    pressure: str
+    pa_s_per_impulse: float
+    pa_per_pressure: float
+
+    def impulse_of(self, pa_s: float) -> float:
+        """Return an impulse in Pa s in this unit."""
+        return pa_s / self.pa_s_per_impulse
+
+    def pressure_of(self, pa: float) -> float:
+        """Return a pressure in Pa in this unit."""
+        return pa / self.pa_per_pressure
+
+    @classmethod
+    def named(cls, name: str) -> "UnitSystem":
+        """Return the units of a name.
+
+        Raises:
+            UnknownNameError: If no units have that name.
+        """
+        if name not in UNITS:
+            raise UnknownNameError("units", name, UNITS)
+        return UNITS[name]
+
+
+UNITS: Final[Mapping[str, UnitSystem]] = MappingProxyType(
+    {
+        each.name: each
+        for each in (
+            UnitSystem("si", "Pa·s", "kPa", 1.0, PA_PER_KPA),
+            UnitSystem("psi", "psi·ms", "psi", PA_PER_PSI / MS_PER_S, PA_PER_PSI),
+        )
+    }
+)
+"""The units by their names."""
+
+
+@dataclass(frozen=True)
+class ReportedBuilding:
+    """A building: one structure, or several that form it.
+
+    Attributes:
+        name: Its name.
+        structures: The structures.
+    """
+
+    name: str
+    structures: tuple[AnyStructure, ...]
+
+    @property
+    def protected(self) -> bool:
+        """Whether its load counts."""
+        return any(each.protected for each in self.structures)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its structures."""
+        return tuple(each.name for each in self.structures)
+
+    @property
+    def height_m(self) -> float | None:
+        """Its height; `None` for as high as the air."""
+        heights = [each.height_m for each in self.structures]
+        known = [height_m for height_m in heights if height_m is not None]
+        return max(known) if len(known) == len(heights) else None
+
+    @property
+    def bounds_m(self) -> Rectangle:
+        """The rectangle around it."""
+        sides = np.array([each.rectangle_m for each in self.structures])
+        low, high = sides.min(axis=0), sides.max(axis=0)
+        return Rectangle(float(low[0]), float(low[1]), float(high[2]), float(high[3]))
+
+
+def targets_of(scenario: Scenario) -> tuple[ReportedBuilding, ...]:
+    """Return the buildings of a scenario, protected ones first."""
+    together = buildings_of(scenario.structures)
+    targets = [ReportedBuilding(name, tuple(parts)) for name, parts in together.items()]
+    return tuple(sorted(targets, key=lambda each: not each.protected))
+
+
+class WallHistories:
+    """Recorder of the mean overpressure on every wall of every building.
+
+    Args:
+        targets: The buildings.
+        site: Their site.
+    """
+
+    def __init__(self, targets: Sequence[ReportedBuilding], site: BlastSite) -> None:
+        self._targets, self._site = tuple(targets), site
+        self._members: dict[tuple[str, WallName], _Members] | None = None
+        self._times: list[float] = []
+        self._means: list[list[float]] = []
+
+    def record(self, solver: Gas, step_s: float) -> None:
+        """Add a step; its pressures are means over it."""
+        if self._members is None:
+            self._members = self._walls(solver)
+        pressure = solver.wall_overpressure_pa()
+        self._times.append(solver.time_s - 0.5 * step_s)
+        self._means.append(
+            [float((share * pressure[own]).mean()) for own, share in self._members.values()]
+        )
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Middles of the steps (steps,)."""
+        return np.array(self._times)
+
+    def of(self, target: str, wall: WallName) -> FloatArray | None:
+        """Return the mean overpressure on a wall, Pa (steps,); `None` for one without air."""
+        keys = list(self._members or ())
+        if (target, wall) not in keys:
+            return None
+        return np.array(self._means)[:, keys.index((target, wall))]
+
+    def _walls(self, solver: Gas) -> dict[tuple[str, WallName], "_Members"]:
+        from blast_env.gas.engine import face_table_of  # Numba takes half a second
+
+        table = face_table_of(solver.grid, self._site)
+        names = [each.name for each in self._site.structures]
+        members = {}
+        for target in self._targets:
+            for index, wall in enumerate(WALLS):
+                parts = [
+                    names.index(each.name)
+                    for each in target.structures
+                    if wall in each.faces and each.name in names
+                ]
+                chosen = np.flatnonzero(np.isin(table.structure, parts) & (table.face == index))
+                if len(chosen):
+                    share = table.share[chosen]
+                    members[target.name, wall] = _Members(chosen, share / share.mean())
+        return members
+
+
+class _Members(NamedTuple):
+    """The faces of a wall, and their weights in its mean, 1 on average."""
+
+    faces: NDArray[np.int64]
+    share: FloatArray
+
+
+@dataclass(frozen=True)
+class TargetLoad:
+    """The load on a building, over its counted walls.
+
+    Attributes:
+        target: Its name.
+        impulse_pa_s: Peak specific impulse, mean over the area of the walls.
+        peak_pa: Largest overpressure on a face of a cell.
+        counted: The peak to compare with limits.
+        arrival_s: Arrival of the wave; NaN if none arrives.
+        wall: The wall with the largest impulse.
+        wall_impulse_pa_s: Impulse on it, mean.
+        duration_s: Duration of the first positive phase of the mean overpressure on it; NaN if no
+            wave arrives or the run ends before.
+        known: Whether these impulses were known when the run ended.
+        flagged: Whether there is a note on them.
+    """
+
+    target: str
+    impulse_pa_s: float
+    peak_pa: float
+    counted: CountedPeak
+    arrival_s: float
+    wall: WallName
+    wall_impulse_pa_s: float
+    duration_s: float
+    known: bool
+    flagged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredBlast:
+    """A blast with the loads on buildings.
+
+    Attributes:
+        result: The blast.
+        histories: Mean overpressures on walls.
+        targets: The buildings.
+    """
+
+    result: GasResult
+    histories: WallHistories
+    targets: tuple[ReportedBuilding, ...]
+
+    @cached_property
+    def loads(self) -> dict[str, TargetLoad]:
+        """The load on every building with a wall in the air, by name."""
+        faces = self.result.on_walls
+        loads = {}
+        for target in self.targets:
+            counting = [
+                (faces["structure"] == each.name) & faces["face"].isin(each.faces)
+                for each in counted_parts(target.structures)
+            ]
+            walls = faces[np.logical_or.reduce(counting)]
+            if len(walls):
+                loads[target.name] = self._load(target, walls)
+        return loads
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Notes on loads outside the validated range of the engine, and on loads not captured.
+
+        The checked range counts for protected buildings alone, capture for all.
+        """
+        names = (name for each in self.targets if each.protected for name in each.names)
+        notes = [note for name in names for note in self.result.impulse(name).notes]
+        late = [name for name, load in self.loads.items() if not load.known]
+        notes += [f"{name}: {NOT_KNOWN}" for name in late]
+        notes += self.result.stepped_notes
+        return tuple(dict.fromkeys(notes))
+
+    def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:
+        by_wall = means_by_wall(walls, "impulse_pa_s")
+        building = next(
+            each
+            for each in self.result.buildings.to_dict("records")
+            if each["building"] == target.name
+        )
+        wall = next(each for each in WALLS if each == by_wall.idxmax())
+        arrivals = walls["arrival_s"].to_numpy()
+        known = self._is_known(target, wall)
+        in_range = all(self.result.impulse(name).in_range for name in target.names)
+        return TargetLoad(
+            target=target.name,
+            impulse_pa_s=float(building["impulse_pa_s"]),
+            peak_pa=float(walls["peak_pa"].max()),
+            counted=counted_peak(self.result.run.site, self.result.run.grid.cell_m, walls),
+            arrival_s=float(np.nanmin(arrivals)) if np.isfinite(arrivals).any() else float("nan"),
+            wall=wall,
+            wall_impulse_pa_s=float(by_wall.max()),
+            duration_s=self._duration_s(target.name, wall),
+            known=known,
+            flagged=not (known and in_range),
+        )
+
+    def _is_known(self, target: ReportedBuilding, wall: WallName) -> bool:
+        buildings, walls = self.result.buildings, self.result.walls
+        on_building = buildings.loc[buildings["building"] == target.name, "known"]
+        on_wall = walls["structure"].isin(target.names) & (walls["face"] == wall) & walls["counts"]
+        return bool(on_building.all() and walls.loc[on_wall, "known"].all())
+
+    def _duration_s(self, target: str, wall: WallName) -> float:
+        pressure = self.histories.of(target, wall)
+        if pressure is None:
+            return float("nan")
+        return first_phase_s(self.histories.time_s, pressure)
+
+
+_NO_PHASE: Final = float("nan")
+
+
+def first_phase_s(time_s: FloatArray, overpressure_pa: FloatArray) -> float:
+    """Return the duration of the first positive phase that reaches 1 kPa, s.
+
+    The phase starts at the last value of at most 0 before 1 kPa. NaN if there is none, or it does
+    not end.
+    """
+    arrived = np.flatnonzero(overpressure_pa >= ARRIVAL_PA)
+    if len(arrived) == 0:
+        return _NO_PHASE
+    before = np.flatnonzero(overpressure_pa[: arrived[0]] <= 0.0)
+    after = np.flatnonzero(overpressure_pa[arrived[0] :] <= 0.0)
+    if len(after) == 0:
+        return _NO_PHASE
+    first = before[-1] if len(before) else 0
+    return _zero_s(time_s, overpressure_pa, int(arrived[0] + after[0])) - float(time_s[first])
+
+
+def _zero_s(time_s: FloatArray, pressure_pa: FloatArray, index: int) -> float:
+    """Return the time at which a pressure falls to 0 in the step before an index, s."""
+    high, low = pressure_pa[index - 1], pressure_pa[index]
+    share = high / (high - low)
+    return float(time_s[index - 1] + share * (time_s[index] - time_s[index - 1]))
+
+
+def measure(
+    blast: GasBlast,
+    targets: Sequence[ReportedBuilding],
+    progress: Callable[[float], None] | None = None,
+) -> MeasuredBlast:
+    """Run a blast and return the loads on buildings."""
+    histories = WallHistories(targets, blast.site)
+    from blast_env.gas.probes import GroundMap  # Numba takes half a second to import
+
+    result = blast.run(progress, lambda grid: (histories, GroundMap(grid)))
+    return MeasuredBlast(result, histories, tuple(targets))

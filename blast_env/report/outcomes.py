@@ -1,0 +1,189 @@
+"""Results of the blasts of a report, and the user's limits of loads on buildings.
+
+This module has no model of damage: judging loads takes knowledge of the building.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Self
+
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation.grid_error import convergence_index
+from blast_env.gas.settings import Cells
+from blast_env.geometry import Layout, Rectangle
+from blast_env.report.loads import ReportedBuilding, TargetLoad, UnitSystem
+from blast_env.report.threats import NamedCharge
+from blast_env.statistics import reductions
+from blast_env.values import plain_number
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The limits of the loads on a building.
+
+    Attributes:
+        target: Name of the building.
+        impulse_pa_s: Largest impulse on its most loaded wall; infinite without a limit.
+        peak_pa: Largest overpressure, see `blast_env.report.peaks`; infinite without a limit.
+    """
+
+    target: str
+    impulse_pa_s: float = inf
+    peak_pa: float = inf
+
+    @classmethod
+    def parsed(cls, text: str, units: UnitSystem) -> "Limit":
+        """Return the limit of a text such as `school=200,40`.
+
+        Args:
+            text: NAME=IMPULSE,PEAK; one of the two may be left out.
+            units: The units of both.
+
+        Raises:
+            BlastEnvError: If the text has another form, or a value is not above 0.
+        """
+        name, sign, values = text.partition("=")
+        parts = values.split(",")
+        try:
+            impulse, peak = (
+                plain_number("--limit", part.strip()) if part.strip() else inf
+                for part in (*parts, "")[:2]
+            )
+        except BlastEnvError:
+            impulse = peak = -1.0
+        if not (name and sign) or len(parts) > 2 or not (impulse > 0.0 and peak > 0.0):
+            raise BlastEnvError(
+                f"--limit is {text!r}, must be NAME=IMPULSE,PEAK with values above 0 in "
+                f"{units.impulse} and {units.pressure}; one of them may be left out"
+            )
+        if not (isfinite(impulse) or isfinite(peak)):
+            raise BlastEnvError(f"--limit is {text!r}, without any limit")
+        return cls(name, impulse * units.pa_s_per_impulse, peak * units.pa_per_pressure)
+
+    def is_kept(self, load: TargetLoad) -> bool:
+        """Return whether a load is within the limit."""
+        return load.wall_impulse_pa_s <= self.impulse_pa_s and load.counted.pa <= self.peak_pa
+
+
+def check_limits(limits: Sequence[Limit], targets: Sequence[ReportedBuilding]) -> None:
+    """Refuse limits of unknown buildings, and two limits of one building.
+
+    Raises:
+        UnknownNameError: If there is no such building.
+        BlastEnvError: If there are two limits of one.
+    """
+    names = [each.name for each in targets]
+    for index, limit in enumerate(limits):
+        if limit.target not in names:
+            raise UnknownNameError("building", limit.target, names)
+        if limit.target in [each.target for each in limits[:index]]:
+            raise BlastEnvError(f"--limit appears twice for {limit.target!r}")
+
+
+@dataclass(frozen=True)
+class LoadPair:
+    """Loads on a building under a threat, without and with the layout.
+
+    Attributes:
+        target: The building.
+        threat: The threat.
+        cells: The cells.
+        bare: Without the layout.
+        walled: With it.
+    """
+
+    target: ReportedBuilding
+    threat: NamedCharge
+    cells: Cells
+    bare: TargetLoad
+    walled: TargetLoad
+
+    @property
+    def reduction(self) -> float:
+        """Share of the impulse that is gone; NaN if there is none."""
+        return reductions(self.walled.impulse_pa_s, self.bare.impulse_pa_s).item()
+
+
+@dataclass(frozen=True)
+class LoadErrors:
+    """Errors of the cells of the impulses on a building under a threat.
+
+    Attributes:
+        bare_pa_s: Of the impulse without the layout.
+        walled_pa_s: Of that with it.
+        reduction: Of its reduction, an absolute share.
+    """
+
+    bare_pa_s: float
+    walled_pa_s: float
+    reduction: float
+
+    @classmethod
+    def of(cls, fine: LoadPair, coarse: LoadPair, ratio: float) -> Self:
+        """Return the errors from the loads with two sizes of cells.
+
+        Args:
+            fine: The loads with the finer cells.
+            coarse: The same with the coarser ones.
+            ratio: Side of the coarser cells over that of the finer ones.
+        """
+        pairs = (
+            (fine.bare.impulse_pa_s, coarse.bare.impulse_pa_s),
+            (fine.walled.impulse_pa_s, coarse.walled.impulse_pa_s),
+            (fine.reduction, coarse.reduction),
+        )
+        return cls(*(convergence_index(*each, ratio) for each in pairs))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The weighted impulse on the protected structures under one charge or layout.
+
+    Attributes:
+        name: Name of the charge, or of the layout.
+        words: Further words on it.
+        bare_pa_s: Impulse without the layout.
+        walled_pa_s: Impulse with it.
+    """
+
+    name: str
+    words: str
+    bare_pa_s: float
+    walled_pa_s: float
+
+    @property
+    def reduction(self) -> float:
+        """Share of the impulse that is gone; NaN if there is none."""
+        return reductions(self.walled_pa_s, self.bare_pa_s).item()
+
+
+@dataclass(frozen=True)
+class ItemWorth:
+    """The worth of one module or piece of the layout.
+
+    Attributes:
+        name: Its row and column, and its item if it is a piece.
+        rectangle_m: The ground that it covers.
+        worth: Growth of the impulse if it is left out, as a share of the impulse without a barrier,
+            mean over the threats; below 0 if the layout is better without it.
+    """
+
+    name: str
+    rectangle_m: Rectangle
+    worth: float
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """A layout of a front.
+
+    Attributes:
+        layout: Its modules or pieces.
+        cost: Its cost.
+        reduction: Reduction of the impulse, as a share, mean over the threats.
+    """
+
+    layout: Layout
+    cost: float
+    reduction: float

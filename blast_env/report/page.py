@@ -1,0 +1,414 @@
+"""The report as self-contained HTML, and as PDF."""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
+from math import isfinite, isnan
+from pathlib import Path
+from typing import Any, Final
+from warnings import catch_warnings, filterwarnings
+
+import numpy as np
+import tomli_w
+
+from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation.consequences import verdict_word
+from blast_env.evaluation.engines.bays import bay_rows
+from blast_env.evaluation.grid_error import FACTOR, ORDER
+from blast_env.files import scratch_folder, write_atomically
+from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
+from blast_env.geometry import layout_counts, layout_text
+from blast_env.layout import write_layout
+from blast_env.plots.plan import stand_off_text
+from blast_env.provenance import code_version, command, versions
+from blast_env.report.figures import (
+    front_figure,
+    mass_figure,
+    place_figure,
+    site_plan,
+    worth_map,
+)
+from blast_env.report.loads import TargetLoad, UnitSystem
+from blast_env.report.outcomes import LoadErrors, LoadPair
+from blast_env.report.peaks import PeakSource
+from blast_env.report.study import Study
+from blast_env.report.threats import other_places
+from blast_env.report.verdict import ReportVerdict, verdict_of
+from blast_env.response.buildings import BuildingDamage
+from blast_env.tables import table_records
+from blast_env.units import MS_PER_S, PA_PER_KPA
+
+with import_extra("report", "reports"):
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+HTML_SUFFIXES: Final = (".html", ".htm")
+_TEMPLATE: Final = "report.html.j2"
+_NONE: Final = "\N{EN DASH}"
+_MINUS: Final = "\N{MINUS SIGN}"
+_PLUS_MINUS: Final = "\N{PLUS-MINUS SIGN}"
+_LIBRARIES: Final = ("numpy", "numba", "scipy", "matplotlib")
+_HASH_DIGITS: Final = 16
+_MOST_BAYS: Final = 40
+
+
+def write_report(
+    study: Study, html: str | Path, pdf: str | Path | None = None, commands: list[str] | None = None
+) -> list[Path]:
+    """Write a report.
+
+    Args:
+        study: Its content.
+        html: The page: one file, with its pictures inside.
+        pdf: The same as PDF, if requested.
+        commands: The command that made it; by default the command line of this process.
+
+    Returns:
+        The files.
+
+    Raises:
+        BlastEnvError: If a suffix is wrong, a file cannot be written, or WeasyPrint lacks its
+            libraries; the page is written before the PDF.
+    """
+    check_targets(html, pdf)
+    page = report_html(study, command() if commands is None else commands)
+    with write_atomically(html) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    if pdf is None:
+        return [Path(html)]
+    with write_atomically(pdf) as temporary:
+        _weasyprint().HTML(string=page).write_pdf(str(temporary))
+    return [Path(html), Path(pdf)]
+
+
+def check_targets(html: str | Path, pdf: str | Path | None) -> None:
+    """Refuse unusable files before any blast is run.
+
+    Raises:
+        BlastEnvError: If a suffix is wrong, or a PDF is requested without WeasyPrint.
+    """
+    if Path(html).suffix.lower() not in HTML_SUFFIXES:
+        raise BlastEnvError(f"{html}: suffix is {Path(html).suffix!r}, must be .html")
+    if pdf is not None:
+        if Path(pdf).suffix.lower() != ".pdf":
+            raise BlastEnvError(f"{pdf}: suffix is {Path(pdf).suffix!r}, must be .pdf")
+        _weasyprint()
+
+
+def _weasyprint() -> Any:
+    """Return the package that makes PDF; it needs libraries of the system, Pango above all."""
+    with import_extra("report", "PDF"), catch_warnings():
+        # WeasyPrint's hint to packagers; without that library, embedded fonts are only larger.
+        filterwarnings("ignore", "HarfBuzz-Subset", DeprecationWarning)
+        try:
+            import weasyprint
+        except OSError as error:
+            raise BlastEnvError(
+                f"no PDF: WeasyPrint lacks a library of the system ({error}); install Pango, or "
+                "print the HTML page from a browser"
+            ) from error
+    return weasyprint
+
+
+def report_html(study: Study, commands: list[str]) -> str:
+    """Return the report as one HTML page."""
+    environment = Environment(
+        loader=PackageLoader("blast_env.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    units = study.options.units
+    environment.filters |= {
+        "impulse": lambda pa_s: _number(units.impulse_of(pa_s)),
+        "pressure": lambda pa: _number(units.pressure_of(pa)),
+        "counted": lambda load: _counted(load, units),
+        "word": lambda passes, flagged: verdict_word(passes, flagged).lower(),
+        "percent": _percent,
+        "impulse_error": lambda pa_s: _error(units.impulse_of(pa_s)),
+        "share_error": lambda share: _error(100.0 * share, 1),
+        "points": _points,
+        "ms": lambda time_s: _number(MS_PER_S * time_s),
+        "money": lambda cost: f"{cost:,.10g}",
+        "picture": lambda png: f"data:image/png;base64,{b64encode(png).decode()}",
+    }
+    return environment.get_template(_TEMPLATE).render(_context(study, commands))
+
+
+def _context(study: Study, commands: list[str]) -> dict[str, Any]:
+    scenario, options = study.scenario, study.options
+    coarse, fine = options.cells
+    protected = [each for each in study.targets if each.protected]
+    layout_json = _layout_file(study)
+    places = [
+        each.against(scenario, study.layout) for each in other_places(scenario, options.places)
+    ]
+    verdict, summary = verdict_of(study), _summary(study)
+    return {
+        "study": study,
+        "scenario": scenario,
+        "units": options.units,
+        "fine": fine,
+        "coarse_words": options.words[0],
+        "fine_words": options.words[1],
+        "protected": protected,
+        "others": [each for each in study.targets if not each.protected],
+        "plan": site_plan(scenario, study.threats, study.layout),
+        "place_texts": {
+            each.name: each.place_text(scenario, study.layout) for each in study.threats
+        },
+        "stand_off": stand_off_text(scenario, study.layout),
+        "summary": summary,
+        "verdict": verdict,
+        "sources": _sources(study, verdict, summary),
+        "standing": _standing(verdict),
+        "spread": _spread(study),
+        "noun": study.scenario.objective.noun,
+        "bay_tables": _bay_tables(study),
+        "two_sizes": coarse != fine,
+        "cells": " and ".join(dict.fromkeys(options.words)),
+        "grid_error": study.grid_error,
+        "index": {"ratio": options.ratio, "factor": FACTOR, "order": ORDER},
+        "worth_map": worth_map(scenario, study.items) if study.items else None,
+        "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
+        "place_figure": place_figure(scenario, places, study.places) if study.places else None,
+        "front_figure": _front(study) if study.front else None,
+        "checked": CHECKED_SCALED_DISTANCE,
+        "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "command": " ".join(_quoted(part) for part in commands),
+        "versions": versions(options.coarse.version, _LIBRARIES) | {"code": code_version()},
+        "scenario_toml": tomli_w.dumps(scenario.model_dump(mode="json", exclude_none=True)),
+        "layout_json": layout_json,
+        "layout_hash": sha256(layout_json.encode()).hexdigest()[:_HASH_DIGITS],
+        "layout_words": layout_counts(study.layout),
+        "texts": [layout_text(each.layout) for each in study.front],
+        "bill": table_records(study.bill),
+    }
+
+
+@dataclass(frozen=True)
+class SummaryLine:
+    """The effect of a layout on one building, over all threats, with the finer cells.
+
+    Attributes:
+        name: The building.
+        worst: The threat with the largest impulse with the layout.
+        least: Smallest reduction of its impulse under a threat.
+        most: Largest reduction.
+        errors: Errors of the cells of the impulses under the worst threat.
+        error: Largest error of the cells of a reduction.
+    """
+
+    name: str
+    worst: LoadPair
+    least: float
+    most: float
+    errors: LoadErrors
+    error: float
+
+
+def _summary(study: Study) -> list[SummaryLine]:
+    fine = study.options.cells[1]
+    lines = []
+    for target in study.targets:
+        own = [
+            each
+            for each in study.pairs
+            if each.target.name == target.name and each.cells == fine and target.protected
+        ]
+        if own:
+            gone = [each.reduction for each in own]
+            worst = max(own, key=lambda each: each.walled.impulse_pa_s)
+            error = max(study.errors(each).reduction for each in own)
+            ends = float(min(gone)), float(max(gone))
+            lines.append(SummaryLine(target.name, worst, *ends, study.errors(worst), error))
+    return lines
+
+
+def _standing(verdict: ReportVerdict) -> str:
+    if verdict.barrier is None:
+        return ""
+    counts = verdict.barrier.pieces["outcome"].value_counts()
+    return ", ".join(f"{number} {word}" for word, number in counts.items())
+
+
+def _spread(study: Study) -> tuple[float, float] | None:
+    outcomes = [each for own in study.masses.values() for each in own]
+    shares = [each.reduction for each in (*outcomes, *study.places)]
+    found = [share for share in shares if isfinite(share)]
+    return (min(found), max(found)) if found else None
+
+
+@dataclass(frozen=True)
+class BayTable:
+    """The bays of a building under a threat, those with the most severe panes first.
+
+    Attributes:
+        title: Building and charge.
+        rows: Bay; then, without the layout and with it: share of panes that break, their
+            condition, damage of the wall panel.
+        left_out: Number of bays left out.
+    """
+
+    title: str
+    rows: tuple[tuple[str, ...], ...]
+    left_out: int
+
+
+def _bay_tables(study: Study) -> list[BayTable]:
+    tables = []
+    for bare, walled in zip(study.bare.responses, study.walled.responses, strict=True):
+        both = list(zip(bay_rows(bare.facade), bay_rows(walled.facade), strict=True))
+        # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
+        both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
+        rows = tuple(
+            (str(first["bay"]), *(text for each in (first, second) for text in _bay_texts(each)))
+            for first, second in both[:_MOST_BAYS]
+        )
+        x_m, y_m = walled.charge.position_m
+        title = f"{walled.building}, {walled.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
+        tables.append(BayTable(title, rows, len(both) - len(rows)))
+    return tables
+
+
+def _share(row: Mapping[str, object]) -> float:
+    share = float(str(row["break_probability"]))
+    return -1.0 if isnan(share) else share
+
+
+def _bay_texts(row: Mapping[str, object]) -> tuple[str, str, str]:
+    return (
+        _percent(float(str(row["break_probability"]))),
+        str(row["condition"]) or _NONE,
+        str(row["damage"]) or _NONE,
+    )
+
+
+Source = tuple[str, str, str]
+"""A number of the summary: its name, its value and its source."""
+
+
+def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine]) -> list[Source]:
+    """Return every number of the summary with its source."""
+    units, fine = study.options.units, study.options.words[1]
+    digests = dict(study.digests)
+
+    def blasts(words: str) -> str:
+        found = (
+            f"{each.name}: {digests[f'{each.name} {words}, {fine}'][:_HASH_DIGITS]}"
+            for each in study.threats
+        )
+        return "blast " + ", ".join(found)
+
+    sides = (("without", "without a barrier"), ("with the layout", "with the layout"))
+    found: list[Source] = []
+    for each in verdict.buildings:
+        for number, (words, of_blast) in enumerate(sides):
+            where = f"worst of the threats; {blasts(of_blast)}; response of its bays"
+            values = (
+                ("level of protection", each.levels[number]),
+                ("panes that break", f"{each.broken[number]:.1f} of {each.panes}"),
+                ("panels that fail", f"{each.failed[number]} of {each.panels}"),
+            )
+            found += [(f"{each.name}, {words}: {what}", value, where) for what, value in values]
+    for line in summary:
+        for words, of_blast, load, error in (
+            (*sides[0], line.worst.bare, line.errors.bare_pa_s),
+            (*sides[1], line.worst.walled, line.errors.walled_pa_s),
+        ):
+            label = f"{line.worst.threat.name} {of_blast}, {fine}"
+            where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
+            impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
+            impulse += _of_cells(_error(units.impulse_of(error)))
+            peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
+            found.append((f"{line.name}, {words}: impulse", impulse, where))
+            found.append((f"{line.name}, {words}: peak", peak, where))
+        span = f"{_percent(line.least)} to {_percent(line.most)}"
+        span += _of_cells(_error(100.0 * line.error, 1))
+        found.append((f"{line.name}: reduction", span, "1 - impulse with / without, all threats"))
+    found.append(("cost of the layout", f"{study.cost:,.10g}", "bill of quantities"))
+    if isfinite(study.grid_error):
+        found.append(
+            (
+                "error of the cells",
+                _percent(study.grid_error),
+                "grid convergence index, the largest of all reductions",
+            )
+        )
+    if verdict.barrier is not None:
+        where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
+        found.append(("pieces of the barrier", _standing(verdict), where))
+    for neighbour in study.walled.worst_neighbours:
+        share = _percent(neighbour.probability[BuildingDamage.MAJOR])
+        where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "
+        where += f"{_number(neighbour.impulse_pa_s)} Pa s; {blasts(sides[1][1])}"
+        found.append((f"{neighbour.building}, a house there: major damage", share, where))
+    return found
+
+
+def _front(study: Study) -> bytes:
+    """Return the figure of the front with the layout of the report, on the same cells."""
+    weighted = []
+    for threat in study.threats:
+        outcomes = {each.name: each for each in study.masses[threat.name]}
+        own = outcomes.get(f"{threat.charge.tnt_kg:g} kg")
+        if own is not None:
+            weighted.append(own.reduction)
+    if not weighted:
+        raise AssertionError(f"no threat was run with {study.options.words[0]}")
+    return front_figure(study.front, (study.cost, float(np.mean(weighted))), len(weighted))
+
+
+def _number(value: float) -> str:
+    """Return a number with three significant digits, or a dash if it is not finite."""
+    if not isfinite(value):
+        return _NONE
+    if value == 0.0:
+        return "0"
+    digits = max(0, 2 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:,.{digits}f}".replace("-", _MINUS)
+
+
+def _error(value: float, digits: int | None = None) -> str:
+    """Return an error with its sign, with two significant digits or the given decimals.
+
+    Empty if it is not finite.
+    """
+    if not isfinite(value):
+        return ""
+    if digits is None:
+        digits = max(0, 1 - int(np.floor(np.log10(value)))) if value > 0.0 else 0
+    return f" {_PLUS_MINUS} {value:,.{digits}f}"
+
+
+def _of_cells(error: str) -> str:
+    return error and f"{error} (cells)"
+
+
+def _counted(load: TargetLoad, units: UnitSystem) -> str:
+    """Return the peak to compare with limits, and its source."""
+    peak, source = _number(units.pressure_of(load.counted.pa)), load.counted.source
+    if source is PeakSource.GAS:
+        return f"{peak} ({source})"
+    return f"{peak} ({source}; gas {_number(units.pressure_of(load.peak_pa))})"
+
+
+def _percent(share: float) -> str:
+    return _NONE if isnan(share) else f"{100.0 * share:.1f} %".replace("-", _MINUS)
+
+
+def _points(share: float) -> str:
+    return f"{100.0 * share:+.2f}".replace("-", _MINUS)
+
+
+def _layout_file(study: Study) -> str:
+    """Return the content of the layout's file, as commands read it."""
+    with scratch_folder() as folder:
+        path = write_layout(folder / "layout.json", study.scenario, study.layout)
+        return path.read_text(encoding="utf-8")
+
+
+def _quoted(part: str) -> str:
+    return f'"{part}"' if " " in part else part

@@ -1,0 +1,67 @@
+"""The peak to compare with a limit: cells clip peaks, and clipping must not keep a limit.
+
+On a face in sight of the charge, the larger of the peak on its cells and Kingery and Bulmash's
+reflected peak counts: that of a hemispherical burst at normal incidence, whatever the angle and the
+height of the charge, which is conservative. On other faces, the peak on the cells is multiplied by
+the possible clipping (`peak_factor`), up to the curve, since an obstacle adds nothing to the wave
+in the open. If the cells alone exceed the curve, as between walls, it is no bound.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import pandas as pd
+
+from blast_env.particles.calibration.references import largest_reflected_peak_pa
+from blast_env.response.facade import peak_factor
+from blast_env.site.scene import BlastSite
+from blast_env.site.sight import in_sight
+
+
+class PeakSource(StrEnum):
+    """The sources of a peak, in the words of a report."""
+
+    GAS = "gas"
+    CURVE = "Kingery-Bulmash reflected"
+    EXTRAPOLATED = "gas, extrapolated from the cells"
+
+
+@dataclass(frozen=True)
+class CountedPeak:
+    """The peak on a building to compare with limits.
+
+    Attributes:
+        pa: The peak.
+        source: Its source.
+    """
+
+    pa: float
+    source: PeakSource
+
+
+def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> CountedPeak:
+    """Return the largest of the counted peaks on faces of cells.
+
+    Args:
+        site: The site with the barrier.
+        cell_m: Side of the cells.
+        faces: The faces, as in `GasResult.on_walls`; at least one.
+    """
+    charge = site.charge
+    points_m = faces[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
+    outward = np.zeros((len(faces), 3))
+    outward[:, :2] = faces[["outward_x", "outward_y"]]
+    seen = in_sight(site, points_m, outward)
+    away_m = np.linalg.norm(points_m - [*charge.position_m, charge.height_m], axis=1)
+    gas_pa = faces["peak_pa"].to_numpy(dtype=np.float64)
+    curve_pa = largest_reflected_peak_pa(away_m, charge.tnt_kg)
+    grown_pa = peak_factor(cell_m, charge.tnt_kg) * gas_pa
+    bounded = gas_pa <= curve_pa
+    hidden_pa = np.where(bounded, np.minimum(grown_pa, curve_pa), grown_pa)
+    counted_pa = np.where(seen, np.maximum(gas_pa, curve_pa), hidden_pa)
+    which = int(counted_pa.argmax())
+    source = PeakSource.GAS if seen[which] else PeakSource.EXTRAPOLATED
+    if bounded[which] and counted_pa[which] == curve_pa[which]:
+        source = PeakSource.CURVE
+    return CountedPeak(float(counted_pa[which]), source)

@@ -1,0 +1,630 @@
+"""The study behind a report: its blasts and their results."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from blast_env.arrays import FloatArray
+from blast_env.documents import parse_csv, read_text
+from blast_env.errors import BlastEnvError, shortened
+from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.evaluation.consequences import Consequences, consequences_of
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.governing import Severity
+from blast_env.gas.settings import Cells
+from blast_env.geometry import Element, Layout, Piece, layout_text, standing
+from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
+from blast_env.layout import Placement, check_layout
+from blast_env.report.figures import (
+    Picture,
+    blast_pictures,
+    damage_pictures,
+    film_stills,
+    risk_picture,
+)
+from blast_env.report.loads import (
+    UNITS,
+    MeasuredBlast,
+    ReportedBuilding,
+    UnitSystem,
+    measure,
+    targets_of,
+)
+from blast_env.report.outcomes import (
+    FrontPoint,
+    ItemWorth,
+    Limit,
+    LoadErrors,
+    LoadPair,
+    Outcome,
+    check_limits,
+)
+from blast_env.report.threats import (
+    NamedCharge,
+    asked_threats,
+    chief_threats,
+    other_masses,
+    other_places,
+)
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.site import AnyCharge, Scenario
+from blast_env.statistics import reductions
+
+MOST_THREATS: Final = 6
+MOST_FRONT: Final = 30
+_MASSES: Final = (0.5, 2.0)
+_BARE, _WALLED = "without a barrier", "with the layout"
+_FILM, _MASSES_PART, _ITEMS, _PLACES, _FRONT = (
+    *("film", "other masses", "without each item", "other places", "front"),
+)
+
+
+def final_cells(scenario: Scenario) -> tuple[Cells, Cells]:
+    """Return the coarser and the finer cells of a report on a site, by `GasEngine.final`."""
+    fine = GasEngine().final([scenario])
+    return ("coarse", "fine") if fine.is_growing else (2.0 * fine.cell_m, fine.cell_m)
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """The scope and the resolution of a study.
+
+    Attributes:
+        charges: The threats; without any, the worst of the places of each source.
+        most_threats: Greatest number of such threats, 1 to 6.
+        cells: Two sides of cells in m, the coarser one first: their loads show the error of the
+            grid. Twice the same is one size, without that error. For large sites "coarse" and
+            "fine", which grow.
+        limits: Limits of the loads on buildings.
+        target: Level of protection that buildings with facades must reach; `None` for that of the
+            scenario's objective, or low if it has none.
+        units: Units of loads.
+        front: CSV file of a search with the layouts of a front.
+        places: Number of places of each source in the sensitivity study.
+        items: Whether to rank the worth of each module or piece.
+        stills: Number of moments of the film.
+        processes: Worker processes of blasts that need no pictures.
+        cache: Folder of the loads of those blasts.
+
+    Raises:
+        BlastEnvError: If an option is out of bounds.
+    """
+
+    charges: tuple[AnyCharge, ...] = ()
+    most_threats: int = 2
+    cells: tuple[Cells, Cells] = (0.5, 0.25)
+    limits: tuple[Limit, ...] = ()
+    target: LevelOfProtection | None = None
+    units: UnitSystem = field(default_factory=lambda: UNITS["si"])
+    front: Path | None = None
+    places: int = 5
+    items: bool = True
+    stills: int = 4
+    processes: int = 1
+    cache: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        for name, value, low, high in (
+            ("threats", self.most_threats, 1, MOST_THREATS),
+            ("charges", len(self.charges), 0, MOST_THREATS),
+            ("places", self.places, 1, 50),
+            ("stills", self.stills, 0, 12),
+        ):
+            if not low <= value <= high:
+                raise BlastEnvError(f"{name} is {value}, must be {low} to {high}")
+        coarse, fine = (GasEngine.with_cells(each) for each in self.cells)
+        if not coarse.smallest_m >= fine.smallest_m:
+            raise BlastEnvError(
+                f"cells are {coarse.smallest_m:g} m and {fine.smallest_m:g} m, must be two sizes, "
+                "the coarser one first"
+            )
+
+    @property
+    def sizes(self) -> tuple[Cells, ...]:
+        """The cells, each once."""
+        return tuple(dict.fromkeys(self.cells))
+
+    @property
+    def ratio(self) -> float:
+        """Side of the coarser cells over that of the finer ones; 1 for one size."""
+        coarse, fine = (GasEngine.with_cells(each).smallest_m for each in self.cells)
+        return coarse / fine
+
+    @property
+    def coarse(self) -> GasEngine:
+        """The engine of the blasts without pictures, with the coarser cells."""
+        return GasEngine.with_cells(self.cells[0])
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """The coarser and the finer cells, in words."""
+        coarse, fine = (GasEngine.with_cells(each).cell_words for each in self.cells)
+        return coarse, fine
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """The content of a report.
+
+    Attributes:
+        scenario: The scenario.
+        layout: The layout.
+        options: The options.
+        targets: The buildings.
+        threats: The threats.
+        bill: Bill of quantities of the layout; `blast_env.io.export.bill.BILL_COLUMNS`.
+        cost: Its cost.
+        pairs: Loads by threat, building and cell size.
+        bare: Response of the buildings without the layout, with the finer cells.
+        walled: Response of the buildings and of the barrier with it.
+        walled_coarse: The same with the coarser cells.
+        pictures: Facades and histories, by threat.
+        stills: Moments of the film of the first threat.
+        items: The worth of each module or piece, the most valuable one first.
+        masses: The threats with other masses, by the name of the threat.
+        places: Charges at other places.
+        front: The front, if one was given.
+        notes: Reasons to distrust loads, by threat and cell size.
+        left_out: Notes on the cases left out.
+        digests: Digest of every blast with pictures.
+        stopped: The part before which it was stopped; empty for a whole report.
+    """
+
+    scenario: Scenario
+    layout: Layout
+    options: StudyOptions
+    targets: tuple[ReportedBuilding, ...]
+    threats: tuple[NamedCharge, ...]
+    bill: pd.DataFrame
+    cost: float
+    pairs: tuple[LoadPair, ...]
+    bare: Consequences
+    walled: Consequences
+    walled_coarse: Consequences
+    pictures: dict[str, tuple[Picture, ...]]
+    stills: tuple[Picture, ...]
+    items: tuple[ItemWorth, ...]
+    masses: dict[str, tuple[Outcome, ...]]
+    places: tuple[Outcome, ...]
+    front: tuple[FrontPoint, ...]
+    notes: tuple[str, ...]
+    left_out: tuple[str, ...]
+    digests: tuple[tuple[str, str], ...]
+    stopped: str = ""
+
+    @property
+    def target(self) -> LevelOfProtection:
+        """Level of protection that buildings with facades must reach."""
+        asked = (self.options.target, self.scenario.objective.level, LevelOfProtection.LOW)
+        return next(each for each in asked if each is not None)
+
+    def pair(self, target: ReportedBuilding, threat: NamedCharge, cells: Cells) -> LoadPair:
+        """Return the loads on a building under a threat with one size of cells."""
+        return next(
+            each
+            for each in self.pairs
+            if (each.target.name, each.threat.name, each.cells) == (target.name, threat.name, cells)
+        )
+
+    def errors(self, pair: LoadPair) -> LoadErrors:
+        """Return the errors of the cells of the impulses on a building; NaN with one size."""
+        coarse, fine = self.options.cells
+        if self.options.ratio == 1.0 or pair.cells != fine:
+            return LoadErrors(float("nan"), float("nan"), float("nan"))
+        return LoadErrors.of(pair, self.pair(pair.target, pair.threat, coarse), self.options.ratio)
+
+    @property
+    def grid_error(self) -> float:
+        """Largest error of the cells of a reduction of the impulse; NaN with one size."""
+        fine = self.options.cells[1]
+        own = [each for each in self.pairs if each.target.protected and each.cells == fine]
+        found = [self.errors(each).reduction for each in own]
+        known = [each for each in found if np.isfinite(each)]
+        return max(known, default=float("nan"))
+
+
+Told = Callable[[str, float], None]
+"""Called with the label of the current part, and its completed share, 0 to 1."""
+
+
+def run_study(
+    scenario: Scenario,
+    layout: Sequence[Element],
+    options: StudyOptions | None = None,
+    progress: Told = lambda _, __: None,
+) -> Study:
+    """Run all blasts of a report.
+
+    Without given threats, charges at other places come first: the worst of them are the threats.
+    An interruption (`KeyboardInterrupt`) after the threats with the coarser cells gives a report on
+    the parts finished by then.
+
+    Args:
+        scenario: The scenario.
+        layout: The layout.
+        options: The scope and the resolution.
+        progress: Called with the label of the current part, and its completed share, 0 to 1.
+
+    Raises:
+        BlastEnvError: If the layout is not legal, a charge is out of place, a limit names no
+            building, or a front cannot be read; all before the first blast.
+    """
+    options = options or StudyOptions(cells=final_cells(scenario))
+    cells = check_layout(scenario, layout)
+    if not cells:
+        raise BlastEnvError("the layout is empty: there is nothing to report on")
+    targets = targets_of(scenario)
+    check_limits(options.limits, targets)
+    asked = asked_threats(scenario, options.charges)
+    for threat in asked:
+        check_layout(scenario.with_possible_charges([threat.charge]), cells)
+    front = front_layouts(options.front, scenario)
+    bill = bill_of_quantities(LayoutPlan(scenario, cells))
+    runs = Runs(scenario, cells, options, targets, asked, progress)
+    stills: tuple[Picture, ...] = ()
+    masses: dict[str, tuple[Outcome, ...]] = {}
+    left_out: tuple[str, ...] = ()
+    items: tuple[ItemWorth, ...] = ()
+    places: tuple[Outcome, ...] = ()
+    points: tuple[FrontPoint, ...] = ()
+    part = options.words[1]
+    try:
+        if not asked:
+            runs.choose_threats()
+        runs.run_threats()
+        part = _FILM
+        stills = runs.film() if options.stills else ()
+        part = _MASSES_PART
+        masses, left_out = runs.other_masses()
+        part = _ITEMS
+        items = runs.item_worths() if options.items else ()
+        part = _PLACES
+        places = runs.other_places()
+        part = _FRONT
+        points = runs.front_points(front)
+        part = ""
+    except KeyboardInterrupt:
+        options = runs.options_of_what_is_done()
+        progress(f"stopped before: {part}", 1.0)
+    coarse, fine = options.cells
+    return Study(
+        scenario=scenario,
+        layout=cells,
+        options=options,
+        targets=targets,
+        threats=runs.threats,
+        bill=bill,
+        cost=Placement.of(scenario, cells).cost,
+        pairs=tuple(each for each in runs.pairs if each.cells in options.cells),
+        bare=runs.consequences(fine, walled=False),
+        walled=runs.consequences(fine, walled=True),
+        walled_coarse=runs.consequences(coarse, walled=True),
+        pictures=runs.pictures[fine],
+        stills=stills,
+        items=items,
+        masses=masses,
+        places=places,
+        front=points,
+        notes=tuple(dict.fromkeys(runs.notes)),
+        left_out=left_out,
+        digests=tuple(runs.digests),
+        stopped=part,
+    )
+
+
+class PlannedPart(NamedTuple):
+    """A part of a report before it is run.
+
+    Attributes:
+        label: The label that `run_study` reports; of parts with several, their common start.
+        cells: Their cells.
+        charges: The charge of each blast; of equal blasts, only the first is run.
+        is_drawn: Whether each blast has pictures.
+    """
+
+    label: str
+    cells: Cells
+    charges: tuple[AnyCharge, ...]
+    is_drawn: bool = False
+
+
+def blasts_of(
+    scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[NamedCharge]
+) -> tuple[PlannedPart, ...]:
+    """Return the parts of a report in their order, with the blasts of each."""
+    coarse = options.cells[0]
+    own = [threat.charge for threat in threats]
+    places = [each.charge for each in other_places(scenario, options.places)]
+    both = ((), layout)
+    first = [] if options.charges else places  # the candidates for the threats
+    known = {(each, charge) for each in both for charge in (*first, *own)}
+    parts = [PlannedPart(_PLACES, coarse, tuple(first * len(both)))] if first else []
+    parts += [
+        PlannedPart(_label(threat, words, size), size, (threat.charge,), is_drawn=True)
+        for size in options.sizes
+        for threat in threats
+        for words in (_BARE, _WALLED)
+    ]
+    parts.append(PlannedPart(_FILM, coarse, (own[0],) * 2 if options.stills else ()))
+
+    def asked(label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]) -> None:
+        pairs = dict.fromkeys((each, charge) for each in layouts for charge in charges)
+        new = [pair for pair in pairs if pair not in known]
+        known.update(new)
+        parts.append(PlannedPart(label, coarse, tuple(charge for _, charge in new)))
+
+    for each in threats:
+        masses, _ = other_masses(scenario, each.charge, _MASSES)
+        charges = [mass.charge for mass in masses]
+        asked(f"{each.name}, {_MASSES_PART}", both, charges)
+    asked(_ITEMS, _fewer(layout) if options.items else (), own)
+    if options.charges:
+        asked(_PLACES, both, places)
+    asked(_FRONT, front_layouts(options.front, scenario), own)
+    return tuple(parts)
+
+
+def _fewer(layout: Layout) -> list[Layout]:
+    """Return the layouts that lack one module or piece, one for each."""
+    return [tuple(each for each in layout if each != piece) for piece in standing(layout)]
+
+
+def _label(threat: NamedCharge, words: str, cells: Cells) -> str:
+    """Return the label of a blast of the threats, for progress and for its digest."""
+    return f"{threat.name} {words}, {GasEngine.with_cells(cells).cell_words}"
+
+
+def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[NamedCharge, ...]:
+    """Return the threats of a report before any blast, for its cost.
+
+    Those given, or stand-ins: one of the places of each source.
+    """
+    if options.charges:
+        return asked_threats(scenario, options.charges)
+    places = other_places(scenario, options.places)
+    return chief_threats(places, lambda _: Severity(), options.most_threats)
+
+
+class Runs:
+    """The blasts of a report, one part after the other."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        layout: Layout,
+        options: StudyOptions,
+        targets: tuple[ReportedBuilding, ...],
+        threats: tuple[NamedCharge, ...],
+        progress: Told,
+    ) -> None:
+        self.scenario, self.layout, self.options = scenario, layout, options
+        self.targets, self.threats, self.progress = targets, threats, progress
+        self.pairs: list[LoadPair] = []
+        self.pictures: dict[Cells, dict[str, tuple[Picture, ...]]] = {}
+        self.notes: list[str] = []
+        self.digests: list[tuple[str, str]] = []
+        self._found: dict[tuple[Cells, bool], list[Consequences]] = {}
+        self._evaluator = BlastEvaluator(scenario, options.coarse, cache=options.cache)
+
+    def run_threats(self) -> None:
+        """Run every threat with both sizes of cells, without and with the layout.
+
+        The coarser ones come first: they suffice for a report if the rest is stopped.
+        """
+        for size in self.options.sizes:
+            for threat in self.threats:
+                both = [self._measured(threat, size, layout) for layout in ((), self.layout)]
+                self.pairs += self._pairs(threat, size, both[0], both[1])
+                for is_walled, measured in enumerate(both):
+                    charge = threat.against(self.scenario, self.layout if is_walled else ())
+                    found = consequences_of(self.scenario, measured.result, charge)
+                    self._found.setdefault((size, bool(is_walled)), []).append(found)
+                # Drawn now, because only these two results are in memory at once.
+                self.pictures.setdefault(size, {})[threat.name] = (
+                    *self._damage_pictures(threat.name, size),
+                    risk_picture(*both),
+                    *blast_pictures(both[0], both[1], self.options.units),
+                )
+
+    def options_of_what_is_done(self) -> StudyOptions:
+        """Return the options of a report on the finished cells, perhaps the coarser ones alone.
+
+        Raises:
+            KeyboardInterrupt: If not even these are finished.
+        """
+        done = [
+            size
+            for size in self.options.cells
+            if self.threats and len(self.pictures.get(size, {})) == len(self.threats)
+        ]
+        if not done:
+            raise KeyboardInterrupt
+        return replace(self.options, cells=(done[0], done[-1]))
+
+    def consequences(self, cells: Cells, *, walled: bool) -> Consequences:
+        """Return the consequences of all threats on the given cells, without or with the layout."""
+        return Consequences.together(self._found[cells, walled])
+
+    def _damage_pictures(self, threat: str, cells: Cells) -> tuple[Picture, ...]:
+        bare, walled = (self._found[cells, is_walled][-1] for is_walled in (False, True))
+        return damage_pictures(self.scenario, self.layout, bare, walled, threat)
+
+    def _measured(self, threat: NamedCharge, cells: Cells, layout: Layout) -> MeasuredBlast:
+        label = _label(threat, _WALLED if layout else _BARE, cells)
+        engine = GasEngine.with_cells(cells)
+        blast = GasBlast(self.scenario, layout, 0, engine, threat.charge)
+        measured = measure(blast, self.targets, partial(self.progress, label))
+        self.notes += [f"{label}: {note}" for note in measured.notes]
+        self.digests.append((label, measured.result.digest))
+        if cells == self.options.cells[0]:
+            self._evaluator.keep(layout, Threat(threat.charge, 0), measured.result.loads())
+        return measured
+
+    def _pairs(
+        self, threat: NamedCharge, cells: Cells, bare: MeasuredBlast, walled: MeasuredBlast
+    ) -> Iterator[LoadPair]:
+        for target in self.targets:
+            if target.name in bare.loads and target.name in walled.loads:
+                loads = bare.loads[target.name], walled.loads[target.name]
+                yield LoadPair(target, threat, cells, *loads)
+
+    def film(self) -> tuple[Picture, ...]:
+        """Return stills of the first threat, without and with the layout."""
+        charge = self.threats[0].charge
+        blasts = [
+            GasBlast(self.scenario, layout, 0, self.options.coarse, charge)
+            for layout in ((), self.layout)
+        ]
+        moments_s = self._moments_s()
+        return film_stills(blasts[0], blasts[1], moments_s, partial(self.progress, _FILM))
+
+    def _moments_s(self) -> list[float]:
+        """Return the times of the stills, s: around the arrival at a protected building."""
+        own = [
+            each
+            for each in self.pairs
+            if each.threat is self.threats[0]
+            and each.target.protected
+            and each.bare.arrival_s > 0.0
+        ]
+        if not own:
+            return []
+        first = min(own, key=lambda each: each.bare.arrival_s).bare
+        arrival_s = first.arrival_s
+        phase_s = first.duration_s if np.isfinite(first.duration_s) else arrival_s
+        last_s = arrival_s + 2.0 * phase_s
+        moments_s = np.linspace(0.5 * arrival_s, last_s, self.options.stills)
+        return [float(moment_s) for moment_s in moments_s]
+
+    def other_masses(self) -> tuple[dict[str, tuple[Outcome, ...]], tuple[str, ...]]:
+        """Return the outcomes of every threat with other masses, and notes on those left out."""
+        found, left_out = {}, []
+        for threat in self.threats:
+            charges, notes = other_masses(self.scenario, threat.charge, _MASSES)
+            left_out += list(notes)
+            own = NamedCharge(f"{threat.charge.tnt_kg:g} kg", threat.charge, "as in the threat")
+            ordered = sorted((own, *charges), key=lambda each: each.charge.tnt_kg)
+            found[threat.name] = self._outcomes(f"{threat.name}, {_MASSES_PART}", ordered)
+        return found, tuple(left_out)
+
+    def other_places(self) -> tuple[Outcome, ...]:
+        """Return the outcomes of the charges at other places."""
+        places = other_places(self.scenario, self.options.places)
+        return self._outcomes(_PLACES, places)
+
+    def choose_threats(self) -> None:
+        """Choose the worst places as threats, by loads with the layout, as in the verdict."""
+        places = other_places(self.scenario, self.options.places)
+        charges = [each.charge for each in places]
+        loads = self._blasts(_PLACES, ((), self.layout), charges)[len(places) :]
+        objective = self.scenario.objective
+        found = dict(
+            zip(charges, (Severity.of_loads(each, objective) for each in loads), strict=True)
+        )
+        most = self.options.most_threats
+        self.threats = chief_threats(places, lambda each: found[each.charge], most)
+
+    def _outcomes(self, label: str, charges: Sequence[NamedCharge]) -> tuple[Outcome, ...]:
+        layouts: tuple[Layout, ...] = ((), self.layout)
+        impulses = self._loads(label, layouts, [each.charge for each in charges])
+        return tuple(
+            Outcome(each.name, each.why, float(bare), float(walled))
+            for each, (bare, walled) in zip(charges, impulses.T, strict=True)
+        )
+
+    def item_worths(self) -> tuple[ItemWorth, ...]:
+        """Return the worth of every module or piece, by the impulse if it alone is left out."""
+        pieces = standing(self.layout)
+        charges = [each.charge for each in self.threats]
+        impulses = self._loads(_ITEMS, ((), self.layout, *_fewer(self.layout)), charges)
+        bare, whole, without = impulses[0], impulses[1], impulses[2:]
+        worths = ((without - whole) / bare).mean(axis=1)
+        items = [
+            ItemWorth(
+                layout_text([element]),
+                self.scenario.zone.element_rectangle_m(element),
+                float(worth),
+            )
+            for element, worth in zip(pieces, worths, strict=True)
+        ]
+        return tuple(sorted(items, key=lambda each: -each.worth))
+
+    def front_points(self, layouts: Sequence[Layout]) -> tuple[FrontPoint, ...]:
+        """Return layouts of a front with their reductions by gas dynamics, the cheapest first."""
+        if not layouts:
+            return ()
+        charges = [each.charge for each in self.threats]
+        impulses = self._loads(_FRONT, ((), *layouts), charges)
+        bare = np.broadcast_to(impulses[0], impulses[1:].shape)
+        gone = reductions(impulses[1:], bare).mean(axis=1)
+        points = [
+            FrontPoint(layout, Placement.of(self.scenario, layout).cost, float(share))
+            for layout, share in zip(layouts, gone, strict=True)
+        ]
+        return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
+
+    def _loads(
+        self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
+    ) -> FloatArray:
+        """Return the counted loads on the protected structures (layouts, charges)."""
+        objective = self.scenario.objective
+        counted = [each.load(objective) for each in self._blasts(label, layouts, charges)]
+        return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
+
+    def _blasts(
+        self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
+    ) -> list[BlastLoads]:
+        """Return the loads of every layout under every charge, from the cache if possible."""
+        pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]
+        told = partial(self.progress, label)
+        return self._evaluator.loads_of_many(pairs, self.options.processes, told)
+
+
+@dataclass(frozen=True)
+class _FrontRow:
+    """The column that is read from a row of a front."""
+
+    layout: str
+
+
+def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
+    """Return the layouts of a front that a search wrote.
+
+    Raises:
+        BlastEnvError: If the file is no front, or a layout is not legal in the scenario.
+    """
+    if path is None:
+        return ()
+    try:
+        layouts = [layout_from(row.layout) for row in parse_csv(read_text(path), _FrontRow)]
+    except ValueError as error:
+        raise BlastEnvError(
+            f"{path}: is not the front.csv of a search (column `layout`, cells as row,column or "
+            f"pieces as row,column,item): {error}"
+        ) from error
+    if len(layouts) > MOST_FRONT:
+        raise BlastEnvError(f"{path}: has {len(layouts)} layouts, must have at most {MOST_FRONT}")
+    return tuple(check_layout(scenario, layout) for layout in layouts if layout)
+
+
+def layout_from(text: str) -> Layout:
+    """Return a layout from the text of `layout_text`: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
+    return tuple(_element_from(element) for element in text.split())
+
+
+def _element_from(text: str) -> Element:
+    parts = text.split(",")
+    if not 2 <= len(parts) <= 4:
+        raise ValueError(f"{shortened(text)!r} must have 2 to 4 parts")
+    row, column, item, turned = (*parts, "", "")[:4]
+    if turned not in ("", "turned"):
+        raise ValueError(f"{shortened(turned)!r} must be 'turned'")
+    if not item:
+        return int(row), int(column)
+    return Piece(int(row), int(column), item, turned == "turned")

@@ -1,0 +1,187 @@
+"""The charges of a report: the worst places, other places, other masses."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.governing import Severity, governing
+from blast_env.geometry import Layout, Rectangle
+from blast_env.layout.build_scene import charge_against
+from blast_env.site import (
+    AnyCharge,
+    PointSource,
+    RectangleSource,
+    Scenario,
+    ScenarioError,
+    SegmentSource,
+    VehicleCharge,
+    VehicleSource,
+)
+from blast_env.site.scene import Charge
+
+_STEPS: Final = 400
+"""Number of parts of a segment in the search for its place nearest to a building."""
+
+
+@dataclass(frozen=True)
+class NamedCharge:
+    """A charge with its name in a report.
+
+    Attributes:
+        name: `T1`, or its place or mass.
+        charge: The charge, at its place or on its vehicle.
+        why: The reason for its choice.
+        source: Number of its charge source, -1 for none.
+    """
+
+    name: str
+    charge: AnyCharge
+    why: str
+    source: int = -1
+
+    def against(self, scenario: Scenario, layout: Layout = ()) -> Charge:
+        """Return the charge at its place, which for a vehicle depends on the layout."""
+        return charge_against(scenario, layout, self.charge)
+
+    def place_text(self, scenario: Scenario, layout: Layout) -> str:
+        """Return its place in words, with a layout, and without if that differs."""
+        bare, walled = (_place_text(self.against(scenario, each)) for each in ((), layout))
+        return walled if bare == walled else f"{bare} without the layout, {walled} with it"
+
+
+def chief_threats(
+    places: Sequence[NamedCharge], severity: Callable[[NamedCharge], Severity], most: int
+) -> tuple[NamedCharge, ...]:
+    """Return the most severe charges: of each source, the place that governs.
+
+    Args:
+        places: The candidate places, see `other_places`.
+        severity: Severity of a charge.
+        most: Greatest number of charges; the worst are taken.
+    """
+    sources: dict[int, list[NamedCharge]] = {}
+    for each in places:
+        sources.setdefault(each.source, []).append(each)
+    worst = [governing(own, severity) for own in sources.values()]
+    ranked = sorted(worst, key=severity, reverse=True)[:most]
+    return tuple(
+        NamedCharge(f"T{number}", each.charge, _why(each, len(sources[each.source])))
+        for number, each in enumerate(ranked, start=1)
+    )
+
+
+def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[NamedCharge, ...]:
+    """Return the charges given by the user.
+
+    Raises:
+        ScenarioError: If one is out of bounds, or not clear of structures and the border.
+    """
+    scenario.with_possible_charges(charges)
+    return tuple(
+        NamedCharge(f"T{number}", charge, "given by the user")
+        for number, charge in enumerate(charges, start=1)
+    )
+
+
+def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
+    """Return charges at even steps along segments, over areas, and at points; each only once.
+
+    The place of each source nearest to a protected structure is added. Those of a vehicle are at
+    its worst place, its second worst, and so on.
+
+    Args:
+        scenario: The scenario.
+        count: Number of places of each segment and vehicle, and along each side of an area.
+    """
+    found: dict[AnyCharge, NamedCharge] = {}
+    for index, source in enumerate(scenario.charge):
+        why = f"charge source {index + 1}"
+        if isinstance(source, VehicleSource):
+            for rank in range(min(count, source.places)):
+                vehicle = VehicleCharge(source, rank)
+                name = f"vehicle, place {rank + 1} by distance"
+                found.setdefault(vehicle, NamedCharge(name, vehicle, why, index))
+            continue
+        nearest = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
+        for place in (*_spread(source, count), nearest):
+            charge = Charge(place, source.tnt_kg, source.height_m)
+            found.setdefault(charge, NamedCharge(_place_text(charge), charge, why, index))
+    return tuple(found.values())
+
+
+def other_masses(
+    scenario: Scenario, charge: AnyCharge, factors: tuple[float, ...]
+) -> tuple[tuple[NamedCharge, ...], tuple[str, ...]]:
+    """Return the same charge with other masses, and notes on those that are not possible."""
+    possible, notes = [], []
+    for factor in factors:
+        other = _with_mass(charge, factor * charge.tnt_kg)
+        name = f"{other.tnt_kg:g} kg"
+        try:
+            scenario.with_possible_charges([other])
+        except (ScenarioError, BlastEnvError) as error:
+            notes.append(f"{name} is omitted: {error}")
+        else:
+            possible.append(NamedCharge(name, other, f"{factor:g} times the mass"))
+    return tuple(possible), tuple(notes)
+
+
+def _why(place: NamedCharge, count: int) -> str:
+    if count == 1:
+        return place.why
+    words = "the worst with the layout"
+    return f"{place.why}, {words} of {count} places examined"
+
+
+def _with_mass(charge: AnyCharge, tnt_kg: float) -> AnyCharge:
+    if isinstance(charge, VehicleCharge):
+        return charge.with_charge(tnt_kg)
+    return charge._replace(tnt_kg=tnt_kg)
+
+
+def _place_text(charge: Charge) -> str:
+    x_m, y_m = charge.position_m
+    return f"({x_m:.1f}, {y_m:.1f}) m"
+
+
+Placed = PointSource | SegmentSource | RectangleSource
+"""Sources whose places do not depend on the layout."""
+
+
+def _candidates(scenario: Scenario, source: Placed) -> Iterator[tuple[float, float]]:
+    """Yield candidates for the place of a source nearest to a protected structure, or nearly so."""
+    if isinstance(source, RectangleSource):
+        left, bottom, right, top = source.rectangle_m
+        for target in _protected(scenario):
+            # The points of the area nearest to the corners of the building.
+            xs_m = {min(max(each, left), right) for each in (target.left, target.right)}
+            ys_m = {min(max(each, bottom), top) for each in (target.bottom, target.top)}
+            yield from ((x_m, y_m) for x_m in xs_m for y_m in ys_m)
+        return
+    yield from _spread(source, _STEPS + 1)
+
+
+def _spread(source: Placed, count: int) -> Iterator[tuple[float, float]]:
+    shares = np.linspace(0.0, 1.0, count).tolist() if count > 1 else [0.5]
+    if isinstance(source, PointSource):
+        yield source.position_m
+    elif isinstance(source, SegmentSource):
+        (x0, y0), (x1, y1) = source.segment_m
+        for share in shares:
+            yield x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+    else:
+        left, bottom, right, top = source.rectangle_m
+        for across in shares:
+            for along in shares:
+                yield left + across * (right - left), bottom + along * (top - bottom)
+
+
+def _distance_m(scenario: Scenario, place: tuple[float, float]) -> float:
+    return min(each.distance_to(place) for each in _protected(scenario))
+
+
+def _protected(scenario: Scenario) -> list[Rectangle]:
+    return [each.rectangle_m for each in scenario.structures if each.protected]

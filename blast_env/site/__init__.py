@@ -1,0 +1,80 @@
+"""Scenario files: models, validation, loading and saving."""
+
+from blast_env.bundled import bundled_scenarios
+from blast_env.geometry import Cell, Element, Layout, Piece
+from blast_env.site.access_way import AccessWay
+from blast_env.site.catalogue import Catalogue, Item, PlacedModule, StockBarrier, stock_barriers
+from blast_env.site.files import (
+    AnyScenario,
+    ScenarioField,
+    find_problems,
+    find_scenario,
+    load_scenario,
+    parse_scenario,
+    save_scenario,
+    scenario_hash,
+)
+from blast_env.site.models import (
+    SCHEMA_VERSION,
+    AnySource,
+    AnyStructure,
+    ConcreteSquareSection,
+    GaugeSection,
+    ModularObstacleSection,
+    PointSource,
+    RectangleSource,
+    Scenario,
+    SegmentSource,
+    SimulationSection,
+    Site,
+    VehicleSource,
+)
+from blast_env.site.objective import ObjectiveSection
+from blast_env.site.problems import Problem, ScenarioError
+from blast_env.site.scene import Charge
+from blast_env.site.vehicles import AnyCharge, VehicleCharge
+from blast_env.site.zone import BuildZone, CostArea, KeepOut
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "AccessWay",
+    "AnyCharge",
+    "AnyScenario",
+    "AnySource",
+    "AnyStructure",
+    "BuildZone",
+    "Catalogue",
+    "Cell",
+    "Charge",
+    "ConcreteSquareSection",
+    "CostArea",
+    "Element",
+    "GaugeSection",
+    "Item",
+    "KeepOut",
+    "Layout",
+    "ModularObstacleSection",
+    "ObjectiveSection",
+    "Piece",
+    "PlacedModule",
+    "PointSource",
+    "Problem",
+    "RectangleSource",
+    "Scenario",
+    "ScenarioError",
+    "ScenarioField",
+    "SegmentSource",
+    "SimulationSection",
+    "Site",
+    "StockBarrier",
+    "VehicleCharge",
+    "VehicleSource",
+    "bundled_scenarios",
+    "find_problems",
+    "find_scenario",
+    "load_scenario",
+    "parse_scenario",
+    "save_scenario",
+    "scenario_hash",
+    "stock_barriers",
+]

@@ -1,0 +1,609 @@
+"""Checks of the consistency between the sections of a scenario."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any, Final, TypeVar
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from blast_env.arrays import BoolArray
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Rectangle, stacked_runs
+from blast_env.response.components import Component, Glazing, Wall
+from blast_env.site.balls import lattice_capacity
+from blast_env.site.boxes import TOLERANCE_M
+from blast_env.site.facade import facade_problems, hardening_problems
+from blast_env.site.heights import (
+    air_height_m,
+    depth_inside_m,
+    highest_grounds_m,
+    is_over_or_below,
+)
+from blast_env.site.objective import ObjectiveSection
+from blast_env.site.parameters import AirParameters, SimulationParameters, for_charge
+from blast_env.site.problems import Problem, extent, unknown_name
+from blast_env.site.reach import places_on
+from blast_env.site.sections import (
+    MOST_MODULES,
+    AnySource,
+    AnyStructure,
+    GaugeSection,
+    Ground,
+    PlaceSource,
+    PointM,
+    SimulationSection,
+    Site,
+    VehicleSource,
+)
+from blast_env.site.structure import BARRIER_NAME
+from blast_env.site.terraces import terrace_problems
+from blast_env.site.vehicles import MOST_PLACES, Obstacles, RatedPiece, VehicleGround
+from blast_env.site.zone import (
+    BuildZone,
+    EmptyZone,
+    Surroundings,
+    distance_m,
+    empty_zone,
+    source_bounds_m,
+)
+from blast_env.site.zone_checks import build_zone_problems
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+
+Checked = TypeVar("Checked")
+
+MOST_AIR_BALLS: Final = 1_000_000
+"""Most air balls, by the memory of a common computer."""
+
+_MOST_ITEMS: Final = 100
+"""Most items of an array that are examined; longer arrays are errors anyway."""
+
+_SITE: Final = TypeAdapter(Site)
+_SOURCE: Final[TypeAdapter[AnySource]] = TypeAdapter(AnySource)
+_STRUCTURE: Final[TypeAdapter[AnyStructure]] = TypeAdapter(AnyStructure)
+_BUILD_ZONE: Final = TypeAdapter(BuildZone)
+_GAUGE: Final = TypeAdapter(GaugeSection)
+_COMPONENTS: Final[TypeAdapter[Mapping[str, Glazing | Wall]]] = TypeAdapter(dict[str, Component])
+_SIMULATION: Final = TypeAdapter(SimulationSection)
+_OBJECTIVE: Final = TypeAdapter(ObjectiveSection)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The sections of a scenario that are valid by themselves.
+
+    Attributes:
+        site: The site, if it is valid.
+        sources: The valid sources, by index.
+        structures: The valid structures, by index.
+        all_structures: Whether all structures are valid.
+        build_zone: The build zone, if there is one and it is valid.
+        parameters: The parameters of the particle model, if they are valid.
+        gauges: The valid gauges, by index.
+        components: The components, by name; `None` if one of them is invalid.
+        objective: The objective, if it is valid.
+    """
+
+    site: Site | None
+    sources: Mapping[int, AnySource]
+    structures: Mapping[int, AnyStructure]
+    all_structures: bool
+    build_zone: BuildZone | None
+    parameters: SimulationParameters | None
+    gauges: Mapping[int, GaugeSection]
+    components: Mapping[str, Glazing | Wall] | None = field(default_factory=dict)
+    objective: ObjectiveSection | None = None
+
+    @property
+    def air_height_m(self) -> float:
+        """Height of the air, m; infinite if it may depend on an invalid section."""
+        if self.site is None or (self.site.air_height_m is None and not self.all_structures):
+            return math.inf
+        return air_height_m(self.site, self.structures.values(), self.build_zone)
+
+    @property
+    def charge_radius_m(self) -> float:
+        """Radius of the charge, m; if unknown, a length below that of any charge."""
+        return 1e-6 if self.parameters is None else charge_radius_m(self.parameters)
+
+
+def charge_radius_m(parameters: SimulationParameters) -> float:
+    """Return the radius of the charge's disc at the start, m."""
+    explosive = parameters.explosive
+    return (explosive.offset_units + explosive.radius_units) / UNITS_PER_M
+
+
+def sound_parts(document: Mapping[str, Any]) -> Parts:
+    """Return the sections of a scenario file that are valid by themselves."""
+    listed = document.get("structures")
+    structures = _sound_items(_STRUCTURE, listed)
+    simulation = _sound(_SIMULATION, document.get("simulation", {}))
+    return Parts(
+        site=_sound(_SITE, document.get("site")),
+        sources=_sound_items(_SOURCE, document.get("charge")),
+        structures=structures,
+        all_structures=isinstance(listed, list | tuple) and len(structures) == len(listed) > 0,
+        build_zone=_sound(_BUILD_ZONE, document.get("build_zone")),
+        parameters=None if simulation is None else simulation.parameters,
+        gauges=_sound_items(_GAUGE, document.get("gauges")),
+        components=_sound(_COMPONENTS, document.get("components", {})),
+        objective=_sound(_OBJECTIVE, document.get("objective", {})),
+    )
+
+
+def check_parts(parts: Parts) -> tuple[Problem, ...]:
+    """Return all problems between the sections."""
+    return (
+        *_name_problems(parts),
+        *_structure_problems(parts),
+        *_charge_problems(parts),
+        *_build_zone_problems(parts),
+        *_simulation_problems(parts),
+        *_height_problems(parts),
+        *_gauge_problems(parts),
+        *_facade_problems(parts),
+        *_removable_problems(parts),
+        *terrace_problems(parts.structures),
+        *_objective_problems(parts),
+    )
+
+
+def _facade_problems(parts: Parts) -> Iterator[Problem]:
+    """Check facades and the measures that harden them, if the sections that they use are valid."""
+    if parts.components is None:
+        return
+    problems = list(facade_problems(parts.structures, parts.components))
+    yield from problems
+    if parts.build_zone is not None and parts.all_structures and not problems:
+        measures = parts.build_zone.hardening
+        yield from hardening_problems(parts.structures, parts.components, measures)
+
+
+def _removable_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that removable structures exist, and are neither protected nor otherwise needed."""
+    if parts.build_zone is None or not parts.all_structures:
+        return
+    structures = {each.name: each for each in parts.structures.values()}
+    first_use: dict[str, str] = {}
+    for number, removable in enumerate(parts.build_zone.removable):
+        for place, name in enumerate(removable.structures):
+            where = f"build_zone.removable[{number}].structures[{place}]"
+            used = first_use.setdefault(name, where)
+            if name not in structures:
+                yield Problem(where, unknown_name("structure", name, structures))
+            elif structures[name].protected:
+                yield Problem(where, f"is {name!r}, which is protected: it cannot be removed")
+            elif structures[name].facade is not None:
+                yield Problem(where, f"is {name!r}, which has a facade: it cannot be removed")
+            elif structures[name].carries:
+                yield Problem(where, f"is {name!r}, a terrace: it cannot be removed")
+            elif used != where:
+                yield Problem(where, f"is {name!r}, which {used} removes already")
+
+
+def _objective_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that a response objective has facades, and a target has a budget."""
+    objective, zone = parts.objective, parts.build_zone
+    if objective is None or not objective.is_response:
+        return
+    facades = [each.facade for each in parts.structures.values() if each.protected]
+    keys = [key for facade in facades if facade is not None for key, _ in facade.names()]
+    wanted = "glazing" if objective.measure == "glazing" else ""
+    if parts.all_structures and not any(key.endswith(wanted) for key in keys):
+        what = "facade with glazing" if wanted else "facade"
+        message = f"is 'response', but no protected structure has a {what}"
+        yield Problem("objective.kind", message)
+    if objective.target is not None and zone is not None and zone.budget is None:
+        message = f"missing: objective.target is {objective.target!r}, costs are shares of a budget"
+        yield Problem("build_zone.budget", message)
+
+
+def check_sources(parts: Parts) -> tuple[Problem, ...]:
+    """Return the problems between the sources of the charge and the other sections.
+
+    They are the result of `check_parts` if the other sections are consistent.
+    """
+    return (*_charge_problems(parts), *_build_zone_problems(parts))
+
+
+def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
+    """Return the section, or `None` if it is missing or invalid."""
+    try:
+        return adapter.validate_python(value)
+    except ValidationError:
+        return None
+
+
+def _sound_items(adapter: TypeAdapter[Checked], values: object) -> dict[int, Checked]:
+    """Return the valid items of an array by index."""
+    if not isinstance(values, list | tuple):
+        return {}
+    items = ((index, _sound(adapter, value)) for index, value in enumerate(values[:_MOST_ITEMS]))
+    return {index: item for index, item in items if item is not None}
+
+
+def _name_problems(parts: Parts) -> Iterator[Problem]:
+    """Check the names of the structures, and that at least one is protected."""
+    for index, structure in parts.structures.items():
+        if structure.name == BARRIER_NAME:
+            message = f"is {BARRIER_NAME!r}, the name of the modules of a layout"
+            yield Problem(f"structures[{index}].name", message)
+    yield from _repeated_names("structures", parts.structures)
+    protected = any(structure.protected for structure in parts.structures.values())
+    if parts.all_structures and not protected:
+        yield Problem("structures", "none is protected, at least one must have protected = true")
+
+
+def _repeated_names(
+    key: str, items: Mapping[int, AnyStructure] | Mapping[int, GaugeSection]
+) -> Iterator[Problem]:
+    """Yield the problems of names that an earlier item of the array has."""
+    first_use: dict[str, int] = {}
+    for index, item in items.items():
+        used = first_use.setdefault(item.name, index)
+        if used != index:
+            message = f"is {item.name!r}, already the name of {key}[{used}]"
+            yield Problem(f"{key}[{index}].name", message)
+
+
+def _structure_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that structures lie inside the site without overlaps, and their number of modules."""
+    stock = 0 if parts.build_zone is None else parts.build_zone.stock
+    modules = sum(each.modules for each in parts.structures.values()) + stock
+    if modules > MOST_MODULES:
+        with_stock = f", the stock of {stock:,} among them" if stock else ""
+        message = f"have {modules:,} modules together{with_stock}, must have at most"
+        yield Problem("structures", f"{message} {MOST_MODULES:,}")
+    for index, structure in parts.structures.items():
+        plans_m = [structure.rectangle_m]
+        if structure.footprint is not None:
+            plans_m.append(Rectangle(*structure.footprint.polygon.bounds))
+        described = _described(structure)
+        yield from _outside_site(
+            parts, f"structures[{index}]", described, Rectangle.around(plans_m)
+        )
+    for (i, one), (j, other) in combinations(parts.structures.items(), 2):
+        if _overlap(one, other) and not _are_above_each_other(one, other):
+            message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"
+            yield Problem(f"structures[{j}]", message)
+
+
+def _overlap(one: AnyStructure, other: AnyStructure) -> bool:
+    """Return whether modules of two structures overlap."""
+    return one.rectangle_m.overlaps(other.rectangle_m) and any(
+        own.overlaps(box) for own in one.boxes_m for box in other.boxes_m
+    )
+
+
+def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
+    """Return whether one of two structures begins at or above the top of the other."""
+    return any(
+        low.height_m is not None and high.base_m >= low.height_m - TOLERANCE_M
+        for low, high in ((one, other), (other, one))
+    )
+
+
+def _charge_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that every place of the charge is clear of structures and border."""
+    vehicles = sum(isinstance(source, VehicleSource) for source in parts.sources.values())
+    places = 0 if parts.site is None else vehicles * places_on(parts.site)
+    if places > MOST_PLACES:
+        yield Problem(
+            "charge",
+            f"has {vehicles} vehicles, whose charges may go off at {places:,} places of the site,"
+            f" must have at most {MOST_PLACES:,}",
+        )
+    for index, source in parts.sources.items():
+        if isinstance(source, VehicleSource):
+            if places <= MOST_PLACES:
+                yield from _vehicle_problems(parts, f"charge[{index}]", source)
+        else:
+            yield from _place_problems(parts, f"charge[{index}]", source)
+        yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)
+
+
+def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Problem]:
+    """Check a charge whose places do not depend on the layout."""
+    radius = parts.charge_radius_m
+    words = "" if parts.parameters is None else f" by {radius:g} m, the charge's radius"
+    bounds = source_bounds_m(source)
+    if parts.site and not parts.site.rectangle_m.contains(bounds.grown(radius)):
+        where, site = extent(bounds), extent(parts.site.rectangle_m)
+        message = f"its centre may be at {where}, must lie inside the site ({site}){words}"
+        yield Problem(key, message)
+    for j, structure in parts.structures.items():
+        distance = min(distance_m(source, box) for box in structure.boxes_m)
+        if distance < radius - TOLERANCE_M and not is_over_or_below(source.height_m, structure):
+            message = (
+                f"its centre comes as near as {distance:g} m to structures[{j}],"
+                f" {_described(structure)}, must keep clear of it{words}"
+            )
+            if structure.height_m is not None:
+                message += f", or be higher than its {structure.height_m:g} m"
+            if structure.base_m > 0.0:
+                message += f", or be lower than its base_m of {structure.base_m:g} m"
+            yield Problem(key, message)
+
+
+def _vehicle_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+    """Check that a vehicle fits on the site and can enter, and that barriers can stop it."""
+    problems = [*_vehicle_size_problems(parts, key, source), *_entry_problems(parts, key, source)]
+    listed: dict[str, Sequence[Ground]] = {
+        "drivable": source.drivable,
+        "keep_outs": source.keep_outs,
+    }
+    for name, areas in listed.items():
+        for index, area in enumerate(areas):
+            where = f"the ground ({extent(area.rectangle_m)})"
+            problems += _outside_site(parts, f"{key}.{name}[{index}]", where, area.rectangle_m)
+    yield from problems
+    if parts.site is not None and parts.all_structures and not problems:
+        yield from _way_problems(parts, key, vehicle_ground(parts, source))
+
+
+def _vehicle_size_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+    """Check that the vehicle is at least as wide as its charge and no larger than the site."""
+    least_m = 2.0 * parts.charge_radius_m
+    if source.width_m < least_m - TOLERANCE_M:
+        message = f"is {source.width_m:g}, must be at least {least_m:g}, the charge's diameter"
+        yield Problem(f"{key}.width_m", message)
+    if parts.site is not None:
+        most_m = min(parts.site.width_m, parts.site.height_m)
+        if source.width_m > most_m + TOLERANCE_M:
+            message = f"is {source.width_m:g}, must be at most {most_m:g}, the site's shorter side"
+            yield Problem(f"{key}.width_m", message)
+
+
+def _entry_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+    """Check that entries lie on the border and are wide enough."""
+    if parts.site is None:
+        return
+    for index, entry in enumerate(source.entries):
+        if entry.side(parts.site) is None:
+            message = (
+                f"runs from {_place(entry.start_m)} to {_place(entry.end_m)}, must lie on one side"
+                f" of the site's border ({extent(parts.site.rectangle_m)})"
+            )
+            yield Problem(f"{key}.entries[{index}]", message)
+        elif entry.length_m < source.width_m - TOLERANCE_M:
+            message = (
+                f"is {entry.length_m:g} m long, must be at least {source.width_m:g} m, the"
+                " vehicle's width"
+            )
+            yield Problem(f"{key}.entries[{index}]", message)
+
+
+def _way_problems(parts: Parts, key: str, ground: VehicleGround) -> Iterator[Problem]:
+    """Check that a vehicle can enter, approach a protected structure, and be stopped."""
+    width = f"{ground.source.width_m:g} m, its width"
+    reach = ground.reach()
+    if not reach.enters:
+        message = (
+            "the vehicle cannot enter: structures, gates and ground that is closed to it leave no"
+            f" entry a gap of {width}"
+        )
+        yield Problem(f"{key}.entries", message)
+    elif any(each.protected for each in ground.structures):
+        stand_off_m = ground.worst_places().stand_off_m
+        if stand_off_m >= ground.entry_stand_off_m - TOLERANCE_M:
+            message = (
+                f"the vehicle comes no nearer to a protected structure than {stand_off_m:g} m, as"
+                " near as where it enters: structures, gates and ground that is closed to it leave"
+                f" no gap of {width}"
+            )
+            yield Problem(key, message)
+        elif parts.build_zone is not None:
+            yield from _stopping_problems(parts, key, ground, parts.build_zone)
+
+
+def _stopping_problems(
+    parts: Parts, key: str, ground: VehicleGround, zone: BuildZone
+) -> Iterator[Problem]:
+    """Check that a barrier can increase the stand-off of a vehicle over the empty site's."""
+    cells = _stopping_cells(empty_zone(_surroundings(parts, zone)), ground.source)
+    if not cells.any():
+        message = "nothing can stop the vehicle: no item in stock stops vehicles"
+        if ground.source.motion is not None:
+            message += f", or is rated for {ground.source.motion.mass_kg:g} kg"
+        yield Problem(key, message)
+        return
+    # Adjoining cells leave no gap: their rectangle stops a vehicle as they do.
+    full = Obstacles(stops=tuple(zone.cells_rectangle_m(*each) for each in stacked_runs(cells)))
+    stand_off_m = ground.worst_places().stand_off_m
+    if ground.worst_places(full).stand_off_m <= stand_off_m + TOLERANCE_M:
+        message = (
+            "nothing can stop the vehicle: even with a vehicle barrier on each of the"
+            f" {cells.sum()} cells where one can stand, it comes as near as {stand_off_m:g} m to a"
+            " protected structure"
+        )
+        yield Problem(key, message)
+
+
+def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
+    """Return the cells that an item which stops the vehicle can cover (rows, columns)."""
+    cells = np.zeros_like(empty.usable)
+    rows, columns = cells.shape
+    for variant, fits in zip(empty.catalogue.variants, empty.fits, strict=True):
+        rating, motion = variant.crash_rating, source.motion
+        heavy = rating is not None and motion is not None and motion.mass_kg > rating.mass_kg
+        stops = variant.stops_vehicles and not heavy
+        if stops and empty.catalogue.stocks[variant.item] > 0:
+            for up, right in variant.cells_at(0, 0):
+                cells[up:, right:] |= fits[: max(rows - up, 0), : max(columns - right, 0)]
+    return cells
+
+
+def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:
+    """Return a vehicle's ground on the empty site, which must be valid."""
+    assert parts.site is not None
+    way = None if parts.build_zone is None else parts.build_zone.access_way
+    closed: tuple[Rectangle, ...] = ()
+    rated: tuple[RatedPiece, ...] = ()
+    if way is not None and way.gate is not None:
+        where, rating = way.gate.rectangle_m, way.gate.crash_rating
+        if rating is None:
+            closed = (where,)
+        else:
+            rated = (RatedPiece(where, rating, "the gate"),)
+    structures = tuple(parts.structures.values())
+    return VehicleGround(source, parts.site, structures, closed, rated, parts.charge_radius_m)
+
+
+def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that the build zone lies inside the site, and that barriers can be built in it."""
+    zone = parts.build_zone
+    if zone is None:
+        return
+    yield from _outside_site(
+        parts, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
+    )
+    yield from build_zone_problems(_surroundings(parts, zone))
+
+
+def _surroundings(parts: Parts, zone: BuildZone) -> Surroundings:
+    structures, sources = tuple(parts.structures.values()), tuple(parts.sources.values())
+    return Surroundings(zone, structures, sources, parts.charge_radius_m, parts.site)
+
+
+def _height_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that structures and barriers do not exceed the height of the air."""
+    for index, structure in parts.structures.items():
+        yield from _above_the_air(parts, f"structures[{index}].height_m", structure.height_m)
+        top_m = parts.air_height_m if structure.height_m is None else structure.height_m
+        if structure.base_m > max(top_m - MODULE_SIDE_M, 0.0) + TOLERANCE_M:
+            what = "the air" if structure.height_m is None else "height_m"
+            message = (
+                f"is {structure.base_m:g}, must be at least {MODULE_SIDE_M:g} below {what}"
+                f" ({top_m:g})"
+            )
+            yield Problem(f"structures[{index}].base_m", message)
+    if parts.build_zone is not None:
+        zone = parts.build_zone
+        grounds_m = highest_grounds_m(zone, parts.structures.values())
+        yield from _above_the_air(parts, "build_zone.height_m", zone.height_m, grounds_m[0])
+        for index, item in enumerate(zone.items):
+            where = f"build_zone.items[{index}].height_m"
+            yield from _above_the_air(parts, where, item.height_m, grounds_m[index])
+
+
+def _gauge_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that gauges have unique names, and lie in the air or at most a module inside."""
+    yield from _repeated_names("gauges", parts.gauges)
+    for index, gauge in parts.gauges.items():
+        key, (x_m, y_m, z_m) = f"gauges[{index}].position_m", gauge.position_m
+        place = f"({x_m:g}, {y_m:g})"
+        yield from _outside_site(parts, key, place, Rectangle(x_m, y_m, x_m, y_m))
+        yield from _above_the_air(parts, f"{key}[2]", z_m)
+        for j, structure in parts.structures.items():
+            depth_m = depth_inside_m(gauge.position_m, structure)
+            if depth_m > MODULE_SIDE_M + TOLERANCE_M:
+                top = "" if structure.height_m is None else f", {structure.height_m:g} m high"
+                message = (
+                    f"{place}, {z_m:g} m high, is {depth_m:g} m deep inside structures[{j}],"
+                    f" {_described(structure)}{top}, must be at most {MODULE_SIDE_M:g} m deep"
+                )
+                yield Problem(key, message)
+
+
+def _above_the_air(
+    parts: Parts, key: str, height_m: float | None, ground_m: float = 0.0
+) -> Iterator[Problem]:
+    """Yield a problem if a height above its ground, such as a terrace, exceeds the air."""
+    if height_m is not None and ground_m + height_m > parts.air_height_m + TOLERANCE_M:
+        terrace = f" on a terrace of {ground_m:g}" if ground_m > 0.0 else ""
+        message = (
+            f"is {height_m:g}{terrace}, must be at most {parts.air_height_m:g}, the height of the"
+            " air (which site.air_height_m can raise)"
+        )
+        yield Problem(key, message)
+
+
+def _simulation_problems(parts: Parts) -> Iterator[Problem]:
+    """Check that no balls overlap at the start."""
+    if parts.parameters is None:
+        return
+    air, explosive = parts.parameters.air, parts.parameters.explosive
+    if 0.0 < air.spacing_units < 2.0 * air.radius_units:
+        yield Problem(
+            "simulation.overrides.air.spacing_units",
+            f"is {air.spacing_units:g}, must be 0 (no air) or at least"
+            f" {2.0 * air.radius_units:g}, twice radius_units: the balls would overlap",
+        )
+    else:
+        yield from _too_much_air(parts.site, air)
+    if explosive.collide_within_charge and explosive.ball_count > 1:
+        sine = math.sin(math.pi / explosive.ball_count)
+        if 2.0 * explosive.offset_units * sine < 2.0 * explosive.radius_units - TOLERANCE_M:
+            least = explosive.radius_units / sine
+            yield Problem(
+                "simulation.overrides.explosive.offset_units",
+                f"is {explosive.offset_units:g}, must be at least {least:g} for"
+                f" {explosive.ball_count} balls of one charge that collide with each other"
+                " (collide_within_charge): they would overlap",
+            )
+
+
+def particle_problems(
+    parameters: SimulationParameters,
+    sources: Sequence[AnySource],
+    structures: Sequence[AnyStructure],
+) -> Iterator[Problem]:
+    """Yield the features of a scenario that particles cannot simulate, unlike gas dynamics.
+
+    Args:
+        parameters: Parameters of the particle model, which bound the mass of every charge.
+        sources: The sources of the charges.
+        structures: The structures; all must stand on the ground, and none be a terrace.
+    """
+    for index, structure in enumerate(structures):
+        if structure.base_m > 0.0:
+            message = (
+                f"is {structure.base_m:g}, must be 0 for particles: they know no heights, and"
+                f" nothing would pass below {structure.name!r}; engine 'gas' takes it"
+            )
+            yield Problem(f"structures[{index}].base_m", message)
+        if structure.carries:
+            message = (
+                "is true, must be false for particles: they know no heights, and nothing would"
+                f" stand on {structure.name!r}; engine 'gas' takes it"
+            )
+            yield Problem(f"structures[{index}].carries", message)
+    for index, source in enumerate(sources):
+        try:
+            for_charge(parameters, source.tnt_kg)
+        except BlastEnvError as error:
+            yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
+
+
+def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
+    """Check the number of air balls, which memory limits."""
+    if site is None:
+        return
+    balls = lattice_capacity(air, site.rectangle_m.scaled(UNITS_PER_M))
+    if balls > MOST_AIR_BALLS:
+        yield Problem(
+            "simulation.overrides.air.spacing_units",
+            f"is {air.spacing_units:g}, which makes {balls:,} air balls on a site of"
+            f" {site.width_m:g} x {site.height_m:g} m, must make at most {MOST_AIR_BALLS:,}",
+        )
+
+
+def _outside_site(
+    parts: Parts, key: str, description: str, rectangle: Rectangle
+) -> Iterator[Problem]:
+    """Yield a problem if a rectangle is not inside the site."""
+    if parts.site and not parts.site.rectangle_m.contains(rectangle):
+        site = extent(parts.site.rectangle_m)
+        yield Problem(key, f"{description} must lie inside the site ({site})")
+
+
+def _place(point_m: PointM) -> str:
+    """Return the text of a point."""
+    return f"({point_m[0]:g}, {point_m[1]:g}) m"
+
+
+def _described(structure: AnyStructure) -> str:
+    """Return the name and the extent of a structure."""
+    return f"{structure.name!r} ({extent(structure.rectangle_m)})"

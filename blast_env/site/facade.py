@@ -1,0 +1,204 @@
+"""Facades: the components in the bays of a structure's walls.
+
+    [structures.facade]
+    storey_m = 3.5
+    glazing = "window_annealed_6"
+    wall = "brick_215"
+
+    [[structures.facade.parts]]         # other components in some of the bays
+    walls = ["west"]
+    storeys = [1]
+    glazing = "window_laminated_12"
+
+    [components.our_window]             # further components, beside those of the catalogue
+    kind = "glazing"
+    ...
+
+Measures of the build zone may put stronger components in some bays at a cost (`Hardening`).
+Loads do not depend on a facade; the response of the building does.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from blast_env.errors import BlastEnvError
+from blast_env.response.components import Glazing, Wall, catalogue
+from blast_env.response.damage import Alternatives
+from blast_env.response.facade import Bay, FilledBay, divide
+from blast_env.site.catalogue import Hardening
+from blast_env.site.problems import Problem, unknown_name
+from blast_env.site.sections import AnyStructure, FacadeSection
+
+MOST_BAYS: Final = 5_000
+"""Most bays of a scenario: a block of 20 storeys and 750 m of walls."""
+
+Components = Mapping[str, Glazing | Wall]
+
+
+@dataclass(frozen=True)
+class NamedBay:
+    """A bay with the names of its components.
+
+    Attributes:
+        bay: The bay.
+        window: Component of its windows in the facade, which has their sizes and sills.
+        glazing: Component of their glass.
+        wall: Component of its wall panel.
+    """
+
+    bay: Bay
+    window: str | None
+    glazing: str | None
+    wall: str | None
+
+    def hardened(self, measures: Sequence[Hardening]) -> "NamedBay":
+        """Return it with measures taken; the last one for a component counts."""
+        glazing, wall = self.glazing, self.wall
+        for measure in measures:
+            if measure.covers(self.bay):
+                glazing = glazing and (measure.glazing or glazing)
+                wall = wall and (measure.wall or wall)
+        return replace(self, glazing=glazing, wall=wall)
+
+    def filled(self, known: Components) -> FilledBay:
+        """Return it with its components.
+
+        Raises:
+            BlastEnvError: If the bay is empty, or smaller than a pane.
+        """
+        window, glass, wall = (
+            None if name is None else known[name] for name in (self.window, self.glazing, self.wall)
+        )
+        assert window is None or isinstance(window, Glazing)
+        assert wall is None or isinstance(wall, Wall)
+        if window is not None and self.glazing != self.window:
+            assert isinstance(glass, Glazing)
+            window = with_glass(window, glass)
+        return FilledBay(self.bay, window, wall)
+
+    def alternatives(self, measures: Sequence[Hardening], known: Components) -> Alternatives:
+        """Return its components, and those that measures would put there."""
+        reached = [self.hardened([each]) for each in measures]
+        glasses = dict.fromkeys(each.glazing for each in (self, *reached) if each.glazing)
+        walls = dict.fromkeys(each.wall for each in (self, *reached) if each.wall)
+        return Alternatives(
+            self.bay.name,
+            self.bay.structure,
+            {name: replace(self, glazing=name, wall=None).filled(known) for name in glasses},
+            {
+                name: replace(self, window=None, glazing=None, wall=name).filled(known)
+                for name in walls
+            },
+        )
+
+
+def with_glass(window: Glazing, glass: Glazing) -> Glazing:
+    """Return windows with other glass; sizes and sills stay."""
+    kept = {name: getattr(window, name) for name in ("width_m", "height_m", "sill_m")}
+    return glass.model_copy(update=kept)
+
+
+def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
+    """Return the bays of a structure with the names of their components; none without a facade.
+
+    Walls of a polygon that are shorter than half a bay have no windows.
+    """
+    facade = structure.facade
+    if facade is None or structure.height_m is None:
+        return ()
+    bays = divide(
+        structure.name,
+        structure.rectangle_m,
+        structure.height_m,
+        structure.faces,
+        facade.storey_m,
+        facade.bay_m,
+        structure.base_m,
+        () if structure.footprint is None else structure.footprint.walls,
+    )
+    named = []
+    for bay in bays:
+        glazing, wall = facade.glazing, facade.wall
+        for part in facade.parts:
+            if part.covers(bay):
+                glazing, wall = part.glazing or glazing, part.wall or wall
+        if bay.line is not None and bay.width_m < 0.5 * facade.bay_m:
+            glazing = None
+        if glazing or wall or bay.line is None:
+            named.append(NamedBay(bay, glazing, glazing, wall))
+    return tuple(named)
+
+
+def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> Iterator[Problem]:
+    """Yield the problems of the facades of a scenario.
+
+    Args:
+        structures: The valid structures, by index.
+        own: The components that the scenario defines.
+    """
+    known = {**catalogue(), **own}
+    bays = 0
+    for index, structure in structures.items():
+        facade = structure.facade
+        if facade is None:
+            continue
+        where = f"structures[{index}].facade"
+        if structure.height_m is None:
+            yield Problem(where, "needs the structure's height_m: bays are storeys high")
+            continue
+        problems = list(_name_problems(facade, where, known))
+        yield from problems
+        if problems:
+            continue
+        try:
+            bays += len([bay.filled(known) for bay in named_bays(structure)])
+        except BlastEnvError as error:
+            yield Problem(where, str(error))
+    if bays > MOST_BAYS:
+        yield Problem("structures", f"have {bays:,} bays in all, must be at most {MOST_BAYS:,}")
+
+
+def hardening_problems(
+    structures: Mapping[int, AnyStructure], own: Components, measures: Sequence[Hardening]
+) -> Iterator[Problem]:
+    """Yield the problems of the measures that harden facades.
+
+    Args:
+        structures: The valid structures, by index.
+        own: The components that the scenario defines.
+        measures: The measures.
+    """
+    known = {**catalogue(), **own}
+    names = [each.name for each in structures.values()]
+    bays = [bay for each in structures.values() for bay in named_bays(each)]
+    for index, measure in enumerate(measures):
+        where = f"build_zone.hardening[{index}]"
+        unknown = {i: name for i, name in enumerate(measure.structures or ()) if name not in names}
+        for place, name in unknown.items():
+            problem = unknown_name("structure", name, names)
+            yield Problem(f"{where}.structures[{place}]", problem)
+        if unknown:
+            continue
+        covered = [bay for bay in bays if measure.covers(bay.bay)]
+        for key, what in (("glazing", "windows"), ("wall", "a wall panel")):
+            name = getattr(measure, key)
+            if name is None:
+                continue
+            problems = list(_kind_problem(f"{where}.{key}", name, known))
+            yield from problems
+            if not problems and all(getattr(bay, key) is None for bay in covered):
+                yield Problem(where, f"{measure.name!r} covers no bay with {what}")
+
+
+def _kind_problem(where: str, name: str, known: Components) -> Iterator[Problem]:
+    """Yield a problem if a name is not that of a component of the key's kind."""
+    kind = Glazing if where.endswith("glazing") else Wall
+    fitting = [each for each, component in known.items() if isinstance(component, kind)]
+    if name not in fitting:
+        yield Problem(where, unknown_name("component", name, fitting))
+
+
+def _name_problems(facade: FacadeSection, where: str, known: Components) -> Iterator[Problem]:
+    for key, name in facade.names():
+        yield from _kind_problem(f"{where}.{key}", name, known)

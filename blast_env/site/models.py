@@ -1,0 +1,540 @@
+"""The scenario model, with all its sections.
+
+All lengths are in metres, x to the right and y upwards from the lower left corner of the site;
+heights are above the ground.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from hashlib import sha256
+from typing import Annotated, Any, Final, Self
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    StrictInt,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+
+from blast_env.errors import BlastEnvError, value_text
+from blast_env.geometry import Cell, Element, Measure
+from blast_env.response.components import Component, Glazing, Wall, catalogue
+from blast_env.response.damage import Alternatives
+from blast_env.response.facade import FilledBay
+from blast_env.site.catalogue import RIGID_KEYS, Hardening
+from blast_env.site.checks import (
+    Parts,
+    charge_radius_m,
+    check_parts,
+    check_sources,
+    particle_problems,
+    sound_parts,
+    vehicle_ground,
+)
+from blast_env.site.facade import NamedBay, named_bays
+from blast_env.site.heights import air_height_m, default_air_height_m, height_notes
+from blast_env.site.objective import ObjectiveSection
+from blast_env.site.parameters import SimulationParameters
+from blast_env.site.problems import Problem, ScenarioError, problems_from
+from blast_env.site.scene import Charge
+from blast_env.site.sections import (
+    FOR_PEOPLE,
+    AnyGeoreference,
+    AnySource,
+    AnyStructure,
+    ChargeSource,
+    ConcreteSquareSection,
+    GaugeSection,
+    ModularObstacleSection,
+    Name,
+    PointM,
+    PointSource,
+    PolygonSection,
+    RectangleSource,
+    Section,
+    SegmentSource,
+    SimulationSection,
+    Site,
+    SizeM,
+    StructureSection,
+    VehicleSource,
+)
+from blast_env.site.vehicles import AnyCharge, VehicleCharge, VehicleGround, ranked
+from blast_env.site.zone import (
+    BuildZone,
+    KeepOut,
+)
+from blast_env.units import MODULE_SIDE_M
+
+__all__ = [
+    "AnySource",
+    "AnyStructure",
+    "BuildZone",
+    "Cell",
+    "Charge",
+    "ChargeSource",
+    "ConcreteSquareSection",
+    "GaugeSection",
+    "KeepOut",
+    "ModularObstacleSection",
+    "ObjectiveSection",
+    "PointM",
+    "PointSource",
+    "PolygonSection",
+    "RectangleSource",
+    "Scenario",
+    "Section",
+    "SegmentSource",
+    "SimulationSection",
+    "Site",
+    "SizeM",
+    "StructureSection",
+    "VehicleCharge",
+    "VehicleSource",
+]
+
+SCHEMA_VERSION: Final = 2
+"""The version of the file format."""
+
+_OPTIONAL: Final[Mapping[str, tuple[str, ...]]] = {
+    "scenario": ("gauges", "objective"),
+    "charge": ("height_m",),
+    "structures": ("height_m", "base_m", "carries", "faces", "peak_weight", "facade"),
+    "objective": ("kind", "measure", "target"),
+    "build_zone": (
+        *("clearance_m", "module_cost", "cost_areas", "budget", "access_way", "height_m", "items"),
+        *("hardening", "removable"),
+    ),
+    "access_way": ("gate",),
+}
+"""Keys by section that the hashes leave out where they have their default values."""
+
+_NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
+"""Sections that the hash ignores; it has the parameters of `simulation` instead, and the components
+if the response of facades counts."""
+
+_BUILT: Final = {
+    *("kind", "name", "corner_m", "rows", "columns", "side_modules"),
+    *("height_m", "base_m", "carries", "outline_m", "courtyards_m"),
+}
+"""Keys of a structure for its shape and place."""
+
+Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
+"""The sources of the charge."""
+
+
+def _check_version(version: int) -> int:
+    """Refuse a file of another version of the format."""
+    if version != SCHEMA_VERSION:
+        raise ValueError(f"must be {SCHEMA_VERSION}, the version of this release")
+    return version
+
+
+class Scenario(Section):
+    """A protective-layout problem, without layout and seed.
+
+    Attributes:
+        schema_version: Version of the file format.
+        name: Short name, as in `load_scenario("courtyard")`.
+        description: Description for readers.
+        site: The simulated area.
+        charge: Sources of the charge: one, or several with weights.
+        structures: Structures, protected or not.
+        build_zone: The zone for barriers; without one, there are none.
+        simulation: Parameters of the particle model.
+        calibration: Name of the calibration that converts impulses of particles to Pa s.
+        gauges: Gauges of overpressure, for the engine `gas`.
+        objective: The objective of layouts.
+        georeference: Place of the site on a map or drawing; no result depends on it.
+        components: Components of facades by name, beside those of the catalogue.
+    """
+
+    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
+    name: Name
+    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
+    site: Site
+    charge: Sources
+    structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
+    build_zone: BuildZone | None = None
+    simulation: SimulationSection = SimulationSection()
+    calibration: Name | None = None
+    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
+    objective: ObjectiveSection = ObjectiveSection()
+    georeference: AnyGeoreference | None = None
+    components: Annotated[dict[Name, Component], Field(max_length=100)] = Field(
+        default_factory=dict
+    )
+
+    @property
+    def bays(self) -> tuple[FilledBay, ...]:
+        """The bays of all facades with their components."""
+        return self.bays_with(())
+
+    def bays_with(self, layout: Iterable[Element]) -> tuple[FilledBay, ...]:
+        """Return the bays of all facades with the measures of a layout taken."""
+        return tuple(bay.filled(self._known) for bay in self.named_bays(layout))
+
+    def named_bays(self, layout: Iterable[Element] = ()) -> tuple[NamedBay, ...]:
+        """Return the bays with the names of their components, with a layout's measures taken."""
+        taken = {each.item for each in layout if isinstance(each, Measure)}
+        measures = [each for each in self._hardening if each.name in taken]
+        return tuple(
+            bay.hardened(measures) for structure in self.structures for bay in named_bays(structure)
+        )
+
+    @property
+    def alternatives(self) -> tuple[Alternatives, ...]:
+        """The bays of all facades with their components and those of the measures."""
+        return tuple(bay.alternatives(self._hardening, self._known) for bay in self.named_bays())
+
+    @property
+    def _known(self) -> dict[str, Glazing | Wall]:
+        """All components by name."""
+        return {**catalogue(), **self.components}
+
+    @property
+    def _hardening(self) -> tuple[Hardening, ...]:
+        return () if self.build_zone is None else self.build_zone.hardening
+
+    @property
+    def zone(self) -> BuildZone:
+        """The build zone, for callers that need one.
+
+        Raises:
+            BlastEnvError: If there is none.
+        """
+        if self.build_zone is None:
+            raise BlastEnvError(
+                f"scenario {self.name!r} has no build zone, so nothing can be placed in it"
+            )
+        return self.build_zone
+
+    @property
+    def parameters(self) -> SimulationParameters:
+        """The parameters of the particle model."""
+        return self.simulation.parameters
+
+    @property
+    def charge_radius_m(self) -> float:
+        """Radius of the charge's disc at the start, m."""
+        return charge_radius_m(self.parameters)
+
+    @property
+    def air_height_m(self) -> float:
+        """Height of the simulated air, m: that of `site`, or the default.
+
+        The default is 12 m, or 6 m more than the highest structure or barrier if that is more.
+        """
+        return air_height_m(self.site, self.structures, self.build_zone)
+
+    @property
+    def height_notes(self) -> tuple[str, ...]:
+        """The features of the scenario that an engine without heights ignores."""
+        return height_notes(self.structures, self.charge, self.build_zone, self.gauges)
+
+    @property
+    def particle_problems(self) -> tuple[Problem, ...]:
+        """The reasons why particle engines cannot run the scenario; `gas` has no such limits."""
+        return tuple(particle_problems(self.parameters, self.charge, self.structures))
+
+    def check_for_particles(self) -> None:
+        """Refuse a scenario that particle engines cannot run.
+
+        Raises:
+            ScenarioError: If there are `particle_problems`; it has all of them.
+        """
+        problems = self.particle_problems
+        if problems:
+            raise ScenarioError(self.name, problems)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values, without the hash of the original."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("content_hash", None)
+        return copied
+
+    @cached_property
+    def content_hash(self) -> str:
+        """SHA-256 of all that affects results, without texts for readers.
+
+        It does not depend on name, description, reasons of areas, names of buildings, data for the
+        stability of barriers, georeference, order of keys, or the form (preset or overrides) of the
+        simulation parameters.
+        """
+        content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
+        for structure in content["structures"]:
+            structure.pop("building", None)
+            structure.pop("title")
+            if not self.objective.is_response:
+                structure.pop("facade", None)
+        if self.objective.is_response and self.components:
+            words = {"title", "source"}
+            content["components"] = {
+                name: each.model_dump(mode="json", exclude=words)
+                for name, each in self.components.items()
+            }
+        content["schema_version"] = 1
+        _omit_defaults(content, self, "scenario")
+        if "objective" in content:
+            _omit_defaults(content["objective"], self.objective, "objective")
+        for key in ("charge", "structures"):
+            for table, section in zip(content[key], getattr(self, key), strict=True):
+                _omit_defaults(table, section, key)
+        default_m = default_air_height_m(self.structures, self.build_zone)
+        if self.site.air_height_m in (None, default_m):
+            del content["site"]["air_height_m"]
+        if self.build_zone is not None:
+            content["build_zone"] = _without_words(self.build_zone)
+        for source in content["charge"]:
+            slow = (source.get("motion") or {}).get("slow", ())
+            for area in (*source.get("keep_outs", ()), *slow):
+                del area["reason"]
+        content["parameters"] = self.parameters.model_dump(mode="json")
+        return _digest(content)
+
+    @property
+    def site_hash(self) -> str:
+        """SHA-256 of build zone, catalogue and structures, which give a layout its meaning.
+
+        It does not depend on charges, objective, budget and facades, nor on protection, weights
+        and faces of structures.
+        """
+        zone = None if self.build_zone is None else _without_words(self.build_zone)
+        if zone is not None:
+            zone.pop("budget", None)
+        built = [each.model_dump(mode="json", include=_BUILT) for each in self.structures]
+        return _digest({"build_zone": zone, "structures": built})
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any], source: str) -> "Scenario":
+        """Return the scenario of a parsed file.
+
+        Args:
+            document: Nested like the models.
+            source: Name of the file, for the error.
+
+        Raises:
+            ScenarioError: If it is invalid; the error has all problems.
+        """
+        try:
+            return cls.model_validate(document)
+        except ValidationError as error:
+            problems = problems_from(error, cls)
+        # Pydantic skips the checks between sections if any section is invalid.
+        raise ScenarioError(source, (*problems, *check_parts(sound_parts(document))))
+
+    def at_stand_off(self, distance_m: float) -> "Scenario":
+        """Return the scenario with the structure at another distance from the charge.
+
+        The structure moves along x, and the site's right border with it: the strip behind the
+        structure keeps its width.
+
+        Args:
+            distance_m: Distance from the charge's centre to the near face of the structure.
+
+        Raises:
+            BlastEnvError: If there is not exactly one structure, to the right of a charge at one
+                fixed point, or if the distance is not positive.
+            ScenarioError: If the scenario would be out of bounds.
+        """
+        source, structure = self.charge[0], self.structures[0]
+        single = len(self.charge) == len(self.structures) == 1
+        if not (single and isinstance(source, PointSource)):
+            raise BlastEnvError(f"{self.name}: needs one point charge and one structure to move")
+        if isinstance(structure, PolygonSection):
+            raise BlastEnvError(f"{self.name}: the structure to move must be a rectangle")
+        x_m, near_m = source.position_m[0], structure.rectangle_m.left
+        if near_m <= x_m:
+            raise BlastEnvError(f"{self.name}: the structure must stand to the right of the charge")
+        if not distance_m > 0.0:
+            raise BlastEnvError(f"stand-off is {distance_m} m, must be greater than 0")
+        strip_m = self.site.width_m - structure.rectangle_m.right
+        corner_m = (x_m + distance_m, structure.corner_m[1])
+        document = self.model_dump()
+        document["structures"][0]["corner_m"] = corner_m
+        document["site"]["width_m"] = corner_m[0] + structure.columns * MODULE_SIDE_M + strip_m
+        return Scenario.from_document(document, f"{self.name} at {distance_m:g} m")
+
+    def with_charge(self, charge: Charge) -> "Scenario":
+        """Return the scenario with the charge at one fixed point.
+
+        Raises:
+            ScenarioError: If the charge would not be clear of a structure or the border.
+        """
+        if not isinstance(charge, Charge):
+            raise BlastEnvError(f"charge is {value_text(charge)}, must be a Charge")
+        return self._with_points((), (charge,))
+
+    def with_possible_charges(self, charges: Sequence[AnyCharge]) -> "Scenario":
+        """Return the scenario with further possible charges.
+
+        Modules must keep clear of these charges, too.
+
+        Raises:
+            ScenarioError: If a charge is out of bounds, or not clear of a structure or the border.
+        """
+        return self._with_points(self.charge, tuple(dict.fromkeys(charges)))
+
+    def _with_points(
+        self, sources: tuple[AnySource, ...], charges: tuple[AnyCharge, ...]
+    ) -> "Scenario":
+        """Return the scenario with the given sources and those of the charges.
+
+        The other sections are valid, so only the sources are checked against them.
+        """
+        document = [
+            {"kind": "point", **charge._asdict()}
+            if isinstance(charge, Charge)
+            else charge.source.model_dump()
+            for charge in charges
+        ]
+        try:
+            together = _SOURCES.validate_python((*sources, *document))
+        except ValidationError:  # the error of the whole document has all problems
+            own = [source.model_dump() for source in sources]
+            return Scenario.from_document(
+                self.model_dump() | {"charge": [*own, *document]}, self.name
+            )
+        problems = check_sources(self._parts(together))
+        if problems:
+            raise ScenarioError(self.name, problems)
+        return self.model_copy(update={"charge": together})
+
+    def with_simulation(
+        self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
+    ) -> "Scenario":
+        """Return the scenario with other parameters of the particle model.
+
+        Args:
+            preset: Name of another preset; the scenario's overrides stay.
+            overrides: Added to the scenario's: `{"air": {"spacing_units": 3.0}}`.
+
+        Raises:
+            ScenarioError: If there is no such preset or parameter, or a value is out of bounds.
+        """
+        document = self.model_dump()
+        simulation = document["simulation"]
+        simulation["preset"] = preset or simulation["preset"]
+        for group, values in (overrides or {}).items():
+            old = simulation["overrides"].get(group, {})
+            simulation["overrides"][group] = {**old, **values}
+        return Scenario.from_document(document, self.name)
+
+    @property
+    def vehicles(self) -> tuple[VehicleSource, ...]:
+        """The sources that are vehicles."""
+        return tuple(source for source in self.charge if isinstance(source, VehicleSource))
+
+    @property
+    def building_names(self) -> dict[str, str]:
+        """Name of each structure's building, by the structure's name."""
+        return {each.name: each.building_name for each in self.structures}
+
+    def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
+        """Return the structures that remain with a layout."""
+        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
+        return tuple(each for each in self.structures if each.name not in away)
+
+    def vehicle_ground(
+        self, source: VehicleSource, layout: Iterable[Element] = ()
+    ) -> VehicleGround:
+        """Return a vehicle's ground without barriers and the structures that a layout removes."""
+        ground = vehicle_ground(self._parts((source,)), source)
+        return replace(ground, structures=self.structures_with(layout))
+
+    def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
+        """Draw independent charges: a source by its weight, then a place in it.
+
+        Charges of one vehicle have rising ranks: its worst place, its second worst, and so on.
+        """
+        return ranked(self.sample_charge(rng) for _ in range(count))
+
+    def sample_charge(self, rng: np.random.Generator) -> AnyCharge:
+        """Draw a charge: a source by its weight, then a place in it, or a vehicle's worst place."""
+        weights = np.array([source.weight for source in self.charge])
+        # Drawn also for a single source, so that adding one does not shift the stream.
+        chosen = int(rng.choice(len(weights), p=weights / weights.sum()))
+        source = self.charge[chosen]
+        if isinstance(source, VehicleSource):
+            return VehicleCharge(source)
+        return Charge(source.sample_position_m(rng), source.tnt_kg, source.height_m)
+
+    @model_validator(mode="after")
+    def _check_sections_together(self) -> Self:
+        """Refuse a scenario with inconsistent sections."""
+        problems = check_parts(self._parts(self.charge))
+        if problems:
+            raise ScenarioError(self.name, problems)
+        return self
+
+    def _parts(self, sources: Sequence[AnySource]) -> Parts:
+        """Return the sections for the checks between them, with the given sources."""
+        return Parts(
+            site=self.site,
+            sources=dict(enumerate(sources)),
+            structures=dict(enumerate(self.structures)),
+            all_structures=True,
+            build_zone=self.build_zone,
+            parameters=self.parameters,
+            gauges=dict(enumerate(self.gauges)),
+            components=self.components,
+            objective=self.objective,
+        )
+
+
+_SOURCES: Final = TypeAdapter(Sources)
+
+
+def _digest(content: dict[str, Any]) -> str:
+    text = json.dumps(_without_negative_zero(content), sort_keys=True, allow_nan=False)
+    return sha256(text.encode()).hexdigest()
+
+
+def _without_words(zone: BuildZone) -> dict[str, Any]:
+    """Return the content of a zone without texts for readers and defaults of optional keys."""
+    content = zone.model_dump(mode="json")
+    for area in (*content["keep_outs"], *content["cost_areas"]):
+        del area["reason"]
+    for item in content["items"]:
+        for key in ("description", *RIGID_KEYS):
+            item.pop(key, None)
+        _without_test(item)
+    for measure in (*content["hardening"], *content["removable"]):
+        del measure["description"]
+    if zone.access_way is not None:
+        if zone.access_way.gate is not None:
+            _without_test(content["access_way"]["gate"])
+        _omit_defaults(content["access_way"], zone.access_way, "access_way")
+    _omit_defaults(content, zone, "build_zone")
+    return content
+
+
+def _omit_defaults(content: dict[str, Any], section: BaseModel, name: str) -> None:
+    """Remove the optional keys of a section that have their default values."""
+    for key in _OPTIONAL[name]:
+        field = type(section).model_fields[key]
+        if getattr(section, key) == field.get_default(call_default_factory=True):
+            content.pop(key, None)
+
+
+def _without_test(content: dict[str, Any]) -> None:
+    """Remove the description of a crash rating, or the key of a missing one."""
+    if content.get("crash_rating") is None:
+        content.pop("crash_rating", None)
+    else:
+        del content["crash_rating"]["test"]
+
+
+def _without_negative_zero(value: Any) -> Any:
+    """Return nested values with every -0.0 replaced by 0.0, which is the same place on a site."""
+    if isinstance(value, dict):
+        return {key: _without_negative_zero(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_negative_zero(item) for item in value]
+    return value + 0.0 if isinstance(value, float) else value

@@ -1,0 +1,315 @@
+"""The reach of a vehicle: the positions of its centre that are connected to its entries.
+
+The computation is exact, without a grid. Obstacles, grown by half of the vehicle's width on all
+sides, cut the plane of its centre into rectangles, edges and corners, each of which is open or
+closed as a whole. Lengths are whole micrometres. Places of the charge form a finer lattice, and
+each has the state of its part of the plane.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.site.sections import Site
+from blast_env.units import MODULE_SIDE_M
+
+_PER_M: Final = 1_000_000
+"""Micrometres in a metre; whole numbers make equal lengths compare equal."""
+
+_MOST_STEPS: Final = 1000
+"""Most regular places of the charge along a side of the site."""
+
+
+Steps = NDArray[np.int64]
+"""Lengths in micrometres."""
+
+
+def places_on(site: Site) -> int:
+    """Return the number of places of a vehicle's charge on a site without obstacles."""
+    along_x, along_y = (
+        steps_of(side_m) // _step(steps_of(side_m)) for side_m in (site.width_m, site.height_m)
+    )
+    return along_x * along_y
+
+
+def squares_of(site: Site) -> tuple[int, int]:
+    """Return the number of rows and of columns of squares of 0.5 m that cover a site."""
+    rows, columns = (ceil(m / MODULE_SIDE_M - 1e-9) for m in (site.height_m, site.width_m))
+    return rows, columns
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """The reach of a vehicle.
+
+    The plane of its centre is cut at `x_m` and `y_m` into corners, edges and rectangles: those of
+    even row and column are corners, those of odd row and column the rectangles between.
+
+    Attributes:
+        width_m: Side of its square.
+        x_m: Cuts along x, rising (columns,).
+        y_m: Cuts along y, rising (rows,).
+        start: Parts with its centre just after entry (2 rows - 1, 2 columns - 1).
+        reached: Parts that its centre can reach, of the same shape.
+        clear: Parts at which it covers no obstacle that it drives over, of the same shape.
+        lattice_x_m: x of the places of its charge, rising, all cuts included.
+        lattice_y_m: The same along y.
+    """
+
+    width_m: float
+    x_m: FloatArray
+    y_m: FloatArray
+    start: BoolArray
+    reached: BoolArray
+    clear: BoolArray
+    lattice_x_m: FloatArray
+    lattice_y_m: FloatArray
+
+    @property
+    def enters(self) -> bool:
+        """Whether it can enter."""
+        return bool(self.reached.any())
+
+    @cached_property
+    def places_m(self) -> FloatArray:
+        """Places of its charge (places, 2): the clear ones of the lattice within reach."""
+        return self._places_m(self.reached & self.clear)
+
+    @property
+    def starts_m(self) -> FloatArray:
+        """Places of its centre just after entry (places, 2)."""
+        return self._places_m(self.start)
+
+    def _places_m(self, where: BoolArray) -> FloatArray:
+        """Return the places of the lattice in some parts of the plane (places, 2)."""
+        of_row = _parts(self.y_m, self.lattice_y_m)
+        of_column = _parts(self.x_m, self.lattice_x_m)
+        rows, columns = np.nonzero(where[of_row[:, np.newaxis], of_column])
+        return np.column_stack((self.lattice_x_m[columns], self.lattice_y_m[rows]))
+
+    def near(self, rows: int, columns: int, step_m: float) -> BoolArray:
+        """Return whether each point of a grid has a reached place within half a step.
+
+        Args:
+            rows: Points upwards, from the lower border.
+            columns: Points to the right, from the left border.
+            step_m: Spacing of the points.
+        """
+        row, column = np.nonzero(self.reached)
+        count = np.zeros((rows + 1, columns + 1), dtype=np.int64)
+        ends = []
+        for cuts_m, index, most in ((self.y_m, row, rows), (self.x_m, column, columns)):
+            low = np.ceil(cuts_m[index // 2] / step_m - 0.5 - 1e-6).astype(np.intp)
+            high = np.floor(cuts_m[(index + 1) // 2] / step_m + 0.5 + 1e-6).astype(np.intp) + 1
+            ends.append((low.clip(0, most), high.clip(0, most)))
+        (bottom, top), (left, right) = ends
+        for y, sign in ((bottom, 1), (top, -1)):
+            np.add.at(count, (y, left), sign)
+            np.add.at(count, (y, right), -sign)
+        near: BoolArray = count.cumsum(axis=0).cumsum(axis=1)[:rows, :columns] > 0
+        return near
+
+    def touches(self, rectangle: Rectangle) -> tuple[bool, bool, bool, bool]:
+        """Return whether it reaches the left, lower, right and upper side of a rectangle."""
+        half_m = self.width_m / 2.0
+        left, bottom, right, top = rectangle.grown(half_m)
+        across = _inner_parts(self.y_m, bottom, top), _inner_parts(self.x_m, left, right)
+        found = []
+        for edge_m, cuts_m, columns in (
+            (left, self.x_m, True),
+            (bottom, self.y_m, False),
+            (right, self.x_m, True),
+            (top, self.y_m, False),
+        ):
+            at = int(np.searchsorted(cuts_m, edge_m - 1e-6))
+            if at == len(cuts_m) or abs(cuts_m[at] - edge_m) > 1e-6:
+                found.append(False)
+            elif columns:
+                found.append(bool(self.reached[across[0], 2 * at].any()))
+            else:
+                found.append(bool(self.reached[2 * at, across[1]].any()))
+        return found[0], found[1], found[2], found[3]
+
+    def ground(self, rows: int, columns: int) -> BoolArray:
+        """Return whether it can cover each square of 0.5 m from the site's lower left corner.
+
+        Args:
+            rows: Squares upwards.
+            columns: Squares to the right.
+        """
+        row, column = np.nonzero(self.reached)
+        left, right = _squares(self.x_m, column, self.width_m, columns)
+        bottom, top = _squares(self.y_m, row, self.width_m, rows)
+        # Two cumulative sums over the corners of rectangles count those that cover a square.
+        counts = np.zeros((rows + 1, columns + 1), dtype=np.int64)
+        for y, sign in ((bottom, 1), (top, -1)):
+            np.add.at(counts, (y, left), sign)
+            np.add.at(counts, (y, right), -sign)
+        covered: BoolArray = counts.cumsum(axis=0).cumsum(axis=1)[:rows, :columns] > 0
+        return covered
+
+
+def _parts(cuts_m: FloatArray, values_m: FloatArray) -> NDArray[np.intp]:
+    """Return the part of an axis in which each value lies: at a cut, or between two."""
+    before = np.searchsorted(cuts_m, values_m, side="left")
+    return before + np.searchsorted(cuts_m, values_m, side="right") - 1
+
+
+def _inner_parts(cuts_m: FloatArray, low_m: float, high_m: float) -> slice:
+    """Return the parts of an axis strictly between two cuts."""
+    first = 2 * int(np.searchsorted(cuts_m, low_m + 1e-6)) - 1
+    after = 2 * int(np.searchsorted(cuts_m, high_m - 1e-6))
+    return slice(max(first, 0), after)
+
+
+def _squares(
+    cuts_m: FloatArray, index: NDArray[np.intp], width_m: float, count: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first square covered from each part of the plane, and the one after the last."""
+    low_m = cuts_m[index // 2] - width_m / 2.0
+    high_m = cuts_m[(index + 1) // 2] + width_m / 2.0
+    first = np.floor(low_m / MODULE_SIDE_M + 1e-5).astype(np.intp)
+    after = np.ceil(high_m / MODULE_SIDE_M - 1e-5).astype(np.intp)
+    return first.clip(0, count), after.clip(0, count)
+
+
+@dataclass(frozen=True)
+class ReachQuery:
+    """The input of the computation of a vehicle's reach.
+
+    Attributes:
+        site: The site.
+        width_m: Side of the vehicle's square.
+        entries_m: Strips of its entries, just inside the border.
+        closed_m: Obstacles that it must not cover.
+        solid_m: Obstacles that it drives over, but on which no charge goes off.
+        level_m: Rectangles with corners that add their x and y to the lattice of the charge.
+    """
+
+    site: Site
+    width_m: float
+    entries_m: tuple[Rectangle, ...]
+    closed_m: tuple[Rectangle, ...]
+    solid_m: tuple[Rectangle, ...]
+    level_m: tuple[Rectangle, ...]
+
+    def answer(self) -> Reach:
+        """Compute the reach of the vehicle."""
+        from scipy.ndimage import label  # takes a third of a second to import
+
+        plane = _Plane.of(self)
+        closed = plane.covering(self.closed_m)
+        start = np.zeros_like(closed)
+        for strip_m in self.entries_m:
+            start[plane.start(strip_m)] = True
+        start &= ~closed
+        # Corners connect along edges, and edges along rectangles, so parts connect side by side
+        # and never diagonally.
+        labels, count = label(~closed)
+        connected = np.zeros(count + 1, dtype=bool)
+        connected[labels[start]] = True
+        return Reach(
+            width_m=self.width_m,
+            x_m=plane.x / _PER_M,
+            y_m=plane.y / _PER_M,
+            start=start,
+            reached=connected[labels],
+            clear=~plane.covering(self.solid_m),
+            lattice_x_m=plane.lattice_x / _PER_M,
+            lattice_y_m=plane.lattice_y / _PER_M,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """The plane of the centres of a vehicle, cut by all obstacles, micrometres.
+
+    Attributes:
+        x: Cuts along x, rising; at the first and the last the vehicle touches the border.
+        y: Cuts along y.
+        lattice_x: x of the places of its charge, rising, cuts included.
+        lattice_y: The same along y.
+        half: Half of its width.
+    """
+
+    x: Steps
+    y: Steps
+    lattice_x: Steps
+    lattice_y: Steps
+    half: int
+
+    @classmethod
+    def of(cls, query: ReachQuery) -> "_Plane":
+        half = steps_of(query.width_m) // 2
+        boxes = np.concatenate(
+            (_grown((*query.closed_m, *query.solid_m), half), _grown(query.entries_m, -half))
+        )
+        # The places nearest to a structure touch it, or are level with its corners.
+        level = _grown(query.level_m, 0)
+        cuts, lattices = [], []
+        for axis, side_m in enumerate((query.site.width_m, query.site.height_m)):
+            end = steps_of(side_m)
+            last = max(end - half, half)
+            regular = np.arange(half, last + 1, _step(end), dtype=np.int64)
+            cut = _within(boxes[:, axis::2], half, last)
+            cuts.append(cut)
+            lattices.append(
+                np.unique(np.concatenate((cut, regular, _within(level[:, axis::2], half, last))))
+            )
+        return cls(cuts[0], cuts[1], lattices[0], lattices[1], half)
+
+    def covering(self, rectangles_m: Iterable[Rectangle]) -> BoolArray:
+        """Return whether the vehicle overlaps a rectangle at each part; touching does not count."""
+        covered = np.zeros((2 * len(self.y) - 1, 2 * len(self.x) - 1), dtype=bool)
+        left, bottom, right, top = _grown(rectangles_m, self.half).T
+        # The parts strictly between; a value that is not a cut lies beyond all of them.
+        low = np.maximum(2 * np.searchsorted(self.y, bottom, side="right") - 1, 0)
+        high = 2 * np.searchsorted(self.y, top, side="left")
+        first = np.maximum(2 * np.searchsorted(self.x, left, side="right") - 1, 0)
+        after = 2 * np.searchsorted(self.x, right, side="left")
+        for own in zip(*map(np.ndarray.tolist, (low, high, first, after)), strict=True):
+            covered[own[0] : own[1], own[2] : own[3]] = True
+        return covered
+
+    def start(self, strip_m: Rectangle) -> tuple[slice, slice]:
+        """Return the parts at which the vehicle stands within the strip behind an entry."""
+        ((left, bottom, right, top),) = _grown((strip_m,), -self.half)
+        return _from_to(self.y, bottom, top), _from_to(self.x, left, right)
+
+
+def steps_of(length_m: float) -> int:
+    """Return a length in micrometres."""
+    return round(length_m * _PER_M)
+
+
+def _grown(rectangles_m: Iterable[Rectangle], by: int) -> Steps:
+    """Return left, bottom, right and top of rectangles, grown on all sides (rectangles, 4)."""
+    sides_m = np.array([*rectangles_m], dtype=np.float64).reshape(-1, 4)
+    steps = np.rint(sides_m * _PER_M).astype(np.int64)  # as `steps_of`
+    grown: Steps = steps + np.array((-by, -by, by, by))
+    return grown
+
+
+def _within(edges: Steps, first: int, last: int) -> Steps:
+    """Return the distinct edges between two ends, and the ends, rising."""
+    inside = edges[(edges > first) & (edges < last)]
+    return np.unique(np.append(inside, (first, last)))
+
+
+def _step(end: int) -> int:
+    """Return the spacing of regular places of the charge on a side of the site, micrometres."""
+    module = steps_of(MODULE_SIDE_M)
+    return module * ceil(end / module / _MOST_STEPS)
+
+
+def _from_to(cuts: Steps, low: int, high: int) -> slice:
+    """Return the parts of an axis from one cut to another, both within the site."""
+    first, last = np.searchsorted(cuts, np.clip([low, high], cuts[0], cuts[-1]))
+    return slice(2 * int(first), 2 * int(last) + 1)

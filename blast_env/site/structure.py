@@ -1,0 +1,353 @@
+"""Structures of square modules, and the surface that balls can reach."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
+from blast_env.site.balls import CollisionType
+from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
+
+_HALF: Final = MODULE_SIDE_UNITS / 2.0
+_BEYOND: Final = 1e-6  # distance beyond an edge at which modules are looked up, units
+
+
+@dataclass(frozen=True, eq=False)
+class WallSurface:
+    """The accessible surface of a set of modules.
+
+    Attributes:
+        free_faces: Whether no module adjoins the face (m, 4); the faces are left, right, lower,
+            upper.
+        covered_corners: Whether the wall continues beyond the corner (m, 4); the corners are lower
+            left, lower right, upper left, upper right.
+    """
+
+    free_faces: BoolArray
+    covered_corners: BoolArray
+
+    @property
+    def exposed(self) -> BoolArray:
+        """Whether any face of the module is free (m,)."""
+        return np.asarray(self.free_faces.any(axis=1))
+
+
+def wall_surface(centres: FloatArray) -> WallSurface:
+    """Find the exposed modules and the covered corners.
+
+    Args:
+        centres: Centres of the intact modules, units (m, 2).
+    """
+    lattices = tuple(_lattices(centres))
+    free = np.ones((len(centres), 4), dtype=np.bool_)
+    for lattice in lattices:
+        free[lattice.members] = lattice.free_faces()
+    left, right, lower, upper = ~free.T
+    covered = np.stack((left | lower, right | lower, left | upper, right | upper), axis=1)
+    if len(lattices) > 1:
+        for corner, (x_sign, y_sign) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
+            past_in_x = centres + (x_sign * (_HALF + _BEYOND), y_sign * (_HALF - _BEYOND))
+            past_in_y = centres + (x_sign * (_HALF - _BEYOND), y_sign * (_HALF + _BEYOND))
+            for lattice in lattices:
+                covered[:, corner] |= lattice.is_solid(past_in_x) | lattice.is_solid(past_in_y)
+    return WallSurface(free_faces=free, covered_corners=covered)
+
+
+@dataclass(frozen=True, eq=False)
+class _Lattice:
+    """Modules whose centres differ by whole modules.
+
+    Attributes:
+        members: Indices of the modules (k,).
+        origin: Lower left corner of the occupancy's first cell, units (2,).
+        cells: Column and row of each of them in the occupancy (2, k).
+        occupied: Occupancy (columns, rows), with a border of empty cells.
+    """
+
+    members: NDArray[np.int64]
+    origin: FloatArray
+    cells: NDArray[np.int64]
+    occupied: BoolArray
+
+    def free_faces(self) -> BoolArray:
+        """Return whether no module of this lattice adjoins the faces (k, 4)."""
+        column, row = self.cells
+        solid = self.occupied
+        beside = solid[column - 1, row], solid[column + 1, row]
+        return ~np.stack((*beside, solid[column, row - 1], solid[column, row + 1]), axis=1)
+
+    def is_solid(self, points: FloatArray) -> BoolArray:
+        """Return whether a module of this lattice covers each point (n, 2)."""
+        cell = np.floor((points - self.origin) / MODULE_SIDE_UNITS).astype(np.int64)
+        inside: BoolArray = np.all((cell >= 0) & (cell < self.occupied.shape), axis=1)
+        cell = np.where(inside[:, None], cell, 0)
+        solid: BoolArray = inside & self.occupied[cell[:, 0], cell[:, 1]]
+        return solid
+
+
+def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
+    """Group the modules by lattice."""
+    if not len(centres):
+        return
+    # Digits below 1e-9 units are rounding of the metres in a scenario file.
+    offsets = np.round(np.mod(centres, MODULE_SIDE_UNITS), 9) % MODULE_SIDE_UNITS
+    for offset in np.unique(offsets @ (1.0, 1.0j)):  # much faster than by rows
+        members = np.flatnonzero((offsets == (offset.real, offset.imag)).all(axis=1))
+        own = centres[members]
+        origin = own.min(axis=0) - (_HALF + MODULE_SIDE_UNITS)
+        cells = np.floor((own - origin) / MODULE_SIDE_UNITS).astype(np.int64).T
+        occupied = np.zeros(cells.max(axis=1) + 2, dtype=np.bool_)
+        occupied[*cells] = True
+        yield _Lattice(members, origin, cells, occupied)
+
+
+Colour = tuple[int, int, int]
+
+BARRIER_NAME: Final = "barrier"
+"""Name of the structure formed by the modules of a layout."""
+
+
+class LoadColours(NamedTuple):
+    """Colours of a module at no, half and full load, for interpolation."""
+
+    unloaded: Colour = (236, 226, 198)
+    half: Colour = (240, 128, 48)
+    full: Colour = (122, 4, 46)
+
+
+def module_name(x_m: float, y_m: float) -> str:
+    """Return the identifier of the module with this centre."""
+    return f"x{x_m:.3f}_y{y_m:.3f}"
+
+
+@dataclass(slots=True)
+class ModularPart:
+    """The basic building element: a static square of 2 units (section 2.7).
+
+    Attributes:
+        structure: Name of its structure.
+        row: Row in the structure's grid, upwards.
+        column: Column in the structure's grid.
+        x: Coordinate x of the centre, units.
+        y: Coordinate y of the centre, units.
+        capacity: Impulse above which it is removed, simulation units; `None` for no limit.
+        piece: Name of its barrier piece; empty for none.
+        hits: Number of collisions.
+        impulse: Sum of m |v| of these collisions (section 2.8), simulation units.
+        transferred_impulse: Sum of the momentum actually transferred along the normals of the
+            contacts, simulation units.
+        first_hit_s: Time of the first collision; `None` before it.
+    """
+
+    collision_type = CollisionType.ModularPart
+
+    structure: str
+    row: int
+    column: int
+    x: float
+    y: float
+    capacity: float | None = None
+    piece: str = ""
+    hits: int = 0
+    impulse: float = 0.0
+    transferred_impulse: float = 0.0
+    first_hit_s: float | None = None
+
+    @property
+    def module_id(self) -> str:
+        """Identifier by the position of the centre in metres, unique on a site."""
+        return module_name(*self.centre_m)
+
+    @property
+    def centre_m(self) -> tuple[float, float]:
+        """The centre."""
+        return self.x / UNITS_PER_M, self.y / UNITS_PER_M
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """The square, units."""
+        half = MODULE_SIDE_UNITS / 2.0
+        return Rectangle(self.x - half, self.y - half, self.x + half, self.y + half)
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The square."""
+        return self.rectangle.scaled(1.0 / UNITS_PER_M)
+
+    @property
+    def destroyed(self) -> bool:
+        """Whether the accumulated impulse exceeds the capacity."""
+        return self.capacity is not None and self.impulse > self.capacity
+
+    def register(self, time_s: float, impulse: float, transferred_impulse: float) -> None:
+        """Count one collision.
+
+        Args:
+            time_s: Its time.
+            impulse: Its m |v|, simulation units.
+            transferred_impulse: Its transferred momentum, simulation units.
+        """
+        if self.first_hit_s is None:
+            self.first_hit_s = time_s
+        self.hits += 1
+        self.impulse += impulse
+        self.transferred_impulse += transferred_impulse
+
+    def colour(self, full_impulse: float) -> Colour:
+        """Return the colour of the load.
+
+        Args:
+            full_impulse: The impulse of full load, simulation units.
+        """
+        return load_colour(self.impulse / full_impulse if full_impulse > 0.0 else 0.0)
+
+
+@dataclass
+class ModularObstacle:
+    """A grid of `ModularPart`s that it creates and manages (section 2.7).
+
+    Attributes:
+        name: Name of the structure.
+        corner: Lower left corner, units.
+        rows: Rows of the grid.
+        columns: Columns of the grid.
+        protected: Whether its load counts.
+        weight: Its weight among the protected structures.
+        cells: The (row, column) of the cells with a module; `None` for all.
+        capacity: Capacity of each module; `None` for no limit.
+        pieces: Names of the modules' barrier pieces, in the order of `cells`; `None` for none.
+        parts: The modules.
+    """
+
+    name: str
+    corner: tuple[float, float]
+    rows: int
+    columns: int
+    protected: bool = False
+    weight: float = 1.0
+    cells: Sequence[tuple[int, int]] | None = None
+    capacity: float | None = None
+    pieces: Sequence[str] | None = None
+    parts: list[ModularPart] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Create the parts."""
+        half = MODULE_SIDE_UNITS / 2.0
+        self.parts = [
+            ModularPart(
+                structure=self.name,
+                row=row,
+                column=column,
+                x=self.corner[0] + column * MODULE_SIDE_UNITS + half,
+                y=self.corner[1] + row * MODULE_SIDE_UNITS + half,
+                capacity=self.capacity,
+                piece="" if self.pieces is None else self.pieces[number],
+            )
+            for number, (row, column) in enumerate(self._used_cells())
+        ]
+
+    @property
+    def kind(self) -> str:
+        """Name of the class, as in scenario files."""
+        return type(self).__name__
+
+    @property
+    def is_barrier(self) -> bool:
+        """Whether it is the barrier of a layout."""
+        return self.name == BARRIER_NAME
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """The rectangle of the whole grid, units."""
+        size = (self.columns * MODULE_SIDE_UNITS, self.rows * MODULE_SIDE_UNITS)
+        return Rectangle.from_corner(self.corner, size)
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The rectangle of the whole grid."""
+        return self.rectangle.scaled(1.0 / UNITS_PER_M)
+
+    @property
+    def boxes_m(self) -> list[Rectangle]:
+        """Its plan: the whole grid, or its modules if they do not fill it."""
+        if self.cells is None:
+            return [self.rectangle_m]
+        return [part.rectangle_m for part in self.parts]
+
+    @property
+    def hits(self) -> int:
+        """Collisions with any of the modules."""
+        return sum(part.hits for part in self.parts)
+
+    @property
+    def first_hit_s(self) -> float | None:
+        """Time of the first collision; None before it."""
+        times = (part.first_hit_s for part in self.parts if part.first_hit_s is not None)
+        return min(times, default=None)
+
+    @property
+    def impulse(self) -> float:
+        """Sum of the modules' impulses, simulation units."""
+        return float(sum(part.impulse for part in self.parts))
+
+    @property
+    def transferred_impulse(self) -> float:
+        """Sum of the momentum actually transferred to the modules, simulation units."""
+        return float(sum(part.transferred_impulse for part in self.parts))
+
+    def _used_cells(self) -> Iterator[tuple[int, int]]:
+        if self.cells is not None:
+            return iter(self.cells)
+        return ((row, column) for row in range(self.rows) for column in range(self.columns))
+
+
+class ConcreteSquare(ModularObstacle):
+    """A square concrete structure: as many rows as columns of modules (section 2.7)."""
+
+    def __post_init__(self) -> None:
+        """Create the parts, after a check of the shape.
+
+        Raises:
+            ValueError: If rows and columns differ.
+        """
+        if self.rows != self.columns:
+            raise ValueError(
+                f"ConcreteSquare {self.name!r} has {self.rows} rows and {self.columns} columns, "
+                "must have as many rows as columns"
+            )
+        super().__post_init__()
+
+
+@dataclass(frozen=True)
+class Border:
+    """The boundary of the simulated space; a ball that reaches it is removed (section 2.4).
+
+    Attributes:
+        site: The simulated area, units.
+    """
+
+    collision_type = CollisionType.Border
+
+    site: Rectangle
+
+    def lines(self) -> tuple[tuple[tuple[float, float], tuple[float, float]], ...]:
+        """Return the four border lines, each from its start to its end."""
+        left, bottom, right, top = self.site
+        corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+        return tuple(zip(corners, corners[1:] + corners[:1], strict=True))
+
+
+def load_colour(share: float) -> Colour:
+    """Return the colour of a load between 0 (none) and 1 (full), clipped to that range."""
+    colours = LoadColours()
+    share = min(max(share, 0.0), 1.0)
+    low, high = (colours.unloaded, colours.half) if share < 0.5 else (colours.half, colours.full)
+    part = 2.0 * share if share < 0.5 else 2.0 * share - 1.0
+    red, green, blue = (
+        round(start + part * (end - start)) for start, end in zip(low, high, strict=True)
+    )
+    return red, green, blue

@@ -1,0 +1,531 @@
+"""Vehicles with a charge: the obstacles that stop one, and the places of its charge.
+
+A vehicle is a square of ground, `width_m` on a side, with sides parallel to those of the site. From
+the border it moves in any direction without rotation, and never covers a structure, closed ground,
+a gate, or an obstacle that stops it. Touching is allowed: it fits through a gap of exactly its
+width, but not through one that is 1 micrometre narrower, nor diagonally between two touching
+obstacles (`blast_env.site.reach`).
+
+A vehicle with a motion breaks through pieces whose crash rating does not cover its mass, or its
+impact speed (`blast_env.site.driving`), and drives on without loss of speed. Broken pieces open
+ways to others and longer run-ups, so the search repeats until no further piece breaks.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from math import hypot
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Element, Rectangle, stacked_runs, standing
+from blast_env.site.catalogue import element_text
+from blast_env.site.crash_rating import CrashRating
+from blast_env.site.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
+from blast_env.site.reach import Reach, ReachQuery, steps_of
+from blast_env.site.scene import Charge, WallName
+from blast_env.site.sections import (
+    AnySource,
+    AnyStructure,
+    Entry,
+    PointM,
+    PointSource,
+    Site,
+    VehicleSource,
+)
+from blast_env.site.terraces import ground_below_m
+from blast_env.site.worst_places import WorstPlaces, nearest_wall, worst_of
+from blast_env.site.zone import BuildZone
+from blast_env.units import MODULE_SIDE_M
+
+_SAME_M: Final = 1e-9
+"""Tolerance within which edges are equal, as in `Rectangle.contains`."""
+
+MOST_PLACES: Final = 3_000_000
+"""Most places of the charges of all vehicles: three vehicles on the largest site."""
+
+
+@dataclass(frozen=True)
+class VehicleCharge:
+    """The charge of a vehicle without a layout; see `WorstPlaces.charge`.
+
+    Attributes:
+        source: The vehicle.
+        rank: Rank of its place among the worst places, from 0.
+    """
+
+    source: VehicleSource
+    rank: int = 0
+
+    @property
+    def tnt_kg(self) -> float:
+        """TNT-equivalent mass."""
+        return self.source.tnt_kg
+
+    @property
+    def height_m(self) -> float:
+        """Height of the charge's centre above the ground."""
+        return self.source.height_m
+
+    def with_charge(
+        self, tnt_kg: float | None = None, height_m: float | None = None
+    ) -> "VehicleCharge":
+        """Return a copy with another mass, kg, or height, m; bounds are not checked."""
+        changes = {"tnt_kg": tnt_kg, "height_m": height_m}
+        given = {key: value for key, value in changes.items() if value is not None}
+        return VehicleCharge(self.source.model_copy(update=given), self.rank)
+
+
+AnyCharge = Charge | VehicleCharge
+"""A charge at a place, or one in a vehicle, with a place that depends on the layout."""
+
+
+def source_of(charge: AnyCharge) -> AnySource:
+    """Return the source of a single charge: a point, or the vehicle.
+
+    Raises:
+        ValidationError: If the charge is out of bounds.
+    """
+    return charge.source if isinstance(charge, VehicleCharge) else PointSource.at(charge)
+
+
+def ranked(charges: Iterable[AnyCharge]) -> tuple[AnyCharge, ...]:
+    """Return charges with rising ranks for those of each vehicle."""
+    met: dict[VehicleSource, int] = {}
+    result: list[AnyCharge] = []
+    for charge in charges:
+        if isinstance(charge, VehicleCharge):
+            rank = met.get(charge.source, 0)
+            met[charge.source] = rank + 1
+            result.append(VehicleCharge(charge.source, rank))
+        else:
+            result.append(charge)
+    return tuple(result)
+
+
+class RatedPiece(NamedTuple):
+    """A piece or gate that stops the vehicles covered by its crash rating.
+
+    Attributes:
+        rectangle: Its rectangle, m.
+        rating: Its crash rating.
+        name: Its name in messages.
+    """
+
+    rectangle: Rectangle
+    rating: CrashRating
+    name: str
+
+
+class Obstacles(NamedTuple):
+    """The obstacles of a layout for vehicles, rectangles in m.
+
+    Attributes:
+        stops: Obstacles that stop every vehicle.
+        solid: Obstacles that vehicles drive over, but inside which no charge goes off.
+        rated: Obstacles with a crash rating.
+    """
+
+    stops: tuple[Rectangle, ...] = ()
+    solid: tuple[Rectangle, ...] = ()
+    rated: tuple[RatedPiece, ...] = ()
+
+
+NOTHING: Final = Obstacles()
+"""The empty site."""
+
+
+def obstacles_of(
+    zone: BuildZone, layout: Iterable[Element], structures: Sequence[AnyStructure]
+) -> Obstacles:
+    """Return the obstacles of a layout.
+
+    Single modules stop vehicles; items of a catalogue do if `stops_vehicles` is true. Elements on a
+    terrace are out of reach, and no obstacles.
+
+    Raises:
+        LayoutError: If there is no such item, or it cannot be turned.
+    """
+    terraces = [each for each in structures if each.carries]
+    stops: list[Rectangle] = []
+    solid: list[Rectangle] = []
+    rated: list[RatedPiece] = []
+    for element in sorted(standing(layout)):
+        variant, rectangle = zone.catalogue.variant(element), zone.element_rectangle_m(element)
+        if ground_below_m(terraces, rectangle) > 0.0:
+            continue
+        if variant.crash_rating is not None:
+            rated.append(RatedPiece(rectangle, variant.crash_rating, element_text(element)))
+        else:
+            (stops if variant.stops_vehicles else solid).append(rectangle)
+    return Obstacles(tuple(stops), tuple(solid), tuple(rated))
+
+
+@dataclass(frozen=True)
+class VehicleGround:
+    """A vehicle with its surroundings on the empty site.
+
+    Attributes:
+        source: The vehicle.
+        site: The site.
+        structures: The structures.
+        gates: Gates that stop it at any speed.
+        rated_gates: Gates with a crash rating.
+        charge_radius_m: Radius of the charge's disc.
+    """
+
+    source: VehicleSource
+    site: Site
+    structures: tuple[AnyStructure, ...]
+    gates: tuple[Rectangle, ...] = ()
+    rated_gates: tuple[RatedPiece, ...] = ()
+    charge_radius_m: float = MODULE_SIDE_M
+
+    @property
+    def entries(self) -> tuple[tuple[Entry, WallName], ...]:
+        """The wide enough entries on the border, each with its side of the site."""
+        return tuple(
+            (entry, side)
+            for entry in self.source.entries
+            if (side := entry.side(self.site)) is not None
+            and steps_of(entry.length_m) >= steps_of(self.source.width_m)
+        )
+
+    @cached_property
+    def closed_m(self) -> tuple[Rectangle, ...]:
+        """All closed rectangles, including gates with a crash rating."""
+        return (*self.always_closed_m, *(gate.rectangle for gate in self.rated_gates))
+
+    @cached_property
+    def standing_m(self) -> tuple[Rectangle, ...]:
+        """The structures that it cannot pass below."""
+        return tuple(
+            box for each in self.structures if not each.lets_through for box in each.boxes_m
+        )
+
+    @cached_property
+    def always_closed_m(self) -> tuple[Rectangle, ...]:
+        """The rectangles that are closed at any speed."""
+        return (
+            *self.standing_m,
+            *(area.rectangle_m for area in self.source.keep_outs),
+            *self.gates,
+            *_outside(
+                self.site.rectangle_m, tuple(each.rectangle_m for each in self.source.drivable)
+            ),
+        )
+
+    def drive(self, obstacles: Obstacles = NOTHING) -> "Drive":
+        """Return the drive of the vehicle against obstacles, cached."""
+        return _drive(self, obstacles)
+
+    def reach(self, obstacles: Obstacles = NOTHING) -> Reach:
+        """Return the reach of the vehicle against obstacles, cached."""
+        return self.drive(obstacles).reach
+
+    def worst_places(self, obstacles: Obstacles = NOTHING) -> WorstPlaces:
+        """Return the worst places of its charge against obstacles, cached."""
+        return _worst_places(self, obstacles)
+
+    def explain(self, obstacles: Obstacles = NOTHING) -> str:
+        """Return a sentence with the vehicle's stand-off, way and speeds."""
+        worst, source = self.worst_places(obstacles), self.source
+        x_m, y_m = worst.places_m[0]
+        name = f"the vehicle with {source.tnt_kg:g} kg TNT"
+        text = f"{name} comes as near as {worst.stand_off_m:.1f} m"
+        if source.motion is None:
+            stopped = "no speed is given: whatever stops vehicles stops it"
+            return f"{text}, at ({x_m:g}, {y_m:g}) m; {stopped}"
+        way, through = self.drive(obstacles).weakest_way
+        steps = []
+        if way:
+            (from_x_m, from_y_m), speed_km_h = way[0]
+            steps.append(f"in at ({from_x_m:g}, {from_y_m:g}) m with {speed_km_h:.0f} km/h")
+        for piece, speed_km_h, _ in through:
+            hit = f"hit at {speed_km_h:.0f} km/h but {piece.rating.words}"
+            steps.append(f"through {piece.name.rstrip(',')}, {hit}")
+        mass = f"{source.motion.mass_kg:g} kg"
+        return f"{text} ({mass}): {', '.join((*steps, f'to ({x_m:g}, {y_m:g}) m'))}"
+
+    @property
+    def entry_stand_off_m(self) -> float:
+        """Least distance of its centre, just after entry, from a loaded wall, m."""
+        return float(nearest_wall(self.reach().starts_m, self.structures)[0].min())
+
+
+class Impact(NamedTuple):
+    """The fastest impact of a vehicle on a piece with a crash rating.
+
+    Attributes:
+        piece: The piece.
+        speed_km_h: Largest impact speed.
+        holds: Whether it stops the vehicle.
+    """
+
+    piece: RatedPiece
+    speed_km_h: float
+    holds: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The drive of a vehicle against a layout.
+
+    Attributes:
+        ground: The vehicle with its surroundings on the empty site.
+        reach: Its reach, through the broken pieces.
+        held: The pieces with a crash rating that stop it, if it reaches them.
+        broken: The pieces with a crash rating that do not.
+    """
+
+    ground: VehicleGround
+    reach: Reach
+    held: tuple[RatedPiece, ...]
+    broken: tuple[RatedPiece, ...]
+
+    @cached_property
+    def speeds(self) -> SpeedField | None:
+        """Its largest speed at each place; `None` if it has no motion."""
+        if self.ground.source.motion is None:
+            return None
+        return _speeds(self.ground, self.reach.near(*_places_shape(self.ground), STEP_M))
+
+    @cached_property
+    def impacts(self) -> tuple[Impact, ...]:
+        """Its impacts on pieces with a crash rating, broken ones first; none without a motion."""
+        if self.speeds is None:
+            return ()
+        return tuple(
+            Impact(piece, speed_km_h, holds)
+            for pieces, holds in ((self.broken, False), (self.held, True))
+            for piece in pieces
+            if (speed_km_h := self.speeds.impact_km_h(piece.rectangle)) is not None
+        )
+
+    @cached_property
+    def worst(self) -> WorstPlaces:
+        """The worst places of its charge.
+
+        Raises:
+            ValueError: If the vehicle cannot enter, which a valid scenario excludes.
+        """
+        if not len(self.places_m):
+            raise ValueError("the vehicle cannot enter, so its charge goes off nowhere")
+        return worst_of(self.ground.source, self.places_m, self.ground.structures)
+
+    @cached_property
+    def weakest_way(self) -> tuple[tuple[WayPoint, ...], tuple[Impact, ...]]:
+        """A way to the worst place with its speeds, and the impacts on the pieces it breaks.
+
+        Both are in the order of the drive, and empty without a motion.
+        """
+        if self.speeds is None:
+            return (), ()
+        way = self.speeds.way_to(self.worst.places_m[0])
+        met: dict[RatedPiece, None] = {}
+        for x_m, y_m in _along(way):
+            around = Rectangle(x_m, y_m, x_m, y_m).grown(self.reach.width_m / 2.0)
+            met |= dict.fromkeys(each for each in self.broken if around.overlaps(each.rectangle))
+        hit = {impact.piece: impact for impact in self.impacts}
+        return way, tuple(hit[piece] for piece in met if piece in hit)
+
+    @cached_property
+    def places_m(self) -> FloatArray:
+        """Places of its charge, m (places, 2).
+
+        They include places beyond a piece that stopped it, at the penetration of the rating.
+        """
+        return np.concatenate([self.reach.places_m, *self._beyond_m()])
+
+    def _beyond_m(self) -> Iterator[FloatArray]:
+        radius_m = self.ground.charge_radius_m
+        standing = [piece.rectangle for piece in (*self.held, *self.broken)]
+        standing += self.ground.standing_m
+        for piece in self.held:
+            if piece.rating.penetration_m == 0.0:
+                continue
+            beyond_m = max(piece.rating.penetration_m, radius_m)
+            left, bottom, right, top = piece.rectangle
+            sides = (right + beyond_m, top + beyond_m, left - beyond_m, bottom - beyond_m)
+            for number in np.flatnonzero(self.reach.touches(piece.rectangle)):
+                low, high = (bottom, top) if number % 2 == 0 else (left, right)
+                along = np.linspace(low, high, max(round((high - low) / MODULE_SIDE_M), 1) + 1)
+                across = np.full_like(along, sides[number])
+                places = np.column_stack((across, along) if number % 2 == 0 else (along, across))
+                yield places[[self._is_clear(place, radius_m, standing) for place in places]]
+
+    def _is_clear(self, place: FloatArray, radius_m: float, standing: Sequence[Rectangle]) -> bool:
+        """Return whether a charge fits at a place."""
+        x, y = place.tolist()
+        around = Rectangle(x, y, x, y).grown(radius_m)
+        inside = self.ground.site.rectangle_m.contains(around)
+        return inside and not any(around.overlaps(each) for each in standing)
+
+
+@lru_cache(maxsize=64)
+def _drive(ground: VehicleGround, obstacles: Obstacles) -> Drive:
+    """Compute the drive of a vehicle."""
+    motion = ground.source.motion
+    held = (*obstacles.rated, *ground.rated_gates)
+    broken: tuple[RatedPiece, ...] = ()
+    if motion is None:
+        return Drive(ground, _reach(ground, obstacles, held, broken), held, broken)
+    broken = tuple(each for each in held if each.rating.mass_kg < motion.mass_kg)
+    held = tuple(each for each in held if each not in broken)
+    slow = tuple(each for each in held if each.rating.speed_km_h < motion.max_speed_km_h)
+    if slow:  # speeds are largest on the site without barriers, which is computed only once
+        slow = _too_slow(slow, _free_speeds(ground))
+    while True:
+        reach = _reach(ground, obstacles, held, broken)
+        weak: tuple[RatedPiece, ...] = ()
+        if slow:
+            is_open = reach.near(*_places_shape(ground), STEP_M)
+            weak = _too_slow(slow, _free_speeds(ground), is_open)
+            weak = weak and _weak_on(ground, _as_bits(is_open), weak)
+        if not weak:
+            return Drive(ground, reach, held, broken)
+        broken = (*broken, *weak)
+        held, slow = (tuple(each for each in those if each not in weak) for those in (held, slow))
+
+
+def _too_slow(
+    pieces: Iterable[RatedPiece], speeds: SpeedField, among: BoolArray | None = None
+) -> tuple[RatedPiece, ...]:
+    """Return the pieces with impact speeds above those of their crash ratings.
+
+    Args:
+        pieces: The pieces.
+        speeds: Speeds of the vehicle.
+        among: Places from which it may hit them (rows, columns); the open ones unless given.
+    """
+    return tuple(
+        each
+        for each in pieces
+        if (speeds.impact_km_h(each.rectangle, among) or 0.0) > each.rating.speed_km_h
+    )
+
+
+def _along(way: Sequence[WayPoint]) -> Iterator[PointM]:
+    """Yield places along a way, at most about 0.5 m apart, between its points at ends of arcs."""
+    for one, other in pairwise(way):
+        (x_m, y_m), (to_x_m, to_y_m) = one.place_m, other.place_m
+        steps = max(round(hypot(to_x_m - x_m, to_y_m - y_m) / MODULE_SIDE_M), 1)
+        for step in range(steps + 1):
+            share = step / steps
+            yield x_m + share * (to_x_m - x_m), y_m + share * (to_y_m - y_m)
+
+
+def _reach(
+    ground: VehicleGround,
+    obstacles: Obstacles,
+    held: Iterable[RatedPiece],
+    broken: Iterable[RatedPiece],
+) -> Reach:
+    source, site = ground.source, ground.site
+    return ReachQuery(
+        site,
+        source.width_m,
+        tuple(entry.strip_m(site, side, source.width_m) for entry, side in ground.entries),
+        (*ground.always_closed_m, *obstacles.stops, *(each.rectangle for each in held)),
+        (*obstacles.solid, *(each.rectangle for each in broken)),
+        ground.standing_m,
+    ).answer()
+
+
+_INWARDS: Final[Mapping[WallName, tuple[int, int]]] = MappingProxyType(
+    {"west": (1, 0), "east": (-1, 0), "south": (0, 1), "north": (0, -1)}
+)
+
+
+def _places_shape(ground: VehicleGround) -> tuple[int, int]:
+    return places_shape(ground.site.width_m, ground.site.height_m)
+
+
+_FEW_ARCS: Final = 6
+"""Step of the arcs in the first search: successive radii grow by a factor of about three."""
+
+
+@lru_cache(maxsize=256)
+def _weak_on(
+    ground: VehicleGround, bits: bytes, pieces: tuple[RatedPiece, ...]
+) -> tuple[RatedPiece, ...]:
+    """Return the pieces that break under a vehicle with the given open places.
+
+    It is cached because many layouts have the same open places.
+
+    Args:
+        ground: The vehicle with its surroundings.
+        bits: The open places, packed.
+        pieces: The pieces.
+    """
+    if _too_slow(pieces, _speeds_on(ground, bits, _FEW_ARCS)) == pieces:
+        return pieces
+    return _too_slow(pieces, _speeds_on(ground, bits))
+
+
+def _speeds(ground: VehicleGround, is_open: BoolArray) -> SpeedField:
+    """Compute the speeds of a vehicle with a motion at the open places."""
+    return _speeds_on(ground, _as_bits(is_open))
+
+
+def _as_bits(is_open: BoolArray) -> bytes:
+    return np.packbits(is_open).tobytes()
+
+
+@lru_cache(maxsize=16)
+def _speeds_on(ground: VehicleGround, bits: bytes, arc_step: int = 1) -> SpeedField:
+    source, shape = ground.source, _places_shape(ground)
+    assert source.motion is not None
+    is_open = np.unpackbits(np.frombuffer(bits, np.uint8), count=shape[0] * shape[1])
+    half_m = source.width_m / 2.0
+    starts = []
+    for entry, side in ground.entries:
+        start = np.zeros(shape, dtype=bool)
+        centres_m = entry.strip_m(ground.site, side, source.width_m).grown(-half_m)
+        start[places_in(centres_m.grown(STEP_M / 2.0))] = True
+        starts.append((start, _INWARDS[side]))
+    return SpeedField.of(
+        source.motion, half_m, is_open.reshape(shape).astype(bool), starts, arc_step
+    )
+
+
+@lru_cache(maxsize=8)
+def _free_speeds(ground: VehicleGround) -> SpeedField:
+    """Compute the speeds on the site without barriers, with all rated gates broken."""
+    reach = _reach(ground, NOTHING, (), ground.rated_gates)
+    return _speeds(ground, reach.near(*_places_shape(ground), STEP_M))
+
+
+@lru_cache(maxsize=1024)
+def _worst_places(ground: VehicleGround, obstacles: Obstacles) -> WorstPlaces:
+    """Return the worst places; the cache is larger than that of drives, which take more memory."""
+    return ground.drive(obstacles).worst
+
+
+@lru_cache(maxsize=64)
+def _outside(site: Rectangle, inside: tuple[Rectangle, ...]) -> tuple[Rectangle, ...]:
+    """Return rectangles that cover the site outside some others; none if there are no others."""
+    if not inside:
+        return ()
+    xs = np.unique([site.left, site.right, *(x for each in inside for x in each[0::2])])
+    ys = np.unique([site.bottom, site.top, *(y for each in inside for y in each[1::2])])
+    outside = np.ones((len(ys) - 1, len(xs) - 1), dtype=bool)
+    for left, bottom, right, top in inside:
+        first_x, first_y = (
+            np.searchsorted(xs, left - _SAME_M),
+            np.searchsorted(ys, bottom - _SAME_M),
+        )
+        after_x, after_y = (
+            np.searchsorted(cuts, high + _SAME_M, "right") - 1
+            for cuts, high in ((xs, right), (ys, top))
+        )
+        outside[first_y:after_y, first_x:after_x] = False
+    return tuple(
+        Rectangle(float(xs[first]), bottom, float(xs[first + count]), top)
+        for row, (bottom, top) in enumerate(pairwise(ys.tolist()))
+        for _, first, _, count in stacked_runs(outside[row : row + 1])
+    )

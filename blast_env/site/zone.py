@@ -1,0 +1,571 @@
+"""The build zone: its cells, and their availability for modules and pieces."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import inf
+from typing import Annotated, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictFloat,
+    StrictInt,
+    model_serializer,
+    model_validator,
+)
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Cell, Element, Piece, Rectangle, Removal
+from blast_env.response.barriers import RigidPiece
+from blast_env.site.access_way import AccessWay, any_in_windows, counts_before
+from blast_env.site.boxes import (
+    TOLERANCE_M,
+    Boxes,
+    box_distances_m,
+    overlapping,
+    overlapping_any,
+)
+from blast_env.site.catalogue import (
+    MOST_ITEMS,
+    AnyMeasure,
+    Catalogue,
+    Cost,
+    Hardening,
+    Item,
+    PlacedModule,
+    Removable,
+    Variant,
+)
+from blast_env.site.sections import (
+    AnySource,
+    AnyStructure,
+    Area,
+    Count,
+    Height,
+    PointM,
+    PointSource,
+    RectangleSource,
+    Section,
+    Site,
+    VehicleSource,
+)
+from blast_env.site.terraces import ground_m, lie_wholly_on
+from blast_env.units import MODULE_SIDE_M
+
+BUDGET_TOLERANCE: Final = 1e-9
+"""Share of the budget by which rounding may exceed it."""
+
+MOST_STOCK: Final = 10_000
+"""Largest stock of modules, or of pieces of all items."""
+
+
+class KeepOut(Area):
+    """A part of the build zone that must stay empty, with the reason."""
+
+
+class CostArea(Area):
+    """A part of the build zone with another cost, with the reason.
+
+    Attributes:
+        module_cost: Cost of a module on a cell that overlaps the area, in a zone without a
+            catalogue.
+        cost_factor: Factor of the cost of an item on a cell that overlaps the area, in a zone with
+            a catalogue.
+    """
+
+    module_cost: Cost | None = None
+    cost_factor: Cost | None = None
+
+    @model_serializer(mode="wrap")
+    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Omit the missing one of the two costs."""
+        return {key: value for key, value in handler(self).items() if value is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class _SameItems:
+    """The items of a zone compared by identity, since comparison by value is slow."""
+
+    items: tuple[Item, ...]
+    hardening: tuple[Hardening, ...]
+    removable: tuple[Removable, ...]
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, _SameItems)
+            and other.items is self.items
+            and other.hardening is self.hardening
+            and other.removable is self.removable
+        )
+
+    def __hash__(self) -> int:
+        return id(self.items)
+
+
+@lru_cache(maxsize=64)
+def _catalogue_of(same: _SameItems, shape: tuple[int, int]) -> Catalogue:
+    return Catalogue.of_items(same.items, (*same.hardening, *same.removable), shape)
+
+
+class BuildZone(Section):
+    """The zone for barriers: a grid of cells of one module each.
+
+    Barriers are the items of a catalogue or, without one, single modules.
+
+    Attributes:
+        corner_m: Lower left corner of the cell (0, 0).
+        rows: Number of rows, counted upwards.
+        columns: Number of columns, counted to the right.
+        items: The catalogue; without one, single modules are placed.
+        hardening: Measures that harden facades, beside the items; of two that change the same
+            component of a bay, the later one counts.
+        removable: Measures that remove structures, beside the items.
+        stock: Number of modules; with a catalogue, the most pieces and measures in all, which is
+            their total stock unless given.
+        keep_outs: Areas in which no cell may be used.
+        module_capacity: Capacity of the barrier's modules, as for structures.
+        clearance_m: Least clear distance between a module and a structure.
+        module_cost: Cost of a module outside all cost areas, without a catalogue.
+        cost_areas: Areas with another cost; the highest one counts.
+        budget: Largest total cost of a layout; unlimited unless given.
+        access_way: A way across the zone that must stay open, if there is one.
+        height_m: Height of the modules, without a catalogue; the height of the air unless given.
+    """
+
+    corner_m: PointM
+    rows: Count
+    columns: Count
+    items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS)] = ()
+    hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS)] = ()
+    removable: Annotated[tuple[Removable, ...], Field(max_length=MOST_ITEMS)] = ()
+    stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
+    keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
+    module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
+    clearance_m: Annotated[StrictFloat, Field(ge=0.0, le=2000.0)] = 0.0
+    module_cost: Cost = 1.0
+    cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100)] = ()
+    budget: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
+    access_way: AccessWay | None = None
+    height_m: Height | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stock_of_items(cls, given: Any) -> Any:
+        """Fill in the stock of a zone with a catalogue: pieces of all items, and measures."""
+        if not isinstance(given, Mapping) or "stock" in given:
+            return given
+        items = given.get("items")
+        if not isinstance(items, list | tuple) or not items:
+            return given
+        pieces = sum(map(_pieces_of, items))
+        for measures in (given.get("hardening"), given.get("removable")):
+            pieces += len(measures) if isinstance(measures, list | tuple) else 0
+        # `build_zone_problems` reports an empty catalogue.
+        return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """The catalogue of items, or of the single module."""
+        if self.items:
+            same = _SameItems(self.items, self.hardening, self.removable)
+            return _catalogue_of(same, self.shape)
+        return Catalogue.of_modules(self.stock, self.height_m, self.module_cost, self.shape)
+
+    @property
+    def measures(self) -> tuple[AnyMeasure, ...]:
+        """The measures: those that harden facades, then those that remove structures."""
+        return (*self.hardening, *self.removable)
+
+    def taken_away(self, layout: Iterable[Element]) -> frozenset[str]:
+        """Return the names of the structures that a layout removes."""
+        taken = {each.item for each in layout if isinstance(each, Removal)}
+        own = (each.structures for each in self.removable if each.name in taken)
+        return frozenset(name for names in own for name in names)
+
+    @property
+    def may_be_taken_away(self) -> frozenset[str]:
+        """The names of the structures that a layout can remove."""
+        return frozenset(name for each in self.removable for name in each.structures)
+
+    def modules(self, layout: Iterable[Element]) -> tuple[PlacedModule, ...]:
+        """Return the modules of a layout, piece by piece.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        catalogue = self.catalogue
+        modules = []
+        for element in layout:
+            variant = catalogue.variant(element)
+            name = self.piece_name(element) if isinstance(element, Piece) else ""
+            modules += [
+                PlacedModule(cell, variant.height_m, name, variant.stops_vehicles)
+                for cell in variant.cells_at(element[0], element[1])
+            ]
+        return tuple(modules)
+
+    def piece_name(self, piece: Piece) -> str:
+        """Return the name of a piece in tables: its item and its centre in metres."""
+        x_m, y_m = self.element_rectangle_m(piece).centre
+        return f"{piece.item}_x{x_m:.3f}_y{y_m:.3f}"
+
+    def rigid_piece(self, element: Element) -> RigidPiece | None:
+        """Return a piece or a module as a rigid body.
+
+        It is `None` for a module as high as the air, and for a measure.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        variant = self.catalogue.variant(element)
+        if not variant.height_m:
+            return None
+        if self.items:
+            return self.items[variant.item].rigid_piece
+        return RigidPiece.of_block(MODULE_SIDE_M, MODULE_SIDE_M, variant.height_m)
+
+    def element_rectangle_m(self, element: Element) -> Rectangle:
+        """Return the rectangle that a module or a piece covers.
+
+        Raises:
+            LayoutError: If there is no such item, or it cannot be turned.
+        """
+        variant = self.catalogue.variant(element)
+        return self.cells_rectangle_m(element[0], element[1], variant.rows, variant.columns)
+
+    @property
+    def rectangle_m(self) -> Rectangle:
+        """The whole zone."""
+        size = (self.columns * MODULE_SIDE_M, self.rows * MODULE_SIDE_M)
+        return Rectangle.from_corner(self.corner_m, size)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and of columns."""
+        return self.rows, self.columns
+
+    @property
+    def boxes(self) -> Boxes:
+        """The squares of all cells, as arrays that broadcast to (rows, columns)."""
+        return _boxes(self, np.arange(self.rows), np.arange(self.columns))
+
+    @property
+    def centres_m(self) -> tuple[FloatArray, FloatArray]:
+        """X and y of the cells' centres, (rows, columns) each."""
+        x = self.corner_m[0] + (np.arange(self.columns) + 0.5) * MODULE_SIDE_M
+        y = self.corner_m[1] + (np.arange(self.rows) + 0.5) * MODULE_SIDE_M
+        grid_x, grid_y = np.meshgrid(x, y)
+        return grid_x, grid_y
+
+    @property
+    def cost_limit(self) -> float:
+        """The budget with an allowance for rounding; infinite without a budget."""
+        return inf if self.budget is None else self.budget * (1.0 + BUDGET_TOLERANCE)
+
+    def cells(self) -> Iterator[Cell]:
+        """Yield every cell, row by row."""
+        return ((row, column) for row in range(self.rows) for column in range(self.columns))
+
+    def cell_rectangle_m(self, cell: Cell) -> Rectangle:
+        """Return the square that a cell covers."""
+        row, column = cell
+        corner = (
+            self.corner_m[0] + column * MODULE_SIDE_M,
+            self.corner_m[1] + row * MODULE_SIDE_M,
+        )
+        return Rectangle.from_corner(corner, (MODULE_SIDE_M, MODULE_SIDE_M))
+
+    def cells_rectangle_m(self, row: int, column: int, rows: int, columns: int) -> Rectangle:
+        """Return the rectangle of cells, m, by its lower left cell and its numbers of cells."""
+        corner = self.cell_rectangle_m((row, column))[:2]
+        return Rectangle.from_corner(corner, (columns * MODULE_SIDE_M, rows * MODULE_SIDE_M))
+
+    def cell_centre_m(self, cell: Cell) -> PointM:
+        """Return the centre of a cell, m."""
+        return self.cell_rectangle_m(cell).centre
+
+    def has(self, cell: Cell) -> bool:
+        """Return whether a cell lies in the grid."""
+        return 0 <= cell[0] < self.rows and 0 <= cell[1] < self.columns
+
+
+def _pieces_of(item: Any) -> int:
+    """Return the stock of an item of a catalogue, validated or not; 0 if it is no whole number."""
+    stock = item.get("stock") if isinstance(item, Mapping) else getattr(item, "stock", 0)
+    return stock if isinstance(stock, int) else 0
+
+
+NO_ZONE: Final = BuildZone.model_construct(corner_m=(0.0, 0.0), rows=0, columns=0, stock=0)
+"""The zone without cells, in place of a missing one."""
+
+
+def source_bounds_m(source: AnySource) -> Rectangle:
+    """Return the bounding box of all places of the charge's centre, m.
+
+    For a vehicle, whose places depend on the layout, it is that of its entries.
+    """
+    if isinstance(source, RectangleSource):
+        return source.rectangle_m
+    if isinstance(source, VehicleSource):
+        return Rectangle.around([entry.bounds_m for entry in source.entries])
+    (x0, y0), (x1, y1) = source.segment_m
+    return Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+
+
+def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
+    """Return the least distance of the charge's centre from each rectangle, m.
+
+    For a vehicle it is the distance of its entries on the border.
+    """
+    if isinstance(source, VehicleSource):
+        each = [box_distances_m(entry.bounds_m, boxes) for entry in source.entries]
+        nearest: FloatArray = np.minimum.reduce(each)
+        return nearest
+    if isinstance(source, PointSource | RectangleSource):
+        return box_distances_m(source_bounds_m(source), boxes)
+    return _segment_distances(*source.segment_m, boxes)
+
+
+def distance_m(source: AnySource, rectangle: Rectangle) -> float:
+    """Return the least distance of the charge's centre from a rectangle, m; see `distances_m`."""
+    left, bottom, right, top = (np.array(side) for side in rectangle)
+    return float(distances_m(source, (left, bottom, right, top)))
+
+
+def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> FloatArray:
+    """Return the distances between a segment and rectangles, m.
+
+    Two disjoint convex figures are nearest at a corner of one of them.
+    """
+    (x0, y0), (x1, y1) = start, end
+    step_x, step_y = x1 - x0, y1 - y0
+    square = step_x**2 + step_y**2
+    nearest = np.minimum(
+        box_distances_m(Rectangle(x0, y0, x0, y0), boxes),
+        box_distances_m(Rectangle(x1, y1, x1, y1), boxes),
+    )
+    left, bottom, right, top = boxes
+    sides = []
+    for x, y in ((left, bottom), (left, top), (right, bottom), (right, top)):
+        along = (x - x0) * step_x + (y - y0) * step_y
+        share = np.clip(along / square, 0.0, 1.0) if square > 0.0 else np.zeros_like(along)
+        nearest = np.minimum(nearest, np.hypot(x - x0 - share * step_x, y - y0 - share * step_y))
+        sides.append((x - x0) * step_y - (y - y0) * step_x)
+    both_sides = (np.minimum.reduce(sides) <= 0.0) & (np.maximum.reduce(sides) >= 0.0)
+    bounds = Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+    meets = both_sides & (box_distances_m(bounds, boxes) == 0.0)
+    return np.where(meets, 0.0, nearest)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A build zone with all that decides the usable cells before any module is placed.
+
+    Attributes:
+        zone: The build zone.
+        structures: The structures on the site.
+        sources: The sources of the charge.
+        charge_radius_m: Radius of the charge's disc.
+        site: The site, for the entries of vehicles; `None` if it is invalid.
+    """
+
+    zone: BuildZone
+    structures: tuple[AnyStructure, ...]
+    sources: tuple[AnySource, ...]
+    charge_radius_m: float
+    site: Site | None
+
+
+@dataclass(frozen=True)
+class EmptyZone:
+    """The cells of a build zone without modules; all arrays are read-only.
+
+    Attributes:
+        catalogue: The catalogue.
+        usable: Whether each cell may be used, shape (rows, columns).
+        passable: Whether each cell is free of structures without a passage, shape (rows, columns).
+        ground_m: Height of the ground of each cell, shape (rows, columns).
+        levels: Mask of each height of the ground (heights, rows, columns); heights is 0 if it is
+            flat.
+        module_costs: Cost of a module on each cell, shape (rows, columns); with a catalogue, the
+            factor of an item's cost there.
+        fits: Whether the cells under each variant may be used, by its lower left cell, shape
+            (variants, rows, columns).
+        costs: Cost of each variant by its lower left cell (variants, rows, columns); infinite if it
+            reaches outside.
+    """
+
+    catalogue: Catalogue
+    usable: BoolArray
+    passable: BoolArray
+    ground_m: FloatArray
+    levels: BoolArray
+    module_costs: NDArray[np.float64]
+    fits: BoolArray
+    costs: NDArray[np.float64]
+
+    def places(self, free: BoolArray) -> BoolArray:
+        """Return whether each variant covers only free cells, all of them on one level.
+
+        Shape (variants, rows, columns).
+        """
+        if len(self.levels):
+            flat = replace(self, levels=self.levels[:0])
+            anywhere: BoolArray = np.any([flat.places(free & own) for own in self.levels], axis=0)
+            return anywhere
+        variants = self.catalogue.variants
+        if len(variants) == 1 and variants[0].rows == variants[0].columns == 1:
+            return free[np.newaxis]  # the usual case
+        places = np.zeros((len(variants), *free.shape), dtype=bool)
+        taken = counts_before(~free)
+        for place, variant in zip(places, variants, strict=True):
+            if variant.is_measure:
+                place[0, 0] = True
+                continue
+            anything = any_in_windows(taken, variant.rows, variant.columns)
+            place[: anything.shape[0], : anything.shape[1]] = ~anything
+        return places
+
+
+@lru_cache(maxsize=16)
+def empty_zone(surroundings: Surroundings) -> EmptyZone:
+    """Return the cells of a build zone without modules, cached."""
+    zone = surroundings.zone
+    boxes, usable = zone.boxes, usable_cells(surroundings)
+    passable = np.ones_like(usable)
+    for structure in surroundings.structures:
+        if not structure.lets_through:
+            passable &= ~overlapping_any(structure.boxes_m, boxes)
+    ground = ground_m(surroundings.structures, boxes)
+    heights_m = np.unique(ground)
+    levels = ground == heights_m[len(heights_m) == 1 :, np.newaxis, np.newaxis]
+    module_costs = _module_costs(zone, boxes)
+    catalogue = zone.catalogue
+    costs = np.stack([_costs(variant, module_costs, zone) for variant in catalogue.variants])
+    cells = EmptyZone(
+        catalogue, usable, passable, ground, levels, module_costs, usable[np.newaxis], costs
+    )
+    cells = replace(cells, fits=cells.places(usable))
+    for array in (usable, passable, ground, levels, module_costs, cells.fits, costs):
+        array.flags.writeable = False
+    return cells
+
+
+def usable_cells(surroundings: Surroundings) -> BoolArray:
+    """Return whether each cell may be used, shape (rows, columns)."""
+    usable = np.ones(surroundings.zone.shape, dtype=bool)
+    for _, blocked in _blocked(surroundings, surroundings.zone.boxes):
+        usable &= ~blocked
+    return usable
+
+
+def reason_against(surroundings: Surroundings, cell: Cell) -> str | None:
+    """Return the reason why a cell of the grid may not be used, or `None` if it may."""
+    boxes = _boxes(surroundings.zone, np.array([cell[0]]), np.array([cell[1]]))
+    for reason, blocked in _blocked(surroundings, boxes):
+        if blocked.any():
+            return reason
+    return None
+
+
+def _boxes(zone: BuildZone, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> Boxes:
+    """Return the squares of cells, as arrays that broadcast to (rows, columns)."""
+    left = np.asarray(zone.corner_m[0] + columns[np.newaxis, :] * MODULE_SIDE_M, dtype=np.float64)
+    bottom = np.asarray(zone.corner_m[1] + rows[:, np.newaxis] * MODULE_SIDE_M, dtype=np.float64)
+    return left, bottom, left + MODULE_SIDE_M, bottom + MODULE_SIDE_M
+
+
+def _blocked(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, BoolArray]]:
+    """Yield each reason against the use of cells, with a mask of the cells."""
+    zone, radius_m = surroundings.zone, surroundings.charge_radius_m
+    for keep_out in zone.keep_outs:
+        yield f"must stay empty: {keep_out.reason}", overlapping(keep_out.rectangle_m, boxes)
+    for structure in surroundings.structures:
+        own = overlapping_any(structure.boxes_m, boxes)
+        if structure.carries:
+            whole = lie_wholly_on(surroundings.structures, structure.height_m, boxes)
+            yield f"lies only partly on the terrace {structure.name!r}", own & ~whole
+        else:
+            yield f"overlaps the structure {structure.name!r}", own
+    if zone.clearance_m > 0.0:
+        yield from _too_close(surroundings, boxes)
+    if zone.access_way is not None and zone.access_way.gate is not None:
+        gate = zone.access_way.gate.rectangle_m
+        yield "is where the gate of the access way stands", overlapping(gate, boxes)
+    for index, source in enumerate(surroundings.sources):
+        if isinstance(source, VehicleSource):
+            yield (
+                f"is where a vehicle enters (charge[{index}])",
+                _on_entries(source, surroundings.site, boxes),
+            )
+            continue
+        yield (
+            f"is closer than the charge's radius of {radius_m:g} m to where the charge"
+            f" may be (charge[{index}])",
+            distances_m(source, boxes) < radius_m - TOLERANCE_M,
+        )
+
+
+def _on_entries(source: VehicleSource, site: Site | None, boxes: Boxes) -> BoolArray:
+    """Return whether a vehicle at one of its entries overlaps each square."""
+    inside = np.zeros(np.broadcast_shapes(boxes[0].shape, boxes[1].shape), dtype=bool)
+    if site is not None:
+        for entry in source.entries:
+            side = entry.side(site)
+            if side is not None:
+                inside |= overlapping(entry.strip_m(site, side, source.width_m), boxes)
+    return inside
+
+
+def _too_close(surroundings: Surroundings, boxes: Boxes) -> Iterator[tuple[str, BoolArray]]:
+    """Yield for each structure a reason with a mask of the cells within the clearance."""
+    clearance_m = surroundings.zone.clearance_m
+    ground = ground_m(surroundings.structures, boxes)
+    for structure in surroundings.structures:
+        distances = np.min([box_distances_m(each, boxes) for each in structure.boxes_m], axis=0)
+        if structure.carries:  # cells on a terrace need no clearance from it
+            distances = np.where(ground < (structure.height_m or inf), distances, inf)
+        yield (
+            f"is closer than {clearance_m:g} m to the structure {structure.name!r}"
+            f" ({distances.min():g} m)",
+            distances < clearance_m - TOLERANCE_M,
+        )
+
+
+def _module_costs(zone: BuildZone, boxes: Boxes) -> NDArray[np.float64]:
+    """Return the cost of a module on each cell: the highest of the areas that overlap it.
+
+    With a catalogue it is the factor of an item's cost, 1 outside all areas.
+    """
+    highest = np.zeros(zone.shape)
+    for area in zone.cost_areas:
+        inside = overlapping(area.rectangle_m, boxes)
+        cost = area.cost_factor if zone.items else area.module_cost
+        highest[inside] = np.maximum(highest[inside], 0.0 if cost is None else cost)
+    return np.where(highest > 0.0, highest, 1.0 if zone.items else zone.module_cost)
+
+
+def _costs(
+    variant: Variant, module_costs: NDArray[np.float64], zone: BuildZone
+) -> NDArray[np.float64]:
+    """Return the cost of a variant by its lower left cell (rows, columns).
+
+    Every module of a piece bears its share of the cost, times the factor of its own cell.
+    """
+    if not zone.items:
+        return module_costs
+    costs = np.full(zone.shape, inf)
+    if variant.is_measure:
+        costs[0, 0] = variant.cost
+        return costs
+    rows, columns = zone.rows - variant.rows + 1, zone.columns - variant.columns + 1
+    if rows > 0 and columns > 0:
+        factors = sum(
+            module_costs[up : up + rows, right : right + columns]
+            for up, right in variant.cells_at(0, 0)
+        )
+        costs[:rows, :columns] = variant.cost * (factors / (variant.rows * variant.columns))
+    return costs

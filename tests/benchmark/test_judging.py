@@ -1,0 +1,259 @@
+"""Scores between best rule and best known; what was submitted is played again."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from blast_env.benchmark import (
+    DEFINITIONS,
+    BenchmarkProblem,
+    JudgedSubmission,
+    KnownLayout,
+    Run,
+    ScoreReference,
+    Submission,
+    judge,
+    make,
+    shipped_standings,
+    standings_page,
+    standings_tables,
+    stored_references,
+)
+from blast_env.benchmark.judging import BUDGET_WEIGHTS, JudgedRun
+from blast_env.cli import app
+from blast_env.cli.judge import JudgeCommand, _submission
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout, Piece
+from tests.benchmark.row import RowEngine
+
+NAME = "control_room-told-v2"
+
+
+def wall(row: int) -> tuple[Piece, ...]:
+    return (Piece(row, 0, "low_wall", True),)
+
+
+REFERENCES = {
+    NAME: ScoreReference(
+        "", "row 1", {}, KnownLayout("rule", wall(16)), KnownLayout("best", wall(12))
+    )
+}
+
+
+def judged(*runs: Run) -> JudgedSubmission:
+    return judge(Submission("own", runs), None, engine=RowEngine(), references=REFERENCES)
+
+
+def run(row: int, budget: int = 0, seed: int = 0) -> Run:
+    return Run(NAME, budget, seed, budget, wall(row))
+
+
+def test_the_best_rule_scores_nothing_and_the_best_known_all() -> None:
+    """1 - 0.1 / (1 + distance) of the row: 0.98 for the rule, 0.9 for the best."""
+    scores = [judged(run(row)).score(0).value for row in (16, 20, 12, 13)]
+    assert scores[:3] == pytest.approx([0.0, 0.0, 1.0])
+    assert scores[3] == pytest.approx((0.98 - 0.95) / (0.98 - 0.9))
+
+
+def test_what_takes_few_blasts_counts_for_more_too() -> None:
+    few, many = judged(run(13)), judged(run(13, 1000))
+    assert few.area().value == pytest.approx(few.score(0).value)
+    assert many.score(200).value == 0.0
+    assert many.area().value == pytest.approx(many.score(1000).value * BUDGET_WEIGHTS[1000])
+    assert sum(BUDGET_WEIGHTS.values()) == pytest.approx(1.0)
+    assert few.area().value > many.area().value
+
+
+def test_the_interval_is_over_the_seeds() -> None:
+    """Scores 0 and 1, Student's t with one degree of freedom: 0.5 +- 12.706 * 0.5."""
+    score = judged(run(16, 50, 0), run(12, 50, 1)).score(50)
+    assert score.value == pytest.approx(0.5)
+    assert score.high - score.value == pytest.approx(12.706 * 0.5, rel=1e-4)
+    assert judged(run(12, 50)).score(50).low != judged(run(12, 50)).score(50).low  # NaN
+
+
+def test_a_layout_that_is_better_than_the_best_known_shows() -> None:
+    best = JudgedRun(NAME, 0, 0, 0, wall(12), 0.5, 0.7, 0.6)
+    assert best.score == pytest.approx(2.0)
+    assert replace(best, best=0.7, share=0.7).score == 1.0
+    assert replace(best, best=0.7, share=0.71).score == 0.0
+
+
+@pytest.mark.parametrize(
+    ("runs", "message"),
+    [
+        ((run(99),), "runs\\[0\\]: control_room-told-v2: .*outside"),
+        ((run(1), run(2)), "appears twice"),
+        ((replace(run(1), blasts=1),), "1 blasts were spent, the budget is 0"),
+        ((replace(run(1), problem="none-v1"),), "there is no problem 'none-v1'"),
+    ],
+)
+def test_a_submission_of_no_use_is_refused(
+    runs: tuple[Run, ...], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(BlastEnvError, match=message):
+        judged(*runs)
+    path = Submission("own", runs).save(tmp_path / "own.json")
+    with pytest.raises(BlastEnvError, match=message):
+        Submission.load(path)
+
+
+def test_what_was_judged_is_read_back(tmp_path: Path) -> None:
+    own = judged(run(13), run(14, 50))
+    assert JudgedSubmission.load(own.save(tmp_path / "own.json")) == own
+    (tmp_path / "own.json").write_text('{"method": "own", "runs": []}')
+    with pytest.raises(BlastEnvError, match=r"own\.json: "):
+        JudgedSubmission.load(tmp_path / "own.json")
+
+
+def test_what_was_judged_can_be_judged_again() -> None:
+    own = judged(run(13), run(14, 50))
+    assert own.submission == Submission("own", (run(13), run(14, 50)))
+    again = judge(own.submission, None, engine=RowEngine(), references=REFERENCES)
+    assert again == own
+
+
+def test_tables_have_the_best_method_first_and_what_it_takes_off() -> None:
+    """Shares of 0.95 and 0.9 behind the walls, 0.98 behind the rule's."""
+    few = replace(judged(run(13, 50), run(13, 50, 1)), method="few")
+    best = replace(judged(run(12, 50)), method="best")
+    scores, reductions = standings_tables((few, best))
+    assert [row[0] for row in scores.rows] == ["best", "few"]
+    assert scores.headers == ("method", "runs", "50 blasts", "all budgets")
+    assert [row[:4] for row in reductions.rows] == [
+        ("best", "50", "1", "10.0"),
+        ("best known", "", "", "10.0"),
+        ("few", "50", "2", "5.0 (5.0 to 5.0)"),
+        ("best rule", "", "", "2.0"),
+    ]
+    page = standings_page((replace(few, note="a | b"), best))
+    assert r"| few | a \| b |" in page
+    assert f"Load taken off in {NAME}, %" in page
+
+
+def test_the_command_takes_both_kinds_of_files_and_writes_the_page(tmp_path: Path) -> None:
+    own = judged(run(13), run(14, 50))
+    for path in (own.save(tmp_path / "judged.json"), own.submission.save(tmp_path / "own.json")):
+        assert _submission(path) == own.submission
+    page = tmp_path / "page.md"
+    result = CliRunner().invoke(app, ["judge", "--page", str(page)])
+    assert result.exit_code == 0, result.output
+    assert page.read_text("utf-8") == standings_page(shipped_standings())
+
+
+def test_standings_that_come_with_the_package_are_of_its_problems() -> None:
+    known = stored_references()
+    for each in shipped_standings():
+        assert set(each.problems) <= set(known)
+        assert all(0 <= made.blasts <= made.budget for made in each.runs)
+
+
+def test_the_page_of_the_documentation_shows_them() -> None:
+    page = Path(__file__).parents[2] / "docs/researchers/standings.md"
+    assert page.read_text("utf-8") == standings_page(shipped_standings())
+
+
+def near(_problem: BenchmarkProblem, _seed: int) -> Layout:
+    return wall(16)
+
+
+def far(_problem: BenchmarkProblem, _seed: int) -> Layout:
+    return wall(12)
+
+
+def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> None:
+    """Else a second method would enter the standings with the layouts of the first."""
+    command = JudgeCommand(out=tmp_path, budget=(0,))
+    found = [
+        command._played(f"{__name__}:{name}", {NAME: DEFINITIONS[NAME]}).runs[0].layout
+        for name in ("near", "far", "near")
+    ]
+    assert found == [wall(16), wall(12), wall(16)]
+
+
+def test_what_was_found_with_any_budget_is_shown() -> None:
+    _, table = standings_tables([judged(run(13, 7))])
+    assert [row[:2] for row in table.rows if row[0] == "own"] == [("own", "7")]
+
+
+def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(
+    tmp_path: Path,
+) -> None:
+    method = f"{__name__}:never_asked"
+    entry = ["judge", "--method", method, "--cell", "1.0", "--out", str(tmp_path / "entry")]
+    result = CliRunner().invoke(app, entry)
+    assert result.exit_code == 2
+    assert "cell_m is 1, must be 0.5 m, the side of a module, divided by" in result.output
+    assert not (tmp_path / "entry").exists()
+
+
+def test_after_ctrl_c_it_is_said_what_goes_on(tmp_path: Path) -> None:
+    entry = JudgeCommand(method="random", out=tmp_path)
+    assert entry.how_to_resume().startswith("the same command resumes after the completed runs")
+    assert "--cache" in replace(entry, out=None).how_to_resume()
+    assert "runs" not in replace(entry, out=None).how_to_resume()
+
+
+def never_asked(problem: BenchmarkProblem, seed: int) -> Layout:
+    """Fail where a method runs that should not."""
+    raise AssertionError(f"{problem.name}, {seed}")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("budget", 10**18, "less than or equal to 1000"),
+        ("budget", True, "valid integer"),
+        ("budget", 1.0, "valid integer"),
+        ("seed", 2**63, "less than or equal to"),
+        ("blasts", "1", "valid integer"),
+        ("layout", [["16", 0, "low_wall", True]], "valid integer"),
+        ("layout", [[16.0, 0, "low_wall", True]], "valid integer"),
+        ("layout", [[16, 0, "low_wall", 1]], "valid boolean"),
+    ],
+)
+def test_values_of_a_submission_are_not_converted(
+    tmp_path: Path, key: str, value: object, words: str
+) -> None:
+    path = Submission("own", (run(16, 50),)).save(tmp_path / "own.json")
+    assert _submission(path) == Submission("own", (run(16, 50),))
+    content = json.loads(path.read_text())
+    content["runs"][0][key] = value
+    path.write_text(json.dumps(content))
+    with pytest.raises(BlastEnvError) as caught:
+        _submission(path)
+    assert f"runs[0].{key}" in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_so_many_runs_and_no_more_before_any_is_looked_at(tmp_path: Path) -> None:
+    path = tmp_path / "many.json"
+    path.write_text(json.dumps({"runs": [0] * 10_001}))
+    with pytest.raises(
+        BlastEnvError, match=r"many\.json: has 10,001 runs, must have at most 10,000"
+    ):
+        _submission(path)
+
+
+def test_a_problem_has_no_budget_that_counts_for_no_score() -> None:
+    with pytest.raises(BlastEnvError, match="budget is 1001, must be an integer from 0 to 1000"):
+        make(NAME, 1001, engine=RowEngine())
+
+
+def test_shares_of_another_version_of_the_engine_are_judged_again() -> None:
+    """Stored shares are of the load that the version had."""
+    cells = {"": 0.123}
+    stored = ScoreReference(
+        "", "row 1", {}, KnownLayout("rule", wall(16), cells), KnownLayout("best", wall(12), cells)
+    )
+    runs = Submission("own", (run(14, 50),))
+
+    def rule(reference: ScoreReference) -> float:
+        (run,) = judge(runs, None, engine=RowEngine(), references={NAME: reference}).runs
+        return run.rule
+
+    assert rule(stored) == 0.123
+    assert rule(replace(stored, engine="row 0")) != 0.123

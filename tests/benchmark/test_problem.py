@@ -1,0 +1,171 @@
+"""Blasts are counted in the problem, versions say what they said, any optimiser can enter."""
+
+from pathlib import Path
+
+import pytest
+
+from blast_env.benchmark import (
+    DEFINITIONS,
+    Asked,
+    BenchmarkProblem,
+    Definition,
+    Submission,
+    make,
+    play,
+    secret_sites,
+    stored_references,
+)
+from blast_env.benchmark.methods import find_method
+from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
+from blast_env.evaluation import BudgetError
+from blast_env.geometry import Layout, Measure, Piece
+from blast_env.site import PointSource
+from tests.benchmark.row import RowEngine
+from tests.site.test_hardening import glazed_yard
+
+WALL = [Piece(12, 0, "low_wall", True)]
+
+
+def problem(budget: int = 3, name: str = "control_room-told-v2") -> BenchmarkProblem:
+    return make(name, budget, engine=RowEngine())
+
+
+def test_blasts_are_counted_and_refused_beyond_the_budget() -> None:
+    own = problem()
+    shares = [own.evaluate(WALL), own.evaluate([]), own.evaluate(WALL)]
+    assert shares[0] == shares[2] == pytest.approx(0.9)
+    assert shares[1] == 1.0
+    assert own.blasts == 2
+    own.evaluate([Piece(20, 0, "low_wall", True)])
+    with pytest.raises(BudgetError, match="1 blasts asked for, 0 of the budget of 3 are left"):
+        own.evaluate([Piece(21, 0, "low_wall", True)])
+    assert own.evaluate(WALL) == shares[0]
+    assert own.best is not None
+    assert own.best.layout == tuple(WALL)
+
+
+def test_an_illegal_layout_costs_nothing() -> None:
+    own = problem()
+    with pytest.raises(LayoutError):
+        own.evaluate([Piece(99, 0, "low_wall", True)])
+    assert own.blasts == 0
+
+
+def test_a_hidden_charge_takes_a_blast_a_place_or_fewer() -> None:
+    own = problem(7, "control_room-hidden-v2")
+    own.evaluate(WALL)
+    assert own.blasts == 3
+    own.evaluate([], threats=1)
+    assert own.blasts == 4
+    assert own.best is not None
+    assert own.best.threats == 3
+    with pytest.raises(BlastEnvError, match="threats is 4, must be 1 to 3"):
+        own.evaluate(WALL, threats=4)
+    own.evaluate([Piece(3, 0, "low_wall", True)])
+    with pytest.raises(BudgetError):
+        own.evaluate([Piece(4, 0, "low_wall", True)])
+
+
+@pytest.mark.parametrize("name", ["random", "genetic"])
+def test_searches_of_the_package_stay_within_the_budget(name: str) -> None:
+    own = problem(12)
+    layout = find_method(name)(own, 1)
+    assert 0 < own.blasts <= 12
+    assert own.judged(layout) < 1.0
+    assert layout == find_method(name)(problem(12), 1)
+
+
+def test_a_method_that_asks_for_more_is_refused() -> None:
+    def greedy(own: BenchmarkProblem, seed: int) -> Layout:
+        layouts = [(Piece(row, 0, "low_wall", True),) for row in range(20)]
+        return min(layouts, key=lambda layout: own.evaluate(layout))
+
+    with pytest.raises(BudgetError):
+        play(greedy, Asked([lambda budget: problem(budget)], (5,)))
+
+
+def test_where_facades_count_measures_take_no_blast() -> None:
+    """What counts is the shortfall or, of a layout that passes, its share of the budget."""
+    definition = Definition("yard", "response")
+    vars(definition)["scenario"] = glazed_yard(target="medium")
+    own = make(definition, len(definition.case.threats), engine="surrogate")
+    measures = [Measure.named("glass"), Measure.named("panels")]
+    assert own.evaluate(()) == 1.0
+    spent = own.blasts
+    shares = [own.evaluate(measures[:1]), own.evaluate(measures)]
+    assert own.blasts == spent
+    assert shares[1] < 1.0
+    assert own.judged(measures) < 1.0
+
+
+def test_every_version_says_what_it_said() -> None:
+    """The digest has the site, the charges and the budgets; a change needs a new version."""
+    known = stored_references()
+    assert set(known) == set(DEFINITIONS)
+    assert {name: each.digest for name, each in DEFINITIONS.items()} == {
+        name: each.digest for name, each in known.items()
+    }
+
+
+def test_a_problem_that_has_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed = Definition("control_room", "told")
+    monkeypatch.setitem(vars(changed), "digest", "0" * 16)
+    with pytest.raises(BlastEnvError, match=r"control_room-told-v2: .* never changes"):
+        make(changed, engine=RowEngine())
+
+
+def test_a_problem_that_there_is_not_names_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'control_room-told-v2'"):
+        make("control_room-tol-v1")
+
+
+def test_families_ask_what_they_say() -> None:
+    for definition in DEFINITIONS.values():
+        case, scenario = definition.case, definition.scenario
+        practice = case.practice
+        assert practice is not None
+        assert (case.charge is not None) == (definition.family == "told")
+        if definition.family == "vehicle":
+            assert scenario.vehicles
+        points = [each for each in scenario.charge if isinstance(each, PointSource)]
+        if definition.family == "hidden" and len(points) == len(scenario.charge):
+            assert len(case.threats) == len(practice.threats) == len(points)
+        assert (definition.family == "response") == scenario.objective.is_response
+        if definition.family == "told":
+            assert case.charges == practice.charges
+
+
+def test_what_is_stored_can_be_built() -> None:
+    for name, each in stored_references().items():
+        if DEFINITIONS[name].site.startswith("site_"):
+            continue  # drawing a site takes half a second
+        own = make(name)
+        assert own.check(each.rule.layout) == own.check(each.best.layout) == ()
+        assert each.best.shares["0.5"] <= each.rule.shares["0.5"] == min(each.rules.values())
+
+
+def test_sites_of_a_secret_are_the_same_again_and_of_no_other() -> None:
+    sites = secret_sites("the judge's own", 3)
+    assert sites == secret_sites("the judge's own", 3)
+    assert sites[:2] == secret_sites("the judge's own", 2)
+    assert not set(sites) & set(secret_sites("the judge's own ", 3))
+    assert all(int(each.site.removeprefix("site_")) >= 2**62 for each in sites)
+    assert sites[0].scenario.zone.items
+    with pytest.raises(BlastEnvError, match="secret has 3 characters, must have at least 8"):
+        secret_sites("abc", 3)
+
+
+def test_runs_go_on_where_they_were(tmp_path: Path) -> None:
+    asked = Asked([lambda budget: problem(budget)], (0, 4), range(2))
+    calls = []
+
+    def wall(own: BenchmarkProblem, seed: int) -> Layout:
+        calls.append((own.budget, seed))
+        return (Piece((12 + seed), 0, "low_wall", True),)
+
+    runs = play(wall, asked, tmp_path / "runs.jsonl")
+    assert [run.key[1:] for run in runs] == [(0, 0), (4, 0), (4, 1)]
+    assert play(wall, asked, tmp_path / "runs.jsonl") == runs
+    assert len(calls) == 3
+    path = Submission("wall", runs, "a note").save(tmp_path / "wall.json")
+    assert Submission.load(path) == Submission("wall", runs, "a note")

@@ -1,0 +1,108 @@
+"""The package's proposal says what it expects, and has no piece that brings nothing."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.arrays import FloatArray
+from blast_env.cli import app
+from blast_env.design import proposal
+from blast_env.design.proposal import LEAST_PIECE_GAIN, problem_of, worth_its_pieces
+from blast_env.design.search import layouts_by_rule
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.geometry import Layout, Piece, Removal
+from blast_env.layout import load_layout
+from blast_env.site import save_scenario
+from blast_env.site.scene import Charge
+from tests.agents.test_self_labelling import wide_yard
+
+CHARGE = Charge((1.7, 5.2), 5.0)
+WALL, SHORT, POST = (Piece(row, 0, "wall") for row in range(3))
+
+
+@dataclass(frozen=True)
+class Additive:
+    """Guesses in which each element takes its own share off, whatever else stands."""
+
+    shares: Mapping[Any, float]
+
+    def loads(self, layouts: Sequence[Layout]) -> FloatArray:
+        return np.array([100.0 * (1.0 - sum(map(self._share, each))) for each in layouts])
+
+    def _share(self, element: Any) -> float:
+        return self.shares.get(element, 0.0)
+
+
+def worth(shares: Mapping[Any, float], layout: Layout, *rules: Layout) -> Layout:
+    guesses: Any = Additive(shares)
+    return worth_its_pieces(guesses, layout, rules)
+
+
+def test_pieces_that_bring_nothing_are_left_out() -> None:
+    shares = {WALL: 0.2, SHORT: 0.5 * LEAST_PIECE_GAIN, POST: -0.01}
+    assert worth(shares, (WALL, SHORT, POST)) == (WALL,)
+    taken = Removal.named("old wall")
+    assert worth(shares, (taken, WALL)) == (taken, WALL)  # the wall may stand in its place
+
+
+def test_a_better_rule_takes_the_place_of_the_layout_and_nothing_falls_below_it() -> None:
+    shares = {WALL: 0.2, SHORT: 0.9 * LEAST_PIECE_GAIN, POST: 0.2 + 0.5 * LEAST_PIECE_GAIN}
+    assert worth(shares, (SHORT,), (WALL,)) == (WALL,)
+    assert worth(shares, (WALL, SHORT), (POST,)) == (WALL, SHORT)
+    assert worth(shares, (WALL, SHORT), (SHORT,)) == (WALL,)
+
+
+def test_the_gain_that_is_expected_is_that_of_the_surrogate_and_no_less_than_a_rules() -> None:
+    found = blast_env.propose(wide_yard(), CHARGE)
+    problem = problem_of(wide_yard(), CHARGE)
+    guesses = proposal._guesses(problem)
+    bare, load = guesses.loads([(), found.layout])
+    assert found.gain is not None
+    assert found.gain == pytest.approx(1.0 - load / bare)
+    assert found.gain > proposal.LEAST_GAIN
+    rules = [tuple(sorted(each)) for each in layouts_by_rule(wide_yard(), CHARGE).values()]
+    assert load <= guesses.loads(rules).min()
+
+
+def test_nothing_is_proposed_where_nothing_gains_enough(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layouts = [*layouts_by_rule(wide_yard(), CHARGE).values()]
+    pieces = {piece for layout in layouts for piece in layout}
+    weak = Additive({piece: 0.016 / max(map(len, layouts)) for piece in pieces})
+    monkeypatch.setattr(proposal, "_guesses", lambda _: weak)
+    found = blast_env.propose(wide_yard(), CHARGE)
+    assert (found.layout, found.gain) == ((), 0.0)
+    save_scenario(wide_yard(), tmp_path / "yard.toml")
+    files = ("--out", str(tmp_path / "none.json"))
+    options = ("--charge", *map(str, CHARGE.position_m), *files)
+    done = CliRunner().invoke(app, ["propose", str(tmp_path / "yard.toml"), *options])
+    assert done.exit_code == 0, done.output
+    words = " ".join(done.output.split())
+    assert (
+        "walled_yard: nothing is proposed, by the surrogate of gas dynamics: no layout has" in words
+    )
+    assert "expected reduction of 3 %, the best one 1.6 %" in words
+    assert load_layout(tmp_path / "none.json", wide_yard()) == ()
+
+
+def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search that was interrupted has the layout of no rule, or of any."""
+
+    def interrupted(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(GasEngine, "loads", interrupted)
+    out = tmp_path / "layout.json"
+    result = CliRunner().invoke(app, ["propose", "courtyard", "--verify", "--out", str(out)])
+    assert result.exit_code == 130, result.output
+    assert "interrupted: no file was left half-written" in result.stderr
+    assert not out.exists()

@@ -1,0 +1,210 @@
+"""A rule and a search are a file and a line each, and then they are everywhere."""
+
+from pathlib import Path
+from types import MappingProxyType
+
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+import blast_env
+from blast_env import save_scenario
+from blast_env.app import offers
+from blast_env.cli import app
+from blast_env.cli.evaluate import EvaluateCommand
+from blast_env.cli.search import SearchCommand
+from blast_env.design.proposal import chosen_for, problem_of
+from blast_env.design.search import ProposerKind, layouts_by_rule, registry
+from blast_env.design.search.registry import ProposerRow
+from blast_env.design.surrogate import LearntSearch
+from blast_env.errors import BlastEnvError
+from blast_env.site.scene import Charge
+from tests.agents.league_cases import road_scenario
+from tests.design.corner import fill_from_the_corner
+from tests.design.search_cases import small_scenario
+from tests.design.test_surrogate import YARD, by_hand
+from tests.gas_sites import hut
+
+OWN = {
+    "corner": ProposerRow(
+        "tests.design.corner:fill_from_the_corner",
+        "from the corner",
+        ProposerKind.RULE,
+        budget=0,
+    ),
+    "one_after_another": ProposerRow(
+        "tests.design.one_after_another:OneAfterAnother",
+        "one after another",
+        budget=6,
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def two_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Add the lines: the files are `tests/design/corner.py` and `one_after_another.py`."""
+    monkeypatch.setattr(registry, "_TABLE", MappingProxyType({**registry._TABLE, **OWN}))
+
+
+def run(*arguments: object) -> Result:
+    result = CliRunner().invoke(app, [*map(str, arguments)], env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    return result
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    save_scenario(small_scenario(), tmp_path / "site.toml")
+    return tmp_path / "site.toml"
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_both_are_methods_of_search(name: str, site: Path) -> None:
+    options = ("--budget", 4, "--held-out", 1, "--engine", "event")
+    shown = run("search", "--scenario", site, "--method", name, *options).stdout
+    assert f"{name} search" in shown
+    assert f"{0 if name == 'corner' else 4} of 4 blasts spent" in shown
+
+
+def test_the_library_has_them_and_their_budget() -> None:
+    found = blast_env.search(small_scenario(), "one_after_another", engine="event", seed=2)
+    assert (found.blasts, found.budget, found.method) == (6, 6, "one_after_another")
+    ruled = blast_env.search(small_scenario(), "corner", engine="event")
+    assert ruled.layout == tuple(sorted(fill_from_the_corner(small_scenario(), None)))
+
+
+def test_the_rule_is_among_those_that_a_proposal_is_chosen_from_and_held_against(
+    tmp_path: Path,
+) -> None:
+    problem = problem_of(hut(), None)
+    assert "from the corner" in layouts_by_rule(hut())
+    assert chosen_for(problem).budget == 5  # blasts: four rules, and this one
+    save_scenario(hut(), tmp_path / "hut.toml")
+    shown = run("propose", tmp_path / "hut.toml", "--verify").stdout
+    assert "up to 5 blasts of gas: about " in shown
+    verdict = shown.partition("judged by gas dynamics")[2]
+    assert "from the corner" in verdict
+    ruled = next(line for line in verdict.splitlines() if line.startswith("from the corner"))
+    assert ruled.count("(cells)") == 2  # beside the load and its reduction
+
+
+def test_both_enter_a_league(tmp_path: Path) -> None:
+    save_scenario(road_scenario(), tmp_path / "road.toml")
+    few = ("--cases", 1, "--seeds", 1, "--budgets", 4, "--methods", "one_after_another")
+    run("league", *few, "--scenario", tmp_path / "road.toml", "--out", tmp_path / "out")
+    summary = pd.read_csv(tmp_path / "out" / "known_road_summary.csv").set_index("entry")
+    assert summary.loc["from the corner", "is_rule"]
+    assert summary.loc["one_after_another, 4 blasts", "blasts"] == 4
+
+
+def test_the_page_offers_both() -> None:
+    offered = offers.offered(hut())
+    assert offered["rule corner"] == "rule: from the corner"
+    assert offered["search one_after_another"] == "search: one after another"
+    charge = Charge((2.0, 4.0), 5.0)
+    expected = fill_from_the_corner(hut(), charge)
+    assert offers.proposed("corner", hut(), [charge]) == expected
+
+
+def test_help_names_all_of_them() -> None:
+    """Those that the package has: the list is made when the command is imported."""
+    shown = run("search", "--help").stdout.replace("│", " ").split()
+    words = {each.strip(".,") for each in shown}
+    assert set(registry._TABLE) - set(OWN) <= words
+
+
+def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> None:
+    assert not {"rule ring_around_building", "search surrogate"} & set(offers.offered(hut()))
+    result = CliRunner().invoke(app, ["search", "--scenario", str(site), "--method", "surrogate"])
+    assert result.exit_code == 2
+    assert "has no catalogue (build_zone.items): surrogate is of no use there" in " ".join(
+        result.stderr.split()
+    )
+
+
+def test_verdicts_are_by_gas_dynamics_unless_told_otherwise() -> None:
+    assert SearchCommand().engine == EvaluateCommand().engine == "gas"
+    assert problem_of(hut(), None).evaluator.engine.name == "gas"
+
+
+def test_a_proposal_says_how_far_it_has_come() -> None:
+    shares: list[float] = []
+    LearntSearch(by_hand(), changes=24).at_once(YARD, None, shares.append)
+    assert shares == sorted(shares)
+    assert len(shares) >= 3
+    assert 0.0 < shares[0] < shares[-1] <= 1.0
+
+
+def test_something_must_have_learnt() -> None:
+    with pytest.raises(BlastEnvError, match="neither a surrogate nor an agent"):
+        LearntSearch()
+
+
+OPTIMISER = """
+from blast_env.design.rules import random_layout
+from blast_env.design.search import SearchResult
+from blast_env.values import generator
+
+class Own:
+    name = "own"
+
+    def propose(self, problem, budget, seed=0, report=None):
+        rng = generator(seed)
+        count = budget // len(problem.threats)
+        tried = [random_layout(problem.scenario, rng) for _ in range(count)]
+        return SearchResult(min(tried, key=problem.load))
+
+class Greedy(Own):
+    name = "greedy for blasts"
+
+    def propose(self, problem, budget, seed=0, report=None):
+        return super().propose(problem, 2 * budget, seed)
+
+class Illegal(Own):
+    name = "illegal"
+
+    def propose(self, problem, budget, seed=0, report=None):
+        return SearchResult(((99, 99),))
+
+nothing = 3
+"""
+
+
+def league(folder: Path, place: str) -> Result:
+    (folder / "own_optimiser.py").write_text(OPTIMISER)
+    save_scenario(road_scenario(), folder / "road.toml")
+    few = ("--cases", 1, "--seeds", 1, "--budgets", 4, "--methods", "", "--method", place)
+    arguments = ("league", *few, "--scenario", folder / "road.toml", "--out", folder / "out")
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("own_optimiser:Greedy", "greedy for blasts, 4 blasts, case 'road 0': the search asks"),
+        ("own_optimiser:Illegal", "illegal, 4 blasts, case 'road 0': "),
+        ("own_optimiser:nothing", "'own_optimiser:nothing' is no proposer: it needs a name"),
+        ("own_optimiser:Missing", "'own_optimiser:Missing' cannot be imported"),
+        ("no_such_module:Own", "'no_such_module:Own' cannot be imported"),
+        ("own", "--method is 'own', must be MODULE:OBJECT"),
+    ],
+)
+def test_an_optimiser_of_ones_own_is_held_to_the_rules(
+    place: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    result = league(tmp_path, place)
+    assert result.exit_code == 2, result.output
+    assert words in " ".join(result.stderr.split())
+
+
+def test_an_optimiser_of_ones_own_enters_a_league(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    result = league(tmp_path, "own_optimiser:Own")
+    assert result.exit_code == 0, result.output
+    summary = pd.read_csv(tmp_path / "out" / "known_road_summary.csv").set_index("entry")
+    assert summary["blasts"].to_dict()["own, 4 blasts"] == 4

@@ -1,0 +1,275 @@
+"""The hand-made walls: across the line of sight, where they are asked for, and always legal."""
+
+from itertools import pairwise
+from math import atan2, pi
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from blast_env import load_scenario
+from blast_env.design.rules import (
+    NEAR_BUILDING,
+    NEAR_CHARGE,
+    expected_charge,
+    line_of_sight_wall,
+    wall_near_building,
+    wall_near_charge,
+)
+from blast_env.errors import BlastEnvError
+from blast_env.geometry import Layout
+from blast_env.layout import Placement
+from blast_env.site import PointSource, RectangleSource, Scenario
+from blast_env.site.scene import Charge
+from tests.agents.sites import site
+
+WEST = Charge((5.0, 20.0), 100.0)
+BUILDING_M = (32.0, 20.0)
+
+
+def centres_m(scenario: Scenario, layout: Layout) -> np.ndarray:
+    """Return the centres of modules (n, 2)."""
+    zone = scenario.zone
+    return np.array([zone.element_rectangle_m(each).centre for each in layout])
+
+
+def covered_m(scenario: Scenario, layout: Layout, charge: Charge) -> list[tuple[float, float]]:
+    """Return from where to where each module reaches across the line of sight, in order."""
+    across = sight(charge)[::-1] * (-1.0, 1.0)
+    half_m = 0.25 * float(np.abs(across).sum())
+    aside_m = np.sort((centres_m(scenario, layout) - charge.position_m) @ across)
+    return [(float(each) - half_m, float(each) + half_m) for each in aside_m]
+
+
+def sight(charge: Charge) -> np.ndarray:
+    """Return the direction in which the building is seen from the charge (2,)."""
+    along = np.subtract(BUILDING_M, charge.position_m)
+    return np.asarray(along / np.hypot(*along))
+
+
+@pytest.mark.parametrize(("share", "column"), [(0.0, 0), (0.5, 9), (1.0, 19)])
+def test_wall_stands_upright_where_it_is_asked_for(share: float, column: int) -> None:
+    """The line of sight runs along a row: twelve modules in one column, six on either side."""
+    wall = line_of_sight_wall(site(), WEST, share)
+    assert {cell[1] for cell in wall} <= {column, column + 1}
+    assert sorted(cell[0] for cell in wall) == list(range(4, 16))
+
+
+def test_wall_turns_with_the_line_of_sight() -> None:
+    """From below the wall lies along a row."""
+    scenario = site(building_m=(18.0, 30.0))
+    wall = line_of_sight_wall(scenario, Charge((20.0, 5.0), 100.0), NEAR_CHARGE)
+    assert {cell[0] for cell in wall} == {0}
+    assert sorted(cell[1] for cell in wall) == list(range(4, 16))
+
+
+def test_a_diagonal_wall_is_at_right_angles_to_the_line_of_sight() -> None:
+    scenario = site(charge_m=(3.0, 3.0), building_m=(33.0, 33.0))
+    x_m, y_m = centres_m(scenario, line_of_sight_wall(scenario, Charge((3.0, 3.0), 1.0), 0.5)).T
+    slope = np.polyfit(x_m, y_m, 1)[0]
+    assert atan2(slope, 1.0) == pytest.approx(-pi / 4.0, abs=0.15)
+    assert float(x_m.mean()) == pytest.approx(float(y_m.mean()), abs=0.25)
+
+
+def test_the_two_named_rules_are_the_ends_of_the_way() -> None:
+    scenario = site()
+    assert wall_near_charge(scenario, WEST) == line_of_sight_wall(scenario, WEST, NEAR_CHARGE)
+    assert wall_near_building(scenario, WEST) == line_of_sight_wall(scenario, WEST, NEAR_BUILDING)
+
+
+@given(
+    angle=st.floats(-1.3, 1.3),
+    distance_m=st.floats(22.0, 26.0),
+    share=st.floats(0.0, 1.0),
+    stock=st.integers(1, 24),
+)
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
+    angle: float, distance_m: float, share: float, stock: int
+) -> None:
+    """Seen along the line of sight, whatever its direction, module touches module.
+
+    Where the two sides begin they may leave less than a module open.
+    """
+    charge_m = (
+        BUILDING_M[0] - distance_m * np.cos(angle),
+        BUILDING_M[1] - distance_m * np.sin(angle),
+    )
+    assume(all(1.0 < each < 39.0 for each in charge_m))
+    charge = Charge(charge_m, 100.0)
+    scenario = site(stock=stock, corner_m=(1.0, 1.0), rows=76, columns=56, keep_outs=())
+    scenario = scenario.model_copy(
+        update={"charge": (PointSource(position_m=charge_m, tnt_kg=1.0),)}
+    )
+    wall = line_of_sight_wall(scenario, charge, share)
+    intervals = covered_m(scenario, wall, charge)
+    width_m = 0.5 * float(np.abs(sight(charge)).sum())
+    for (_, end), (begin, _) in pairwise(intervals):
+        assert begin <= end + 1e-6 or (begin <= width_m and begin - end < width_m)
+    if len(wall) == stock:
+        assert abs(intervals[0][0] + intervals[-1][1]) <= 3.0 * width_m
+
+
+@given(
+    charge_y_m=st.floats(2.0, 38.0),
+    share=st.floats(0.0, 1.0),
+    blocked=st.tuples(st.integers(0, 15), st.integers(0, 15), st.integers(1, 8), st.integers(1, 8)),
+    budget=st.floats(4.0, 20.0),
+    way_m=st.sampled_from([1.0, 2.5, 4.0]),
+)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_a_wall_keeps_every_condition(
+    charge_y_m: float,
+    share: float,
+    blocked: tuple[int, int, int, int],
+    budget: float,
+    way_m: float,
+) -> None:
+    row, column, rows, columns = blocked
+    scenario = site(
+        charge_m=(5.0, charge_y_m),
+        keep_outs=[
+            {
+                "corner_m": (15.0 + 0.5 * column, 15.0 + 0.5 * row),
+                "size_m": (0.5 * columns, 0.5 * rows),
+                "reason": "a tree",
+            }
+        ],
+        clearance_m=1.0,
+        budget=budget,
+        cost_areas=[
+            {"corner_m": (20.0, 15.0), "size_m": (5.0, 10.0), "module_cost": 2.0, "reason": "rock"}
+        ],
+        access_way={"width_m": way_m, "between": "left_right"},
+    )
+    charge = Charge((5.0, charge_y_m), 100.0)
+    wall = line_of_sight_wall(scenario, charge, share)
+    assert len(wall) > 1
+    assert Placement.of(scenario, wall).cells == wall
+    assert line_of_sight_wall(scenario, charge, share) == wall
+
+
+def test_a_greater_share_is_farther_from_the_charge() -> None:
+    for name in ("courtyard", "perimeter_gate", "street_junction"):
+        scenario = load_scenario(name)
+        charge = expected_charge(scenario.charge)
+        walls = [line_of_sight_wall(scenario, charge, share) for share in (0.0, 0.5, 1.0)]
+        away_m = [
+            np.hypot(*(centres_m(scenario, wall) - charge.position_m).T).min() for wall in walls
+        ]
+        assert away_m[0] < away_m[1] < away_m[2]
+
+
+def test_the_wall_follows_the_charge() -> None:
+    scenario = load_scenario("courtyard")
+    low, high = (
+        centres_m(scenario, line_of_sight_wall(scenario, Charge((5.0, y_m), 100.0)))[:, 1].mean()
+        for y_m in (7.0, 23.0)
+    )
+    assert low < 14.0 < 16.0 < high
+
+
+def test_the_wall_goes_round_a_corner() -> None:
+    """At the street junction the pavement, and with it the wall, turns round the block."""
+    scenario = load_scenario("street_junction")
+    wall = line_of_sight_wall(scenario, Charge((20.0, 20.0), 100.0), NEAR_CHARGE)
+    x_m, y_m = centres_m(scenario, wall).T
+    assert (x_m > 25.0).any()
+    assert (y_m > 25.0).any()
+
+
+def test_the_budget_buys_less_where_modules_cost_more() -> None:
+    scenario = load_scenario("street_junction")
+    charge = expected_charge(scenario.charge)
+    near_kerb, near_facade = (
+        wall_near_charge(scenario, charge),
+        wall_near_building(scenario, charge),
+    )
+    assert len(near_facade) < len(near_kerb) == 12
+
+
+def test_a_path_leaves_a_gap_and_the_wall_goes_on_behind_it() -> None:
+    """It does not jump to the end of the path, and the gap is as wide as the path."""
+    path = {"corner_m": (15.0, 21.5), "size_m": (8.0, 1.0), "reason": "a path"}
+    wall = line_of_sight_wall(site(keep_outs=[path]), WEST, NEAR_CHARGE)
+    assert {cell[1] for cell in wall} == {0}
+    assert sorted(cell[0] for cell in wall) == [*range(3, 13), 15, 16]
+
+
+def test_the_wall_bends_round_a_tree() -> None:
+    """A small obstacle on its line is no reason for a gap."""
+    tree = {"corner_m": (15.0, 21.0), "size_m": (0.5, 0.5), "reason": "a tree"}
+    wall = line_of_sight_wall(site(keep_outs=[tree]), WEST, NEAR_CHARGE)
+    assert (12, 1) in wall
+    assert sorted(cell[0] for cell in wall) == list(range(4, 16))
+
+
+def test_no_module_goes_where_the_building_hides_the_charge() -> None:
+    """From below to the left, a wall across the line of sight would reach behind a long row."""
+    scenario = site(charge_m=(5.0, 10.0), corner_m=(10.0, 11.0), rows=30, columns=40, stock=30)
+    houses = tuple(
+        scenario.structures[0].model_copy(
+            update={"name": f"house_{number}", "corner_m": (15.0 + number, 20.0), "side_modules": 2}
+        )
+        for number in range(20)
+    )
+    row = scenario.model_copy(update={"structures": houses})
+    places_m = centres_m(row, line_of_sight_wall(row, Charge((5.0, 10.0), 100.0), NEAR_BUILDING))
+    beyond_m = places_m[places_m[:, 1] > 20.0]
+    assert len(places_m) - len(beyond_m) > 5
+    # Their lines of sight pass the houses' end at x = 15 m above the roofs at y = 21 m.
+    assert (11.0 * (beyond_m[:, 0] - 5.0) <= 10.0 * (beyond_m[:, 1] - 10.0)).all()
+
+
+def test_the_wall_is_not_behind_the_charge() -> None:
+    scenario = site(charge_m=(18.0, 20.0))
+    wall = line_of_sight_wall(scenario, Charge((18.0, 20.0), 100.0), NEAR_CHARGE)
+    assert centres_m(scenario, wall)[:, 0].min() > 18.0
+
+
+def test_between_two_buildings_the_wall_stays_on_the_side_of_the_charge() -> None:
+    """The line of sight ends in the open, between them; the zone goes on behind it."""
+    scenario = site(building_m=(20.0, 28.0), rows=20, columns=30)
+    building = scenario.structures[0]
+    other = building.model_copy(update={"name": "other", "corner_m": (20.0, 8.0)})
+    both = scenario.model_copy(update={"structures": (building, other)})
+    wall = line_of_sight_wall(both, WEST, NEAR_BUILDING)
+    assert wall
+    assert centres_m(both, wall)[:, 0].max() < 22.0
+
+
+def test_behind_the_building_there_is_no_wall() -> None:
+    scenario = site(charge_m=(38.0, 20.0))
+    assert line_of_sight_wall(scenario, Charge((38.0, 20.0), 100.0)) == ()
+
+
+def test_the_wall_turns_to_the_building_that_counts_most() -> None:
+    scenario = site(rows=30)
+    building = scenario.structures[0]
+
+    def height_m(weight: float) -> float:
+        other = building.model_copy(
+            update={"name": "other", "corner_m": (30.0, 30.0), "weight": weight}
+        )
+        both = scenario.model_copy(update={"structures": (building, other)})
+        return float(centres_m(both, line_of_sight_wall(both, WEST))[:, 1].mean())
+
+    assert height_m(0.1) + 1.0 < height_m(1.0) < height_m(9.0) - 1.0
+
+
+def test_the_expected_charge_is_the_mean_by_weight() -> None:
+    point = PointSource(position_m=(10.0, 0.0), tnt_kg=100.0, weight=3.0)
+    area = RectangleSource(
+        kind="rectangle", corner_m=(0.0, 2.0), size_m=(4.0, 4.0), tnt_kg=20.0, weight=1.0
+    )
+    assert expected_charge((point, area)) == Charge((8.0, 1.0), 80.0)
+
+
+def test_what_makes_no_sense_is_an_error() -> None:
+    with pytest.raises(BlastEnvError, match=r"share is 1\.5, must be from 0 to 1"):
+        line_of_sight_wall(site(), WEST, 1.5)
+    with pytest.raises(BlastEnvError, match="'free_field' has no build zone"):
+        line_of_sight_wall(load_scenario("free_field"), WEST)
+    with pytest.raises(BlastEnvError, match="there is no line of sight"):
+        line_of_sight_wall(site(), Charge(BUILDING_M, 100.0))

@@ -1,0 +1,216 @@
+"""What is asked, what it costs, and which layout counts as the best."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.design.search.problem import LayoutProblem
+from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
+from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.evaluation import BlastEvaluator, Case, Threat
+from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.evaluation.comparison import Objective
+from blast_env.site.scene import Charge
+from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
+from tests.design.search_cases import ballistic, small_problem, small_scenario
+
+LAYOUTS = [((row, column),) for row in range(4) for column in range(3)]
+WEST = Charge((5.0, 20.5), 100.0)
+
+
+@pytest.fixture(scope="module")
+def problem() -> LayoutProblem:
+    """The small problem with four threats; all tests share what it remembers."""
+    return small_problem(realisations=4)
+
+
+def session(problem: LayoutProblem, budget: int, threats: int = 1) -> SearchSession:
+    return SearchSession(problem, budget, Plan(threats, budget))
+
+
+@pytest.mark.parametrize("risk", [MeanRisk(), ConditionalValueAtRisk(0.5)])
+def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk) -> None:
+    """Mean over the realisations of a charge, then risk over the charges, as agents are paid."""
+    scenario = ballistic("courtyard")
+    evaluator = BlastEvaluator(scenario, "event")
+    case = practice_hidden(scenario, 3, 2, 1, risk)
+    layout = ((9, 0), (10, 0), (11, 0))
+    expected = Objective(evaluator, case).assess(layout).impulse_pa_s
+    found = LayoutProblem(evaluator, case).load(layout)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_pair_of_layout_and_threat_is_paid_for_once(problem: LayoutProblem) -> None:
+    """In whatever order the cells are named; further threats cost only what is new."""
+    it = session(problem, 100)
+    it.assess([((0, 0), (1, 0)), ((1, 0), (0, 0)), ((2, 0),)])
+    assert it.blasts == 2
+    it.assess([((1, 0), (0, 0))], 3)
+    assert it.blasts == 4
+    it.assess([((2, 0),)])
+    assert it.blasts == 4
+
+
+def test_what_a_cache_knows_is_paid_for_all_the_same(problem: LayoutProblem) -> None:
+    """Otherwise a search would find more the second time."""
+    for _ in range(2):
+        it = session(problem, 2)
+        with pytest.raises(SearchEndedError):
+            it.assess(LAYOUTS)
+        assert it.blasts == 2
+
+
+@given(budget=st.integers(1, 12), threats=st.integers(1, 4))
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_the_budget_is_used_as_far_as_it_goes_and_no_farther(budget: int, threats: int) -> None:
+    it = session(_SHARED, budget, threats)
+    try:
+        it.assess(LAYOUTS)
+    except SearchEndedError:
+        assert budget < len(LAYOUTS) * threats
+    assert it.blasts == min(budget // threats, len(LAYOUTS)) * threats
+
+
+_SHARED = small_problem(realisations=4)
+
+
+def test_it_ends_when_nothing_new_is_asked(problem: LayoutProblem) -> None:
+    it = session(problem, 100)
+    asked = 0
+
+    def ask_for_ever() -> None:
+        nonlocal asked
+        while asked < 100_000:
+            it.assess(LAYOUTS[:1])
+            asked += 1
+
+    it.run(ask_for_ever, lambda: None)
+    assert it.blasts == 1
+    assert asked < 100_000
+
+
+def test_a_layout_that_has_met_more_threats_goes_before(problem: LayoutProblem) -> None:
+    """One that looks better under one threat does not replace one that has met two."""
+    it = session(problem, 100)
+    by_first = sorted(LAYOUTS, key=lambda each: it.assess([each])[0])
+    best, worst = by_first[0], by_first[-1]
+    assert it.best is not None
+    assert it.best.layout == best
+    it.assess([worst], 2)
+    assert it.best.layout == worst
+    it.assess([best], 2)
+    assert it.best.layout == min(best, worst, key=lambda each: it.assess([each], 2)[0])
+
+
+def test_the_lucky_one_is_found_out(problem: LayoutProblem) -> None:
+    """With blasts enough for all, the choice is the one by all threats, not by the first."""
+    it = SearchSession(problem, 100, Plan(1, 12))
+    it.run(lambda: _ask(it), it.confirm_best)
+    assert it.best is not None
+    impulses = {layout: problem.load(layout) for layout in LAYOUTS}
+    assert it.best.threats == 4
+    assert it.best.layout == min(impulses, key=lambda each: impulses[each])
+    assert it.best.load == pytest.approx(min(impulses.values()))
+
+
+def test_what_is_held_back_is_not_explored_with(problem: LayoutProblem) -> None:
+    it = SearchSession(problem, 10, Plan(1, 6))
+    met = []
+    it.run(lambda: _ask(it), lambda: met.append(it.blasts))
+    assert met == [6]
+
+
+def _ask(it: SearchSession) -> None:
+    it.assess(LAYOUTS)
+
+
+def test_the_front_is_the_front(problem: LayoutProblem) -> None:
+    it = session(problem, 100)
+    pairs = [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0))]
+    it.assess([(), *LAYOUTS, *pairs])
+    front = it.front()
+    assert [len(each.layout) for each in front] == [0, 1, 2]
+    for fewer, more in pairwise(front):
+        assert fewer.load > more.load
+    assert front[1].load == it.assess(LAYOUTS).min()
+
+
+def test_it_reports_every_batch(problem: LayoutProblem) -> None:
+    told: list[tuple[int, int]] = []
+    it = SearchSession(
+        problem, 9, Plan(1, 9), lambda state: told.append((state.blasts, state.budget))
+    )
+    it.assess(LAYOUTS[:4])
+    it.assess(LAYOUTS[2:6])
+    assert told == [(4, 9), (6, 9)]
+
+
+def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
+    scenario = ballistic("courtyard")
+    evaluator = BlastEvaluator(scenario, "event")
+    problem = LayoutProblem(evaluator, practice_hidden(scenario, 16, 1, 0))
+    plans = [Plan.of(problem, budget) for budget in (1, 10, 50, 200, 1000, 100_000)]
+    assert all(plan.exploring_blasts >= 1 for plan in plans)
+    threats = [plan.threats for plan in plans]
+    assert threats == sorted(threats)
+    assert threats[0] == 1
+    assert plans[-1] == Plan(16, 100_000)
+
+
+def test_hidden_charges_come_first_and_spread() -> None:
+    """A search that looks at the first three charges of the road has its middle and both ends."""
+    scenario = ballistic("courtyard")
+    threats = practice_hidden(scenario, 16, 2, seed=3).threats
+    assert [t.charge for t in threats[:16]] == [t.charge for t in threats[16:]]
+    assert len({threat.seed for threat in threats}) == 32
+    first, *others = (t.charge_against(scenario, ()).position_m[1] for t in threats[:16])
+    assert abs(first - float(np.median([first, *others]))) < 2.0
+    assert {min(others), max(others)} == {*others[:2]}
+
+
+def test_a_known_charge_has_its_realisations() -> None:
+    scenario = small_scenario()
+    threats = practice_visible(scenario, WEST, 3, seed=1).threats
+    assert {threat.charge for threat in threats} == {WEST}
+    assert len({threat.seed for threat in threats}) == 3
+    assert threats == practice_visible(scenario, WEST, 3, seed=1).threats
+    assert threats != practice_visible(scenario, WEST, 3, seed=2).threats
+
+
+def test_reductions_refer_to_the_threats_that_were_met(problem: LayoutProblem) -> None:
+    it = session(problem, 100)
+    for threats in (1, 4):
+        it.assess([()], threats)
+        assert it.best is not None
+        assert problem.reduction(it.best) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("threats", "words"),
+    [((), "there are none"), ((Threat(WEST, 1), Threat(WEST, 1)), "appears twice")],
+)
+def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words: str) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        LayoutProblem(
+            BlastEvaluator(small_scenario(), "event"),
+            Case(small_scenario(), threats, realisations=len(threats)),
+        )
+
+
+def test_a_site_without_a_build_zone_is_refused() -> None:
+    scenario = small_scenario().model_copy(update={"build_zone": None})
+    with pytest.raises(BlastEnvError, match="no build zone"):
+        LayoutProblem(BlastEvaluator(scenario, "event"), Case(scenario, (Threat(WEST, 1),)))
+
+
+def test_a_layout_that_does_not_fit_is_refused(problem: LayoutProblem) -> None:
+    with pytest.raises(LayoutError, match="outside the build zone"):
+        session(problem, 10).assess([((9, 9),)])
+
+
+def test_no_budget_is_refused(problem: LayoutProblem) -> None:
+    with pytest.raises(BlastEnvError, match="budget is 0 blasts, must be at least 1"):
+        session(problem, 0)

@@ -1,0 +1,52 @@
+"""A fourth engine, as a user writes one: a formula instead of a blast."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import ClassVar
+
+import numpy as np
+
+from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad
+from blast_env.geometry import Element
+from blast_env.layout.build_scene import charge_against
+from blast_env.site import AnyCharge, Scenario
+
+
+@dataclass(frozen=True)
+class ShadeEngine(Engine):
+    """Each structure takes less, the farther it is and the more modules stand.
+
+    Attributes:
+        share: What is left of an impulse behind one module.
+    """
+
+    share: float = 0.9
+    name: str = "shade"
+    version: str = "shade 1"
+
+    title: ClassVar[str] = "Shade"
+    validated_range: ClassVar[str] = "the validated range of a shade"
+
+    def loads(
+        self,
+        scenario: Scenario,
+        layout: Sequence[Element],
+        charge: AnyCharge,
+        seed: int,
+    ) -> BlastLoads:
+        """Return a load of 1,000 Pa s at 1 m, which falls with the distance of the centre."""
+        x_m, y_m = charge_against(scenario, layout, charge).position_m
+        loads = []
+        for each in scenario.structures:
+            left, bottom, right, top = each.rectangle_m
+            distance_m = hypot(0.5 * (left + right) - x_m, 0.5 * (bottom + top) - y_m)
+            loads.append(
+                StructureLoad.on(
+                    each,
+                    1000.0 / distance_m * self.share ** len(layout),
+                    notes=("a formula, not a blast",),
+                )
+            )
+        modules = [each.rows * each.columns for each in scenario.structures]
+        return BlastLoads(tuple(loads), np.repeat([each.impulse_pa_s for each in loads], modules))

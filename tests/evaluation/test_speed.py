@@ -1,0 +1,133 @@
+"""`blast-env bench`, and what it measures."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from blast_env import Scenario, load_scenario, simulate
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import speed
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.speed import (
+    Crowd,
+    blast_cost,
+    crowd,
+    environment_cost,
+    random_action,
+    site_cost,
+    street,
+)
+from blast_env.layout.build_scene import draw_charge
+from tests.envs.small import small_document
+from tests.gas_sites import hut
+
+
+def small() -> Scenario:
+    """A small site in the bundled scenarios' model, which the event engine runs in no time."""
+    return Scenario.model_validate(small_document())
+
+
+def test_a_blast_is_timed_with_the_steps_that_it_has() -> None:
+    cost = blast_cost(small(), "event", repeats=2, memory=False)
+    assert (cost.scenario, cost.engine, cost.memory_mb) == (small().name, "event", None)
+    assert cost.steps == simulate(small(), engine="event").steps
+    assert cost.cell_updates is None
+    assert cost.cpu_s > 0.0
+
+
+def test_a_blast_of_gas_counts_its_cells() -> None:
+    cost = blast_cost(hut(), "gas", repeats=1, memory=False)
+    assert cost.cell_updates is not None
+    assert cost.cell_updates > 1000 * cost.steps
+
+
+def test_memory_is_that_of_a_process_of_its_own() -> None:
+    assert 50.0 < speed.peak_memory_mb(small(), "event") < 1000.0
+
+
+def test_blasts_are_counted_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed, "_LOT_S", 0.1)
+    found = crowd(small(), "event", 0.02, 2)
+    assert found.processes == 2
+    assert 0.0 < found.ratio < 20.0
+    assert Crowd(2, alone_per_s=4.0, together_per_s=7.0).ratio == 1.75
+
+
+def test_an_episode_is_its_placements_and_its_blast() -> None:
+    cost = environment_cost(small(), "event", episodes=2, environments=2)
+    assert cost.steps == 3  # the stock
+    assert 0.0 < cost.placing_s < cost.episode_s
+    assert cost.blast_s + cost.placing_s == pytest.approx(cost.episode_s)
+    assert cost.vector_steps_per_s > 0.0
+
+
+def test_random_actions_are_legal_and_finish_when_nothing_is_free() -> None:
+    rng = np.random.default_rng(0)
+    mask = np.array([False, True, False, True, True])
+    assert {random_action(mask, rng) for _ in range(50)} == {1, 3}
+    assert random_action(np.array([False, False, True]), rng) == 2
+
+
+def test_a_scenario_without_a_build_zone_has_no_environment() -> None:
+    with pytest.raises(BlastEnvError, match="build zone"):
+        environment_cost(load_scenario("free_field"), "event", 1, 1)
+
+
+def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("blast_env.cli.bench.load_scenario", lambda _: small())
+    options = ("--engine", "event", "--repeats", "1", "--processes", "1", "--no-memory")
+    result = CliRunner().invoke(app, ["bench", *options, "--no-environment"])
+    assert result.exit_code == 0, result.output
+    for words in ("cores", "pymunk 7", "blasts per CPU s", small().name, "event"):
+        assert words in result.stdout
+    assert "gas" not in result.stdout
+    refused = CliRunner().invoke(app, ["bench", "--engine", "steam"])
+    assert refused.exit_code == 2
+    assert "steam" in refused.output
+
+
+def test_a_street_keeps_its_proportions() -> None:
+    """In whole modules; so does the cube root of the charge."""
+    long, short = street(100.0), street(50.0)
+    assert [each.name for each in long.structures] == [each.name for each in short.structures]
+    for one, other in zip(long.structures, short.structures, strict=True):
+        near, far = np.array(other.rectangle_m), np.array(one.rectangle_m)
+        assert near == pytest.approx(far / 2.0, abs=0.75)
+    heavy_kg, light_kg = (draw_charge(each, 0).tnt_kg for each in (long, short))
+    assert heavy_kg == pytest.approx(8.0 * light_kg)
+
+
+def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told() -> None:
+    engine, scenario = GasEngine(), street(20.0)
+    cost = site_cost(scenario, engine)
+    assert (cost.site, cost.cells) == ("street_20_m", "uniform")
+    assert 1e-6 * cost.cell_updates / cost.cpu_s > 1.0
+    assert 100.0 < cost.memory_mb < 1000.0
+    assert cost.told == engine.cost(scenario, draw_charge(scenario, 0))
+    assert 0.5 < cost.told.steps / cost.steps < 2.0
+
+
+def test_the_command_prints_a_row_for_each_site_and_way_of_growing() -> None:
+    own = ("--site", "large", "--length", "20", "--site", "visitor_entrance")
+    result = CliRunner().invoke(app, ["bench", *own, "--cells", "coarse"])
+    assert result.exit_code == 0, result.output
+    rows = [line.split()[:2] for line in result.output.splitlines()]
+    assert ["street_20_m", "coarse"] in rows
+    assert ["visitor_entrance", "coarse"] in rows
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--site", "small"), "small: is 'small', there is no such bundled scenario"),
+        (("--cells", "fine"), "--cells needs --site"),
+        (("--site", "large", "--cells", "big"), "cells is 'big', must be"),
+        (("--site", "large", "--length", "2"), "--length is 2, must be 20 to 200"),
+        (("--length", "50"), "--length needs --site large"),
+    ],
+)
+def test_wrong_options_of_large_sites_are_named(options: tuple[str, ...], words: str) -> None:
+    refused = CliRunner().invoke(app, ["bench", *options])
+    assert refused.exit_code == 2
+    assert words in " ".join(refused.output.split())

@@ -1,0 +1,244 @@
+"""Loads on faces, gauges, maps and pictures."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from blast_env.errors import BlastEnvError
+from blast_env.gas.faces import exposed_faces, ground_faces
+from blast_env.gas.grid import FaceKind, GasGrid
+from blast_env.gas.probes import (
+    FaceLoads,
+    Gauges,
+    GroundMap,
+    LoadTable,
+    PatchHistories,
+    Snapshots,
+    positive_phases,
+)
+from tests.gas.flows import blast, street
+
+STEP_S = 1e-3
+HISTORY_PA = np.array([0.0, 50.0, 250.0, 400.0, 100.0, -50.0, -20.0, 30.0, 500.0, 0.0])
+"""Foot, first phase, negative phase, second phase."""
+
+
+def recorded(history_pa: NDArray[np.float64]) -> LoadTable:
+    """Return a table of two points: one with a history, and one in still air."""
+    table = LoadTable(2, arrival_pa=100.0, is_mean=True)
+    for k, value in enumerate(history_pa):
+        table.add(np.array([value, 0.0]), (k + 1) * STEP_S, STEP_S)
+    return table
+
+
+def test_loads_of_a_history_by_hand() -> None:
+    table = recorded(HISTORY_PA)
+    assert table.impulse_pa_s == pytest.approx([0.8 - 0.07 + 0.53, 0.0])
+    assert table.impulse_time_s[0] == pytest.approx(9e-3)
+    assert table.net_impulse_pa_s == pytest.approx([1.26, 0.0])
+    assert table.peak_pa.tolist() == [500.0, 0.0]
+    assert table.peak_time_s[0] == pytest.approx(8.5e-3)
+    # From 50 to 250 Pa, between the middles of the steps.
+    assert table.arrival_s == pytest.approx([1.75e-3, np.nan], nan_ok=True)
+    assert table.steepest_s == pytest.approx([8.0e-3, np.nan], nan_ok=True)
+
+
+def test_a_later_pulse_counts_only_above_the_largest_value_so_far() -> None:
+    """An echo that does not make up for the suction before it adds nothing."""
+    echo = np.where(np.arange(len(HISTORY_PA)) == 8, 40.0, HISTORY_PA)
+    table = recorded(echo)
+    assert table.impulse_pa_s[0] == pytest.approx(0.8)
+    assert table.impulse_time_s[0] == pytest.approx(5e-3)
+    assert table.net_impulse_pa_s[0] == pytest.approx(0.8)
+
+
+@given(
+    arrays(np.float64, st.integers(1, 40), elements=st.floats(-1e5, 1e6)),
+    st.floats(1e-5, 1e-2),
+)
+def test_impulses_of_whole_histories_are_those_of_the_recorder(
+    history_pa: NDArray[np.float64], step_s: float
+) -> None:
+    """And no more than the sum of all positive phases, no less than what came in the end."""
+    table = LoadTable(1, is_mean=True)
+    for k, value in enumerate(history_pa):
+        table.add(np.array([value]), (k + 1) * step_s, step_s)
+    whole = max(float(step_s * np.cumsum(history_pa).max()), 0.0)
+    scale = step_s * np.abs(history_pa).sum() + 1e-12
+    assert table.impulse_pa_s[0] == pytest.approx(whole, abs=1e-9 * scale)
+    assert table.net_impulse_pa_s[0] <= table.impulse_pa_s[0]
+    positive = step_s * np.maximum(history_pa, 0.0).sum()
+    assert table.impulse_pa_s[0] <= positive + 1e-9 * scale
+
+
+def test_phases_of_a_history_by_hand() -> None:
+    time_s = STEP_S * np.arange(1.0, len(HISTORY_PA) + 1.0)
+    found = positive_phases(time_s, HISTORY_PA, arrival_pa=100.0)
+    assert found.first_pa_s == pytest.approx(0.025 + 0.15 + 0.325 + 0.25 + 0.025)
+    assert found.first_end_s == pytest.approx(6e-3)
+    assert found.positive_pa_s - found.first_pa_s == pytest.approx(0.005 + 0.265 + 0.25)
+    assert found.negative_pa_s == pytest.approx(-0.035)
+    still = positive_phases(time_s, 0.0 * HISTORY_PA)
+    assert still == (0.0, 0.0, 0.0, time_s[-1])
+
+
+def test_values_at_the_ends_of_steps_are_joined_by_lines() -> None:
+    table = LoadTable(1, arrival_pa=1.0, is_mean=False)
+    for k, value in enumerate([0.0, 100.0, 50.0]):
+        table.add(np.array([value]), (k + 1) * 1e-3, 1e-3)
+    assert table.impulse_pa_s == pytest.approx([0.125])
+    assert table.arrival_s == pytest.approx([1e-3 + 1e-5])
+
+
+def test_faces_of_chosen_cells() -> None:
+    solid = np.zeros((6, 5, 4), dtype=bool)
+    solid[2:4, 2, 0:2] = True
+    solid[5, 2, 0] = True  # at the border: nothing is beyond
+    grid = GasGrid(0.5, solid, origin_m=(10.0, 0.0, 0.0))
+    chosen = np.zeros_like(solid)
+    chosen[2:4, 2, 0:2] = True
+    faces = exposed_faces(grid, chosen)
+    # Two on each end, four on each side, two above, none below.
+    count = {(axis, side): 0 for axis in range(3) for side in (-1, 1)}
+    for axis, side in zip(faces.axis.tolist(), faces.side.tolist(), strict=True):
+        count[axis, side] += 1
+    assert count == {(0, -1): 2, (0, 1): 2, (1, -1): 4, (1, 1): 4, (2, -1): 0, (2, 1): 2}
+    assert solid[tuple(faces.solid.T)].all()
+    assert not solid[tuple(faces.air.T)].any()
+    top = faces.centres_m(grid)[faces.axis == 2]
+    assert sorted(top.tolist()) == [[11.25, 1.25, 1.0], [11.75, 1.25, 1.0]]
+    assert len(ground_faces(grid)) == 30 - 3
+    with pytest.raises(BlastEnvError, match="cells of air"):
+        exposed_faces(grid, np.ones_like(solid))
+
+
+def test_faces_are_loaded_from_their_own_side() -> None:
+    """A wall between mirrors: the side of the blast is loaded, the other is not; x, y and z."""
+    for axis in range(3):
+        solid = np.zeros((21, 21, 21), dtype=bool)
+        np.moveaxis(solid, axis, 0)[12] = True
+        centre = [10.5, 10.5, 10.5]
+        centre[axis] = 6.5
+        recorders: list[FaceLoads] = []
+
+        def setup(grid: GasGrid, recorders: list[FaceLoads] = recorders) -> dict[str, Any]:
+            faces = exposed_faces(grid, grid.solid)
+            recorders.append(FaceLoads(len(faces)))
+            return {"faces": faces, "recorders": recorders}
+
+        solver = blast(
+            solid, (centre[0], centre[1], centre[2]), setup=setup, faces={"z_low": FaceKind.OPEN}
+        )
+        solver.advance(0.01)
+        load = recorders[0].impulse_pa_s
+        near = solver.faces.side == -1
+        assert (load[near] > 0.0).all()
+        assert (load[~near] == 0.0).all()
+        # The most loaded face is the one opposite the charge.
+        air = solver.faces.air[np.flatnonzero(near)[load[near].argmax()]]
+        expected = [10, 10, 10]
+        expected[axis] = 11
+        assert air.tolist() == expected
+
+
+def test_patches_keep_the_mean_history_of_their_faces() -> None:
+    """Their running impulse is the mean of the faces', and a patch without a face is refused."""
+    made: list[FaceLoads | PatchHistories] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        faces = exposed_faces(grid, grid.solid)
+        patch = np.where(faces.axis == 2, -1, faces.side > 0)
+        made.extend((FaceLoads(len(faces)), PatchHistories(patch, 2)))
+        return {"faces": faces, "recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.03)
+    loads, patches = made
+    assert isinstance(loads, FaceLoads)
+    assert isinstance(patches, PatchHistories)
+    assert patches.history_pa.shape == (2, solver.steps)
+    assert (np.diff(patches.time_s) > 0.0).all()
+    whole = loads.net_impulse_pa_s
+    for side, history in enumerate(patches.history_pa):
+        members = (solver.faces.axis != 2) & ((solver.faces.side > 0) == bool(side))
+        assert history @ patches.step_s == pytest.approx(whole[members].mean(), rel=1e-5)
+    with pytest.raises(BlastEnvError, match="each must have a face"):
+        PatchHistories(np.array([0, 2]), 3)
+
+
+def test_gauges_keep_the_history() -> None:
+    made: list[Gauges] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        made.append(Gauges(grid, [grid.cell_at((8.0, 4.5, 0.1)), (27, 4, 2)]))
+        return {"recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.03)
+    (gauges,) = made
+    history, time_s = gauges.history_pa, gauges.time_s
+    assert history.shape == (solver.steps, 2)
+    assert time_s[-1] == solver.time_s
+    assert (np.diff(time_s) > 0.0).all()
+    assert (history[:3, 1] == 0.0).all()
+    assert gauges.peak_pa == pytest.approx(history.max(axis=0))
+    assert gauges.arrival_s[0] < gauges.arrival_s[1]
+    joined = np.concatenate((np.zeros((1, 2)), history))
+    steps = np.diff(np.concatenate(([0.0], time_s)))
+    means = 0.5 * (joined[1:] + joined[:-1])
+    expected = np.cumsum(means.T * steps, axis=-1).max(axis=-1)
+    assert gauges.impulse_pa_s == pytest.approx(expected, rel=1e-9)
+    with pytest.raises(BlastEnvError, match="which is solid"):
+        Gauges(solver.grid, [(12, 5, 0)])
+    with pytest.raises(BlastEnvError, match="but the grid is"):
+        Gauges(solver.grid, [(30, 5, 0)])
+
+
+def test_maps_agree_with_gauges() -> None:
+    cells = [(16, 9, 0), (3, 20, 0)]
+    made: list[Any] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        made.extend((Gauges(grid, cells), GroundMap(grid)))
+        return {"recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.03)
+    gauges, ground = made
+    for k, (x, y, _) in enumerate(cells):
+        assert ground.peak_pa[x, y] == pytest.approx(gauges.peak_pa[k], rel=1e-5)
+        impulse = gauges.impulse_pa_s[k]
+        assert ground.impulse_pa_s[x, y] == pytest.approx(impulse, rel=0.02)
+    assert np.isnan(ground.peak_pa[13, 5])
+    with pytest.raises(BlastEnvError, match="0 to 9"):
+        GroundMap(solver.grid, layer=10)
+
+
+def test_pictures_are_taken_once_at_their_times() -> None:
+    times = [0.0, 0.002, 0.0020001, 0.01, 1.0]
+    made: list[Snapshots] = []
+
+    def setup(grid: GasGrid) -> dict[str, Any]:
+        made.extend((Snapshots(grid, 2, 1, times), Snapshots(grid, 1, 12, times)))
+        return {"recorders": made}
+
+    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver.advance(0.02)
+    plan, section = made
+    assert len(plan.frames) == len(section.frames) == 3
+    assert plan.frames[0].overpressure_pa.shape == (30, 26)
+    assert section.frames[0].overpressure_pa.shape == (30, 10)
+    assert [frame.time_s for frame in plan.frames] == [frame.time_s for frame in section.frames]
+    assert all(
+        time_s <= frame.time_s < time_s + 0.002
+        for time_s, frame in zip((0.0, 0.002, 0.01), plan.frames, strict=True)
+    )
+    for one, other in zip(plan.frames, section.frames, strict=True):
+        line = one.overpressure_pa[:, 12]
+        np.testing.assert_array_equal(line, other.overpressure_pa[:, 1])
+    assert np.isnan(plan.frames[0].overpressure_pa[13, 5])

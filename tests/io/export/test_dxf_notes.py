@@ -1,0 +1,253 @@
+"""What a drawing says beside its lines, read back as a CAD program reads it."""
+
+from itertools import combinations, pairwise
+from math import hypot, pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ezdxf.document import Drawing
+from ezdxf.entities.lwpolyline import LWPolyline
+from ezdxf.entities.mtext import MText
+from ezdxf.filemanagement import readfile
+from ezdxf.math import bulge_to_arc
+
+from blast_env import load_scenario
+from blast_env.design.rules import random_layout
+from blast_env.geometry import Rectangle
+from blast_env.io.export import LayoutPlan, export_layout
+from blast_env.io.export.dxf import key_of, note_lines, texts_of
+from blast_env.layout import Placement
+from blast_env.plots.plan import Kinds
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
+
+GATE = load_scenario("perimeter_gate")  # a clearance and an access way
+JUNCTION = load_scenario("street_junction")  # a budget
+COURTYARD = load_scenario("courtyard")  # none of these
+CLEARANCE_M = 1.5
+NAMES = ["courtyard", "free_field", "perimeter_gate", "street_junction"]
+
+PointM = tuple[float, float]
+
+
+def some_cells(scenario: Scenario, count: int) -> tuple[tuple[int, int], ...]:
+    placement = Placement.empty(scenario)
+    for _ in range(count):
+        row, column = np.argwhere(placement.free)[0]
+        placement = placement.place((int(row), int(column)))
+    return placement.cells
+
+
+def drawn(plan: LayoutPlan, folder: Path) -> Drawing:
+    document = readfile(export_layout(plan, folder / "layout.dxf"))
+    assert not document.audit().has_issues
+    return document
+
+
+def notes_of(document: Drawing) -> MText:
+    (notes,) = document.modelspace().query('*[layer=="NOTES"]')
+    assert isinstance(notes, MText)
+    return notes
+
+
+def outlines_of(document: Drawing, *layers: str) -> list[LWPolyline]:
+    """Return the outlines on some layers."""
+    polylines = [each for each in document.modelspace() if isinstance(each, LWPolyline)]
+    return [each for each in polylines if each.dxf.layer in layers]
+
+
+def line_pieces(outline: LWPolyline) -> list[list[PointM]]:
+    """Return each side and each arc of an outline as points on it, twenty apiece."""
+    corners = list(outline.get_points("xyb"))
+    assert outline.closed
+    pieces = []
+    for (x0, y0, bulge), (x1, y1, _) in pairwise([*corners, corners[0]]):
+        if bulge == 0.0:
+            shares = np.linspace(0.0, 1.0, 20)
+            pieces.append([(x0 + s * (x1 - x0), y0 + s * (y1 - y0)) for s in shares])
+            continue
+        centre, start, end, radius = bulge_to_arc((x0, y0), (x1, y1), bulge)
+        angles = np.linspace(start, end if end > start else end + 2.0 * pi, 20)
+        pieces.append(
+            [(centre.x + radius * np.cos(a), centre.y + radius * np.sin(a)) for a in angles]
+        )
+    return pieces
+
+
+def distance_m(point: PointM, rectangle: Rectangle) -> float:
+    x, y = point
+    gap_x = max(rectangle.left - x, 0.0, x - rectangle.right)
+    gap_y = max(rectangle.bottom - y, 0.0, y - rectangle.top)
+    return hypot(gap_x, gap_y)
+
+
+def test_notes_say_what_has_no_place_on_the_site(tmp_path: Path) -> None:
+    plan = LayoutPlan(GATE, some_cells(GATE, 3), Charge((15.0, 20.5), 500.0))
+    assert notes_of(drawn(plan, tmp_path)).plain_text(split=True) == [
+        "Scenario: perimeter_gate",
+        "Units: metres, from the lower left corner of the site",
+        "Charge: 500 kg TNT at (15.00, 20.50)",
+        "Modules: 3 of a stock of 16, 0.5 m x 0.5 m each",
+        "Clearance: 1.5 m at least between modules and structures",
+        "Access way: 6 m wide, from left to right of the build zone, to be kept open",
+        "A: the lane through the gap, and room to wait for the check",
+        "B: the lane turns off to the car park here",
+        "C: build zone",
+        "D: charge of 500 kg TNT may be here",
+        "E: charge of 100 kg TNT may be here",
+        "F: access way of 6 m from left to right",
+        "G: charge of 500 kg TNT",
+    ]
+
+
+def test_the_budget_is_there_with_what_the_modules_take(tmp_path: Path) -> None:
+    plan = LayoutPlan(JUNCTION, some_cells(JUNCTION, 4))
+    cost = Placement.of(JUNCTION, plan.layout).cost
+    lines = notes_of(drawn(plan, tmp_path)).plain_text(split=True)
+    budget = lines.index(f"Budget: 16, of which the modules take {cost:g}")
+    assert lines[budget - 2 : budget] == ["Clearance: none required", "Access way: none required"]
+
+
+def test_without_a_charge_the_notes_name_every_mass_that_there_may_be() -> None:
+    masses = {source.tnt_kg for source in GATE.charge}
+    assert masses == {100.0, 500.0}
+    assert "Charge: 100 or 500 kg TNT, anywhere on the layer CHARGE_PLACE" in note_lines(
+        LayoutPlan(GATE, ())
+    )
+
+
+def test_a_site_without_a_build_zone_has_nothing_to_say_of_modules() -> None:
+    subjects = [line.split(":")[0] for line in note_lines(LayoutPlan(load_scenario(NAMES[1]), ()))]
+    assert subjects == ["Scenario", "Units", "Charge"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_notes_are_above_everything_and_in_the_first_view(name: str, tmp_path: Path) -> None:
+    """Whoever opens the drawing sees the notes, and they cover nothing."""
+    scenario = load_scenario(name)
+    document = drawn(LayoutPlan(scenario, ()), tmp_path)
+    notes = notes_of(document)
+    assert notes.dxf.attachment_point == 7  # bottom left: further lines grow upwards
+    left_m, bottom_m = notes.dxf.insert.x, notes.dxf.insert.y
+    outlines = outlines_of(document, "SITE", "CLEARANCE")
+    tops = [y for outline in outlines for piece in line_pieces(outline) for _, y in piece]
+    assert bottom_m > max(tops) + notes.dxf.char_height
+    assert left_m == 0.0
+    assert notes.dxf.width == scenario.site.width_m
+    assert notes.dxf.char_height >= 0.4  # as high as the names on the site
+    lines = notes.plain_text(split=True)
+    assert notes.dxf.char_height * max(map(len, lines)) <= scenario.site.width_m + 1e-6
+    top_m = bottom_m + len(lines) * 5.0 / 3.0 * notes.dxf.char_height
+    (view,) = document.viewports.get_config("*Active")
+    assert view.dxf.center.y + view.dxf.height / 2.0 > top_m
+    assert view.dxf.center.y - view.dxf.height / 2.0 < 0.0
+
+
+def test_notes_on_a_narrow_site_are_readable_all_the_same(tmp_path: Path) -> None:
+    """Lines are broken rather than shrunk, and the first view has room for that."""
+    document = load_scenario("free_field").model_dump()
+    document["site"] = {"width_m": 8.0, "height_m": 8.0}
+    document["charge"] = [{"kind": "point", "position_m": (2.0, 4.0), "tnt_kg": 100.0}]
+    document["structures"][0]["corner_m"] = (5.0, 3.0)
+    document["structures"][0]["side_modules"] = 4
+    drawing = drawn(LayoutPlan(Scenario.from_document(document, "narrow"), ()), tmp_path)
+    notes = notes_of(drawing)
+    assert notes.dxf.char_height == 0.4
+    lines = notes.plain_text(split=True)
+    assert max(map(len, lines)) * notes.dxf.char_height <= 8.0
+    assert lines[1:4] == ["Units: metres, from", "the lower left", "corner of the site"]
+    (view,) = drawing.viewports.get_config("*Active")
+    wrapped_m = notes.dxf.insert.y + len(lines) * 5.0 / 3.0 * 0.4
+    assert view.dxf.center.y + view.dxf.height / 2.0 > wrapped_m
+
+
+@pytest.mark.parametrize("name", ["control_room", "hotel_forecourt", *NAMES, "school_and_clinic"])
+def test_no_text_covers_another_or_a_module(name: str) -> None:
+    scenario = load_scenario(name)
+    layout = random_layout(scenario, np.random.default_rng(0)) if scenario.build_zone else ()
+    plan = LayoutPlan(scenario, layout)
+    labels = texts_of(plan, 0.6)
+    for one, other in combinations([label.box_m for label in labels], 2):
+        assert not one.overlaps(other)
+    pieces = [each for each in plan.features if each.kind is Kinds.BARRIER]
+    for label in labels:
+        if label.feature not in pieces:
+            outlines = [Rectangle(*piece.places_m[0], *piece.places_m[2]) for piece in pieces]
+            assert not any(label.box_m.overlaps(outline) for outline in outlines)
+        elif label.text:
+            outline = Rectangle(*label.feature.places_m[0], *label.feature.places_m[2])
+            assert outline.contains(label.box_m)
+
+
+def test_every_letter_is_explained_once() -> None:
+    plan = LayoutPlan(load_scenario("control_room"), ())  # three places of one charge
+    key = key_of(plan)
+    letters = [label.text for label in texts_of(plan, 0.5) if len(label.text) == 1]
+    assert set(letters) == set(key.values())
+    assert letters.count(key["charge of 100 kg TNT may be here"]) == 3
+
+
+def test_the_clearance_is_a_dashed_line_at_its_distance_from_every_structure(
+    tmp_path: Path,
+) -> None:
+    """Every point of the line, also between the ends of an arc, is at the distance."""
+    document = drawn(LayoutPlan(GATE, ()), tmp_path)
+    assert document.layers.get("CLEARANCE").dxf.linetype == "DASHED"
+    outlines = outlines_of(document, "CLEARANCE")
+    assert len(outlines) == len(GATE.structures) == 4
+    for outline, structure in zip(outlines, GATE.structures, strict=True):
+        pieces = line_pieces(outline)
+        assert len(pieces) == 8
+        points = [point for piece in pieces for point in piece]
+        distances = [distance_m(point, structure.rectangle_m) for point in points]
+        assert distances == pytest.approx([CLEARANCE_M] * len(points))
+        x = [x for x, _ in points]
+        assert (min(x), max(x)) == pytest.approx(
+            structure.rectangle_m.grown(CLEARANCE_M)[0::2]
+        )  # the line goes all the way round
+
+
+@pytest.mark.parametrize("name", ["courtyard", "free_field", "street_junction"])
+def test_without_a_clearance_the_layer_is_empty(name: str, tmp_path: Path) -> None:
+    document = drawn(LayoutPlan(load_scenario(name), ()), tmp_path)
+    assert "CLEARANCE" in document.layers
+    assert not document.modelspace().query('*[layer=="CLEARANCE"]')
+
+
+def test_the_line_is_the_scenario_s_own_rule(tmp_path: Path) -> None:
+    """A cell is refused for its clearance exactly if it comes inside a drawn line."""
+    zone = GATE.zone
+    document = drawn(LayoutPlan(GATE, ()), tmp_path)
+    polygons = [
+        [point for piece in line_pieces(outline) for point in piece[:-1]]
+        for outline in outlines_of(document, "CLEARANCE")
+    ]
+    empty = Placement.empty(GATE)
+    inside = set()
+    for cell in zone.cells():
+        reason = empty.explain(cell) or ""
+        if reason and "structure" not in reason:
+            continue  # of a keep-out or a charge, which come first
+        square = zone.cell_rectangle_m(cell)
+        is_inside = any(
+            lies_inside(nearest_m(square, structure.rectangle_m), polygon)
+            for polygon, structure in zip(polygons, GATE.structures, strict=True)
+        )
+        assert is_inside == bool(reason), (cell, reason)
+        inside.add(is_inside)
+    assert inside == {False, True}
+
+
+def nearest_m(square: Rectangle, structure: Rectangle) -> PointM:
+    """Return a point of a square that is as near as any to a structure."""
+    x, y = structure.centre
+    return min(max(x, square.left), square.right), min(max(y, square.bottom), square.top)
+
+
+def lies_inside(point: PointM, polygon: list[PointM]) -> bool:
+    """Return whether a point is inside a convex polygon, not on its line."""
+    corner = np.array(polygon)
+    step = np.roll(corner, -1, axis=0) - corner
+    to_point = np.array(point) - corner
+    return bool((step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0] > 1e-6).all())

@@ -1,0 +1,622 @@
+"""Faults of real maps and drawings: nothing vanishes, stops the file or is guessed in silence."""
+
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import pytest
+from ezdxf import units
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.errors import BlastEnvError
+from blast_env.io.imported_site import imported_plan
+from blast_env.io.importing import ImportedSite, ImportOptions, import_site
+from blast_env.io.importing.ledger import Deed, LedgerEntry
+from blast_env.plots.plan import site_features
+from blast_env.site import RectangleSource, Scenario
+from studies.real_files.__main__ import main
+from tests.io.importing.maps import Places, charge, outline, rectangle, written
+
+PLACE = charge(-5.0, 2.0)
+HOUSE = outline(rectangle(0, 0, 6, 4), name="House", height=6.0, protected=True)
+DEGREE_M = 111_195.0
+"""Length of a degree on the equator, where the extracts of these tests lie."""
+
+
+def entries(site: ImportedSite, deed: Deed, words: str) -> tuple[LedgerEntry, ...]:
+    return tuple(each for each in site.ledger.of(deed) if words in each.kind)
+
+
+def places(found: Sequence[LedgerEntry]) -> list[str]:
+    return [each.place for each in found]
+
+
+def error_of(path: Path, **options: Any) -> str:
+    with pytest.raises(BlastEnvError) as caught:
+        import_site(path, ImportOptions(**options))
+    return str(caught.value)
+
+
+def imported(path: Path, **options: Any) -> ImportedSite:
+    return import_site(path, ImportOptions(**options))
+
+
+# Extracts of OpenStreetMap.
+
+
+class Extract:
+    """An extract in metres around (0, 0) on the equator, written in the order of its objects."""
+
+    def __init__(self) -> None:
+        self.nodes: list[str] = []
+        self.others: list[str] = []
+
+    def node(self, x: float, y: float) -> int:
+        number = len(self.nodes) + 1
+        lon, lat = x / DEGREE_M, y / DEGREE_M
+        self.nodes.append(f'<node id="{number}" lat="{lat:.9f}" lon="{lon:.9f}"/>')
+        return number
+
+    def way(self, number: int, outline: Places, marks: str = "", **tags: str) -> list[int]:
+        """Add a closed way; return its nodes."""
+        nodes = [self.node(*place) for place in outline]
+        self.way_of(number, [*nodes, nodes[0]], marks, **tags)
+        return nodes
+
+    def way_of(self, number: int, nodes: Sequence[int], marks: str = "", **tags: str) -> None:
+        sides = "".join(f'<nd ref="{node}"/>' for node in nodes)
+        self.others.append(f'<way id="{number}" {marks}>{sides}{_tags(tags)}</way>')
+
+    def relation(self, number: int, members: Sequence[tuple[int, str]], **tags: str) -> None:
+        ways = "".join(f'<member type="way" ref="{way}" role="{role}"/>' for way, role in members)
+        tags = {"type": "multipolygon", **tags}
+        self.others.append(f'<relation id="{number}">{ways}{_tags(tags)}</relation>')
+
+    def write(self, folder: Path, backwards: bool = False, negative: bool = False) -> Path:
+        objects = [*self.nodes, *self.others]
+        text = "\n".join(objects[::-1] if backwards else objects)
+        if negative:
+            text = text.replace(' id="', ' id="-').replace('ref="', 'ref="-')
+        path = folder / "town.osm"
+        path.write_text(f'<osm version="0.6">\n{text}\n</osm>')
+        return path
+
+
+def _tags(tags: dict[str, str]) -> str:
+    return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
+
+
+def town(**tags: str) -> Extract:
+    """Return an extract with a house, way 1, and a street beside it, way 2."""
+    extract = Extract()
+    extract.way(1, rectangle(0, 0, 10, 8), building="yes", height="6", name="House", **tags)
+    street = [extract.node(x, -12.0) for x in (-20.0, 30.0)]
+    extract.way_of(2, street, highway="residential", width="8")
+    return extract
+
+
+HOUSE_1 = {"protect": ("House",)}
+
+
+@pytest.mark.parametrize("missing", ["inner", "outer"])
+def test_relation_without_all_ways_is_left_out_by_name(missing: str, tmp_path: Path) -> None:
+    extract = town()
+    extract.way(10, rectangle(20, 0, 9, 9))
+    members = [(10, "outer"), (99, "inner")] if missing == "inner" else [(99, "outer")]
+    extract.relation(5, members, building="yes", name="Court")
+    path = extract.write(tmp_path)
+    site = imported(path, **HOUSE_1)
+    (lost,) = entries(site, Deed.LEFT_OUT, "relations of which the extract does not have all ways")
+    assert (lost.place, lost.name) == ("relation 5", "Court")
+    assert "--protect is 'Court', which is left out: relation 5" in error_of(
+        path, protect=("Court",)
+    )
+    if missing == "inner":
+        near = (25.0 / DEGREE_M, 4.0 / DEGREE_M)
+        words = "nearest to it is relation 5 (Court), which is left out"
+        assert words in error_of(path, protect_near=near)
+
+
+def test_relation_whose_rings_share_a_side_is_put_together(tmp_path: Path) -> None:
+    extract = town()
+    outer = extract.way(10, rectangle(20, 0, 10, 8))
+    inner = [extract.node(*place) for place in rectangle(20, 2, 4, 4)]
+    extract.way_of(11, [*inner, inner[0]])
+    extract.relation(5, [(10, "outer"), (11, "inner")], building="yes", height="6", name="Court")
+    del outer
+    site = imported(extract.write(tmp_path), **HOUSE_1)
+    (court,) = (each for each in site.buildings if each.title == "Court")
+    assert court.outline.area == pytest.approx(80.0 - 16.0, rel=0.01)
+    assert places(entries(site, Deed.GUESSED, "rings that touch")) == ["relation 5"]
+
+
+@pytest.mark.parametrize("negative", [False, True])
+def test_objects_may_come_in_any_order_with_any_ids(negative: bool, tmp_path: Path) -> None:
+    extract = town()
+    extract.way(11, rectangle(22, 2, 4, 4))
+    extract.way(10, rectangle(20, 0, 10, 10))
+    extract.relation(5, [(10, "outer"), (11, "inner")], building="yes", height="3", name="Court")
+    site = imported(extract.write(tmp_path, backwards=True, negative=negative), **HOUSE_1)
+    areas = {each.title: each.outline.area for each in site.buildings}
+    assert areas == pytest.approx({"House": 80.0, "Court": 84.0}, rel=0.01)
+    sign = "-" if negative else ""
+    assert {each.place for each in site.buildings} == {f"way {sign}1", f"relation {sign}5"}
+
+
+def test_deleted_objects_of_the_editor_are_not_there(tmp_path: Path) -> None:
+    extract = town()
+    extract.way(7, rectangle(20, 0, 9, 9), "action='delete' user='a>b'", building="yes")
+    site = imported(extract.write(tmp_path), **HOUSE_1)
+    assert [each.place for each in site.buildings] == ["way 1"]
+
+
+def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
+    extract = Extract()
+    extract.way(1, rectangle(0, 0, 20, 10), building="yes", name="Hall")
+    extract.way(3, rectangle(0, 0, 10, 10), **{"building:part": "yes", "height": "30"})
+    extract.way(4, rectangle(10, 0, 10, 10), **{"building:part": "yes", "building:levels": "2"})
+    extract.way(5, rectangle(12, 2, 4, 4), **{"building:part": "yes"})
+    street = [extract.node(x, -12.0) for x in (-20.0, 30.0)]
+    extract.way_of(2, street, highway="residential", width="8")
+    site = imported(extract.write(tmp_path), protect=("Hall",))
+    found = {each.place: (each.height_m, each.outline.area) for each in site.buildings}
+    assert {place: height_m for place, (height_m, _) in found.items()} == {
+        "way 3": 30.0,
+        "way 4": 6.0,
+    }
+    assert [area for _, area in found.values()] == pytest.approx([100.0, 100.0], rel=0.01)
+    assert places(entries(site, Deed.MERGED, "small or without a height")) == ["way 5"]
+    assert places(entries(site, Deed.MERGED, "parts above their building, covered")) == ["way 1"]
+    assert all(each.protected for each in site.buildings)
+    assert len({each.building for each in site.scenario.structures}) == 1
+    weights = sum(each.weight for each in site.scenario.structures if each.protected)
+    assert weights == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("tags", "height_m", "words"),
+    [
+        ({"height": "29'6\""}, 9.0, None),
+        ({"height": "29 ft 6 in"}, 9.0, None),
+        ({"height": "about 9", "building:levels": "3"}, 9.0, "cannot be read"),
+        ({"building:levels": "2;3"}, 9.0, "several numbers"),
+        ({"building:levels": "3-4"}, 12.0, "several numbers"),
+        ({"building:levels": "2,5"}, 7.5, None),
+    ],
+)
+def test_heights_as_people_write_them(
+    tags: dict[str, str], height_m: float, words: str | None, tmp_path: Path
+) -> None:
+    house = outline(rectangle(0, 0, 6, 4), protected=True, **tags)
+    site = imported(written(tmp_path, house, PLACE))
+    assert site.buildings[0].height_m == height_m
+    guesses = site.ledger.of(Deed.GUESSED)
+    assert [words in each.kind for each in guesses if words] == ([True] if words else [])
+    assert words is not None or not guesses
+
+
+def test_roofs_are_open_below_and_cellars_are_left_out(tmp_path: Path) -> None:
+    extract = town()
+    extract.way(3, rectangle(20, 0, 8, 6), building="roof")
+    extract.way(4, rectangle(40, 0, 8, 6), building="garage", layer="-1")
+    extract.way(5, rectangle(20, 12, 9, 9), amenity="parking", parking="underground")
+    extract.way(6, rectangle(40, 12, 9, 9), amenity="parking", parking="surface")
+    site = imported(extract.write(tmp_path), **HOUSE_1)
+    (roof,) = (each for each in site.buildings if each.place == "way 3")
+    assert (roof.base_m, roof.height_m) == (4.0, 4.5)
+    assert places(entries(site, Deed.GUESSED, "open below")) == ["way 3"]
+    assert places(entries(site, Deed.LEFT_OUT, "below the ground")) == ["way 4"]
+    assert places(entries(site, Deed.LEFT_OUT, "not on the ground")) == ["way 5"]
+    assert "way 6" in places(entries(site, Deed.READ, "place of a charge"))
+
+
+def test_building_over_building_is_merged_and_the_higher_stands(tmp_path: Path) -> None:
+    low = outline(rectangle(10, 0, 10, 10), height=3.0)
+    tower = outline(rectangle(12, 2, 4, 4), height=12.0)
+    hidden = outline(rectangle(10, 4, 6, 6), height=2.0)
+    site = imported(written(tmp_path, HOUSE, low, tower, hidden, PLACE), protect=("House",))
+    found = {each.place: (each.height_m, each.outline.area) for each in site.buildings}
+    assert found == {
+        "features[0]": (6.0, 24.0),
+        "features[1]": (3.0, 84.0),
+        "features[2]": (12.0, 16.0),
+    }
+    assert places(entries(site, Deed.MERGED, "covered")) == ["features[3]"]
+    assert places(entries(site, Deed.MERGED, "overlap left out")) == ["features[1]"]
+
+
+def test_ruins_and_hair_lines_do_not_stop_the_file(tmp_path: Path) -> None:
+    ruin = outline(rectangle(0, 0, 6, 4), building="ruins")
+    thin = outline(rectangle(10, 0, 0.2, 30), name="Screen")
+    site = imported(written(tmp_path, HOUSE, ruin, thin, PLACE))
+    assert [each.place for each in site.buildings] == ["features[0]"]
+    assert places(entries(site, Deed.MERGED, "covered")) == ["features[1]"]
+    assert places(entries(site, Deed.LEFT_OUT, "centre of no module")) == ["features[2]"]
+
+
+def test_exchanged_longitude_and_latitude_are_refused(tmp_path: Path) -> None:
+    extract = Extract()
+    far = [(x + 900_000.0, y) for x, y in rectangle(0, 0, 10, 8)]
+    extract.way(1, far, building="yes", height="6")
+    extract.way(3, [(x + 900_030.0, y) for x, y in rectangle(0, 0, 9, 8)], amenity="parking")
+    path = extract.write(tmp_path)
+    lon_lat = (900_005.0 / DEGREE_M, 4.0 / DEGREE_M)
+    assert imported(path, protect_near=lon_lat).buildings[0].protected
+    message = error_of(path, protect_near=lon_lat[::-1])
+    assert "outside of it: are longitude and latitude exchanged?" in message
+
+
+def test_heights_that_no_file_has_are_guessed_by_neighbours_and_kind(tmp_path: Path) -> None:
+    row = [outline(rectangle(12 * k, 10, 8, 6), height=4.0 + 2.0 * k) for k in range(1, 5)]
+    bare = outline(rectangle(72, 10, 8, 6), name="Bare")
+    shed = outline(rectangle(72, 20, 4, 4), name="Shed")
+    garage = outline(rectangle(84, 20, 6, 6), building="garages", name="Garages")
+    path = written(tmp_path, HOUSE, *row, bare, shed, garage, PLACE)
+    heights = {each.title: each.height_m for each in imported(path).buildings}
+    assert (heights["Bare"], heights["Shed"], heights["Garages"]) == (8.0, 3.0, 3.0)
+    low = imported(path, low_heights=True)
+    assert {each.title: each.height_m for each in low.buildings}["Bare"] == 6.0
+    (guess,) = (each for each in imported(path).ledger.of(Deed.GUESSED) if each.name == "Bare")
+    assert "unsafe side" in guess.kind
+    assert guess.detail == "8.0 m as 5 neighbours, low 6.0 m"
+    same = imported(path, default_height_m=5.0)
+    assert {each.title: each.height_m for each in same.buildings}["Bare"] == 5.0
+
+
+def test_options_hold_in_a_map_without_roles(tmp_path: Path) -> None:
+    tags = {"kindless": "x", "storeys_of": 2.0, "levels": 4, "min_height": 2.0}
+    feature = outline(rectangle(0, 0, 6, 4)) | {"properties": tags}
+    path = written(tmp_path, feature)
+    options: dict[str, Any] = {"protect_near": (1.0, 1.0), "charge_at": ((-5.0, 2.0),)}
+    (house,) = imported(path, level_height_m=2.5, **options).buildings
+    assert (house.height_m, house.base_m) == (10.0, 2.0)
+    (other,) = imported(path, height_from="storeys_of", **options).buildings
+    assert other.height_m == 2.0
+
+
+def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
+    extract = town()
+    site = imported(extract.write(tmp_path), rotation_deg=0.0, margin_m=20.0, **HOUSE_1)
+    (house,) = site.buildings
+    near = [
+        each.lines_m[0][0][1]
+        for each in site.scenario.charge
+        if not isinstance(each, RectangleSource)
+    ]
+    south = house.outline.bounds[1]
+    assert sorted(south - y for y in near) == pytest.approx([9.0, 15.0], abs=0.15)
+    assert not entries(site, Deed.GUESSED, "widths of streets")
+
+
+def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
+    assert "--charge-at X,Y" in error_of(written(tmp_path, HOUSE))
+    assert "--margin" in error_of(written(tmp_path, HOUSE))
+
+
+@pytest.mark.parametrize(
+    ("title", "name"),
+    [
+        ("Дом культуры", "Dom_kultury"),
+        ("Łódź: Sąd", "Lodz_Sad"),
+        ("1st National", "b_1st_National"),
+    ],
+)
+def test_names_of_the_map_stay_titles_and_become_latin_ids(
+    title: str, name: str, tmp_path: Path
+) -> None:
+    house = outline(rectangle(0, 0, 6, 4), name=title, height=6.0)
+    path = written(tmp_path, house, PLACE)
+    site = imported(path, protect=(title,))
+    (structure,) = site.scenario.structures
+    assert (structure.name, structure.title) == (name, title)
+    assert f"{name} ({title})" in error_of(path)
+    (label,) = (each.label for each in site_features(site.scenario) if each.name == name)
+    assert label.startswith(title)
+    assert site.scenario.content_hash == retitled(site.scenario).content_hash
+
+
+def retitled(scenario: Scenario) -> Scenario:
+    document = scenario.model_dump()
+    document["structures"][0]["title"] = "other"
+    return Scenario.from_document(document, "retitled")
+
+
+def test_labels_of_real_names_do_not_lie_on_each_other(tmp_path: Path) -> None:
+    names = [f"Государственное бюджетное учреждение культуры № {k}" for k in range(8)]
+    row = [
+        outline(rectangle(12 * (k % 4), 14 * (k // 4), 10, 8), name=each, height=6.0)
+        for k, each in enumerate(names)
+    ]
+    site = imported(written(tmp_path, *row, PLACE), protect=(names[0],))
+    axes = imported_plan(site).axes[0]
+    boxes = [text.get_window_extent() for text in axes.texts if "\n" in text.get_text()]
+    assert len(boxes) == len(names)
+    for one, other in combinations(boxes, 2):
+        assert not one.overlaps(other)
+
+
+# Drawings.
+
+
+def drawing(folder: Path) -> tuple[Path, Any]:
+    document = ezdxf.filemanagement.new("R2010", units=units.M)
+    return folder / "plan.dxf", document
+
+
+def of_layer(name: str) -> dict[str, str]:
+    return {"layer": name}
+
+
+DRAWN: dict[str, Any] = {
+    "buildings_from": ("HOUSES",),
+    "protect_near": (1.0, 1.0),
+    "charge_at": ((-5.0, 2.0),),
+}
+
+
+def test_entities_on_layer_0_of_a_block_have_the_layer_of_the_insert(tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
+    inner.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("0"))
+    outer.add_blockref("INNER", (0, 0), dxfattribs=of_layer("0"))
+    outer.add_lwpolyline(rectangle(10, 0, 4, 4), close=True, dxfattribs=of_layer("TREES"))
+    document.modelspace().add_blockref("OUTER", (0, 0), dxfattribs=of_layer("HOUSES"))
+    document.saveas(path)
+    site = imported(path, **DRAWN)
+    assert [each.outline.area for each in site.buildings] == [24.0]
+    assert len(entries(site, Deed.PASSED, "layer TREES")) == 1
+
+
+@pytest.mark.parametrize("gap", [0.0006, 0.005, 0.2])
+def test_outlines_with_a_gap_are_closed_and_named(gap: float, tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    space = document.modelspace()
+    ring = [*rectangle(0, 0, 6, 4), (0.0, gap)]
+    space.add_lwpolyline(ring, dxfattribs=of_layer("HOUSES"))
+    for (x, y), (u, v) in zip(
+        rectangle(10, 0, 6, 4), [*rectangle(10, 0, 6, 4)[1:], (10.0, gap)], strict=True
+    ):
+        space.add_line((x, y), (u, v), dxfattribs=of_layer("HOUSES"))
+    space.add_lwpolyline(rectangle(20, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES"))
+    document.saveas(path)
+    if gap > 0.05:
+        others = {"protect_near": (21.0, 1.0), "charge_at": ((15.0, 2.0),)}
+        site = imported(path, **(DRAWN | others))
+        assert len(site.buildings) == 1
+        assert len(entries(site, Deed.LEFT_OUT, "open lines")) == 5
+        assert "nearest to it is LWPOLYLINE" in error_of(path, **DRAWN)
+        return
+    site = imported(path, **DRAWN)
+    assert len(site.buildings) == 3
+    (alone,) = entries(site, Deed.CLOSED, "outlines with a gap")
+    assert alone.detail == f"{1000 * gap:.1f} mm"
+    together = entries(site, Deed.CLOSED, "lines joined to outlines")
+    assert len(together) == 4
+    assert any(f"{1000 * gap:.1f} mm bridged" in each.detail for each in together)
+
+
+def test_lines_joined_to_an_outline_keep_what_they_say(tmp_path: Path) -> None:
+    corners = [*rectangle(0, 0, 6, 4), (0, 0)]
+    tags = {"building": "yes", "height": 6.0, "min_height": 2.0, "protected": True}
+    sides = [
+        {
+            "type": "Feature",
+            "properties": tags,
+            "geometry": {"type": "LineString", "coordinates": [list(a), list(b)]},
+        }
+        for a, b in pairwise(corners)
+    ]
+    (house,) = imported(written(tmp_path, *sides, PLACE)).buildings
+    assert (house.height_m, house.base_m, house.protected) == (6.0, 2.0, True)
+
+
+def test_hatch_with_a_hole_and_an_inner_outline_are_courtyards(tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    space = document.modelspace()
+    hatch = space.add_hatch(dxfattribs=of_layer("HOUSES"))
+    hatch.paths.add_polyline_path(rectangle(0, 0, 12, 10), is_closed=True)
+    hatch.paths.add_polyline_path(rectangle(4, 3, 4, 4), is_closed=True, flags=0)
+    for left, width in ((20, 12), (24, 4)):
+        shape = rectangle(left, 3 * (width == 4), width, 10 - 6 * (width == 4))
+        space.add_lwpolyline(shape, close=True, dxfattribs=of_layer("HOUSES"))
+    document.saveas(path)
+    site = imported(path, **DRAWN)
+    assert [each.outline.area for each in site.buildings] == [104.0, 104.0]
+    assert len(entries(site, Deed.GUESSED, "taken as courtyards")) == 1
+
+
+def test_meshes_have_a_footprint_and_their_heights(tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    space = document.modelspace()
+    corners = [(x, y, z) for z in (1.0, 7.0) for x, y in rectangle(0, 0, 6, 4)]
+    sides = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5)]
+    mesh = space.add_mesh(dxfattribs=of_layer("HOUSES"))
+    with mesh.edit_data() as data:
+        data.vertices, data.faces = corners, sides
+    moved = [[(x + 10, y, z) for x, y, z in (corners[k] for k in side)] for side in sides]
+    space.add_polyface(dxfattribs=of_layer("HOUSES")).append_faces(moved)
+    document.saveas(path)
+    found = [
+        (each.outline.area, each.base_m, each.height_m)
+        for each in imported(path, **DRAWN).buildings
+    ]
+    assert found == [(24.0, 1.0, 7.0), (24.0, 1.0, 7.0)]
+
+
+def test_what_a_drawing_has_of_no_outline_is_named(tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    space = document.modelspace()
+    space.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES"))
+    document.add_xref_def("other.dxf", "OTHER")
+    space.add_blockref("OTHER", (0, 0), dxfattribs=of_layer("HOUSES"))
+    space.add_xline((0, 0), (1, 1), dxfattribs=of_layer("HOUSES"))
+    space.add_mline([(20, 0), (30, 0)], dxfattribs=of_layer("HOUSES"))
+    document.saveas(path)
+    site = imported(path, **DRAWN)
+    kinds = {each.kind for each in site.ledger.of(Deed.LEFT_OUT)}
+    assert {
+        "references to other files, or to blocks that are not there",
+        "entities of the type XLINE",
+        "open lines, which close no outline",
+    } <= kinds
+
+
+def test_scale_of_0_is_1(tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    block = document.blocks.new("HOUSE")
+    block.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("0"))
+    marks = {**of_layer("HOUSES"), "xscale": 3.0, "zscale": 3.0}
+    document.modelspace().add_blockref("HOUSE", (0, 0), dxfattribs=marks)
+    document.saveas(path)
+    path.write_text(
+        path.read_text().replace(" 41\n3.0\n", " 41\n0.0\n").replace(" 43\n3.0\n", " 43\n0.0\n")
+    )
+    site = imported(path, **DRAWN)
+    assert [each.outline.area for each in site.buildings] == [24.0]
+    assert len(entries(site, Deed.GUESSED, "scale of 0")) == 2
+
+
+def test_damaged_drawing_is_recovered_and_named(tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    document.modelspace().add_lwpolyline(
+        rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES")
+    )
+    document.saveas(path)
+    lines = path.read_text().splitlines()
+    at = next(k for k, line in enumerate(lines) if line == "LWPOLYLINE")
+    assert lines[at + 1].strip() == "5"
+    path.write_text("\n".join([*lines[: at + 2], "NO HANDLE", *lines[at + 3 :]]))
+    site = imported(path, **DRAWN)
+    assert len(site.buildings) == 1
+    assert places(entries(site, Deed.GUESSED, "recovered")) == ["plan.dxf"]
+
+
+@pytest.mark.parametrize("old", [True, False])
+def test_elevation_and_thickness_are_those_of_new_polylines(old: bool, tmp_path: Path) -> None:
+    path, document = drawing(tmp_path)
+    marks = {**of_layer("HOUSES"), "thickness": 6.0}
+    space = document.modelspace()
+    if old:
+        marks["elevation"] = (0.0, 0.0, 3.0)
+        space.add_polyline2d(rectangle(0, 0, 6, 4), close=True, dxfattribs=marks)
+    else:
+        marks["elevation"] = 3.0
+        space.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=marks)
+    document.saveas(path)
+    (house,) = imported(path, **DRAWN).buildings
+    assert (house.base_m, house.height_m) == (3.0, 9.0)
+
+
+# The ledger.
+
+
+def test_strict_refuses_guesses_and_omissions(tmp_path: Path) -> None:
+    path = written(tmp_path, HOUSE, PLACE)
+    assert imported(path, strict=True).buildings
+    bare = outline(rectangle(10, 0, 6, 4))
+    small = outline(rectangle(20, 0, 1, 1))
+    message = error_of(written(tmp_path, HOUSE, bare, small, PLACE), strict=True)
+    assert "--strict allows no guess and no omission" in message
+    assert "features[1]" in message
+    assert "features[2]" in message
+
+
+def test_guesses_about_what_is_not_on_the_site_do_not_count(tmp_path: Path) -> None:
+    street: dict[str, Any] = {"type": "LineString", "coordinates": [[300, 0], [300, 9]]}
+    far = {"type": "Feature", "properties": {"highway": "residential"}, "geometry": street}
+    path = written(tmp_path, HOUSE, far, PLACE)
+    assert imported(path, strict=True, origin=(-10.0, -10.0), size_m=(30.0, 30.0)).buildings
+    near = {**far, "geometry": {**street, "coordinates": [[9, -9], [9, 13]]}}
+    assert "features[1]" in error_of(written(tmp_path, HOUSE, near, PLACE), strict=True)
+
+
+def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
+    bare = outline(rectangle(10, 0, 6, 4), name="Bare")
+    site = imported(written(tmp_path, HOUSE, bare, PLACE))
+    (kind,) = site.ledger.record["guessed"]
+    (entry,) = site.ledger.record["guessed"][kind]
+    assert (entry["place"], entry["name"], entry["position"]) == (
+        "features[1]",
+        "Bare",
+        (13.0, 2.0),
+    )
+    assert "read: building: 2 (features[0], features[1])" in site.ledger.text
+    assert "guessed 1: heights not in the file" in site.scenario.description
+
+
+KINDS = st.sampled_from(
+    [
+        {"building": "yes"},
+        {"building": "roof"},
+        {"building": "house", "height": "tall"},
+        {"building": "yes", "layer": "-1"},
+        {"building:part": "yes", "height": "9"},
+        {"highway": "service"},
+        {"highway": "steps"},
+        {"amenity": "parking"},
+        {"barrier": "wall"},
+        {"natural": "tree"},
+        {"kind": "keep_out"},
+        {"kind": "charge_place"},
+        {},
+    ]
+)
+SHAPES = st.tuples(
+    st.sampled_from(["Polygon", "LineString", "Point", None]),
+    st.integers(-8, 40),
+    st.integers(-8, 40),
+    st.integers(1, 12),
+)
+
+
+def shaped(shape: tuple[str | None, int, int, int], tags: dict[str, str]) -> dict[str, Any]:
+    kind, x, y, side = shape
+    ring = [[x, y], [x + side, y], [x + side, y + side], [x, y + side], [x, y]]
+    coordinates: Any = {"Polygon": [ring], "LineString": ring[:3], "Point": [x, y]}
+    geometry = None if kind is None else {"type": kind, "coordinates": coordinates[kind]}
+    return {"type": "Feature", "properties": tags, "geometry": geometry}
+
+
+@given(st.lists(st.tuples(SHAPES, KINDS), max_size=12), st.booleans())
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_every_object_is_on_the_ledger_or_on_the_site(
+    tmp_path_factory: pytest.TempPathFactory,
+    drawn: list[tuple[tuple[str | None, int, int, int], dict[str, str]]],
+    cut: bool,
+) -> None:
+    """Each object is read or has a reason; what is read as a building stands on the site."""
+    house = outline(rectangle(50, 0, 8, 6), name="House", height=6.0, protected=True)
+    features = [house, charge(64.0, 3.0), *(shaped(*each) for each in drawn)]
+    path = written(tmp_path_factory.mktemp("maps"), *features)
+    part: dict[str, Any] = {"origin": (20.0, -5.0), "size_m": (50.0, 30.0)} if cut else {}
+    site = imported(path, protect=("House",), **part)
+    fates = site.ledger.of(Deed.READ, Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+    assert {each.place for each in fates} == {f"features[{k}]" for k in range(len(features))}
+    read = {each.place for each in site.ledger.of(Deed.READ) if each.kind == "building"}
+    assert read == {each.place for each in site.buildings}
+    assert not entries(site, Deed.LEFT_OUT, "of no use")
+
+
+def test_a_folder_of_files_has_the_sums_of_their_ledgers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(tmp_path, HOUSE, outline(rectangle(10, 0, 6, 4)), PLACE)
+    (tmp_path / "broken.osm").write_text("<osm")
+    main(tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    assert "imported 1 of 2 files" in lines
+    assert "read: building: 2" in lines
+    assert any(line.startswith("guessed: heights not in the file") for line in lines)
+    assert any(line.startswith("refused: ") for line in lines)
+
+
+@pytest.mark.parametrize("layer", ["1", "-1"])
+def test_layers_of_a_map_are_no_layers_of_a_drawing(layer: str, tmp_path: Path) -> None:
+    """A tag `layer` of OpenStreetMap says what is above what; selectors are still tags."""
+    extract = town()
+    extract.way(3, rectangle(20, 0, 8, 6), building="yes", height="3", layer=layer)
+    site = imported(extract.write(tmp_path), buildings_from=("building",), **HOUSE_1)
+    assert len(site.buildings) == (2 if layer == "1" else 1)

@@ -1,0 +1,199 @@
+"""Placing modules one by one: what may be placed, why not, and that both always agree."""
+
+import copy
+import pickle
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.errors import LayoutError
+from blast_env.geometry import Cell
+from blast_env.layout import Placement, check_layout, usable_cells
+from blast_env.site import Scenario, bundled_scenarios, load_scenario
+from tests.site.documents import Document
+from tests.site.zones import (
+    area,
+    available,
+    buildable,
+    filled,
+    may_stand,
+    zone_documents,
+    zone_scenario,
+)
+
+CONDITIONS: Document = {
+    "clearance_m": 1.0,
+    "module_cost": 1.5,
+    "budget": 20.0,
+    "access_way": {"width_m": 3.0, "between": "left_right"},
+}
+
+
+def assert_free_explain_and_place_agree(placement: Placement, cells: list[Cell]) -> None:
+    for cell in cells:
+        reason = placement.explain(cell)
+        assert (reason is None) == placement.free[cell], cell
+        if reason is None:
+            after = placement.place(cell)
+            assert after.cells == (*placement.cells, cell)
+            assert after.stock_left == placement.stock_left - 1
+        else:
+            with pytest.raises(LayoutError, match=f"^{re.escape(reason)}$"):
+                placement.place(cell)
+
+
+# --- Random zones against the rules written out the slow way.
+
+
+@pytest.mark.slow
+@given(zone_documents(), st.integers(0, 10**6))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int) -> None:
+    scenario = buildable(document)
+    zone = scenario.zone
+    rng = np.random.default_rng(seed)
+    placement = Placement.empty(scenario)
+    # The checks of a scenario promise this.
+    assert not placement.is_full
+    while True:
+        for cell in zone.cells():
+            allowed = cell not in placement.cells and may_stand(scenario, {*placement.cells, cell})
+            assert placement.free[cell] == allowed, (placement.cells, cell)
+        assert_free_explain_and_place_agree(placement, list(zone.cells()))
+        if placement.is_full:
+            return
+        cells = available(placement)
+        placement = placement.place(cells[rng.integers(len(cells))])
+
+
+@given(zone_documents(), st.integers(0, 10**6), st.data())
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_order_does_not_matter_and_fewer_modules_are_no_worse(
+    document: Document, seed: int, data: st.DataObject
+) -> None:
+    scenario = buildable(document)
+    full = filled(scenario, np.random.default_rng(seed))
+    shuffled = Placement.of(scenario, data.draw(st.permutations(full.cells)))
+    assert (shuffled.free == full.free).all()
+    assert shuffled.cost == full.cost
+    some = data.draw(st.lists(st.sampled_from(full.cells), unique=True))
+    fewer = Placement.of(scenario, some)
+    assert all(fewer.free[cell] for cell in set(full.cells) - set(some))
+    assert (fewer.free >= full.free).all()
+
+
+# --- The bundled scenarios of single modules, as they are and with every condition added.
+
+MODULAR = [name for name in bundled_scenarios() if not load_scenario(name).height_notes]
+
+
+@pytest.mark.parametrize("conditions", [{}, CONDITIONS], ids=["as they are", "with conditions"])
+@pytest.mark.parametrize("name", MODULAR)
+def test_bundled_scenarios_are_placed_without_contradiction(
+    name: str, conditions: Document
+) -> None:
+    """About 20 episodes of each, 20 cells looked at in every state."""
+    document = load_scenario(name).model_dump()
+    if document["build_zone"] is None:
+        assert Placement.empty(load_scenario(name)).is_full
+        return
+    document["build_zone"].update(conditions)
+    scenario = Scenario.from_document(document, name)
+    zone = scenario.zone
+    every, rng = list(zone.cells()), np.random.default_rng(0)
+    for _ in range(20):
+        placement = Placement.empty(scenario)
+        while not placement.is_full:
+            looked_at = [every[i] for i in rng.integers(len(every), size=18)]
+            cells = available(placement)
+            chosen = cells[rng.integers(len(cells))]
+            assert_free_explain_and_place_agree(placement, [*looked_at, chosen, cells[0]])
+            placement = placement.place(chosen)
+        assert check_layout(scenario, placement.cells) == placement.cells
+        assert (Placement.of(scenario, placement.cells[::-1]).free == placement.free).all()
+
+
+# --- Whole layouts.
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ([(0, 0), (1, 1), (0, 0)], "cell (0, 0) is repeated"),
+        ([(0, 0), (8, 0)], "cell (8, 0) is outside the build zone of 8 rows and 8 columns"),
+        ([(0, 0), (0, 1)], "cell (0, 1) costs 1, but only 0.5 of the budget of 1.5 is left"),
+    ],
+)
+def test_layout_is_refused_by_its_first_bad_cell(cells: list[Cell], words: str) -> None:
+    with pytest.raises(LayoutError, match=f"^{re.escape(words)}$"):
+        Placement.of(zone_scenario(budget=1.5 if "costs" in words else 50.0), cells)
+
+
+def test_layout_that_closes_the_way_is_refused_by_the_cell_that_closes_it() -> None:
+    scenario = zone_scenario(access_way={"width_m": 0.5, "between": "left_right"})
+    wall = [(row, 3) for row in range(8)]
+    assert Placement.of(scenario, wall[:-1]).cells == tuple(wall[:-1])
+    with pytest.raises(LayoutError, match=r"cell \(7, 3\) would close the access way of 0.5 m"):
+        Placement.of(scenario, wall)
+    with pytest.raises(LayoutError, match=r"cell \(0, 3\) would close the access way of 0.5 m"):
+        check_layout(scenario, wall[::-1])
+    # A diagonal wall: the vehicle does not fit between corners that touch.
+    with pytest.raises(LayoutError, match=r"cell \(7, 7\) would close"):
+        Placement.of(scenario, [(i, i) for i in range(8)])
+
+
+@pytest.mark.parametrize("cell", [(np.int64(3), np.uint8(1)), np.array([3, 1]), [3, 1]])
+def test_numpy_cells_become_plain_integers(cell: Any) -> None:
+    placement = Placement.empty(zone_scenario()).place(cell)
+    assert placement.cells == ((3, 1),)
+    assert all(type(number) is int for number in placement.cells[0])
+    assert placement.explain(cell) == "cell (3, 1) is taken by a module"
+
+
+@pytest.mark.parametrize("cell", [3, (1.0, 2), (True, 1), (1, 2, 3), None, "31"])
+def test_what_is_no_cell_is_refused(cell: Any) -> None:
+    with pytest.raises(LayoutError, match=r"^cell: .* must be a pair of integers"):
+        Placement.empty(zone_scenario()).place(cell)
+
+
+# --- A value like any other.
+
+
+def test_placing_leaves_the_placement_as_it_was() -> None:
+    before = Placement.empty(zone_scenario())
+    free = before.free.copy()
+    before.place((0, 0)).place((5, 5))
+    assert (before.cells, before.stock_left, before.cost) == ((), 10, 0.0)
+    assert (before.free == free).all()
+
+
+@pytest.mark.parametrize("name", ["free", "usable", "module_costs"])
+def test_arrays_are_read_only(name: str) -> None:
+    placement = Placement.of(zone_scenario(), [(0, 0)])
+    for each in (placement, pickle.loads(pickle.dumps(placement))):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(each, name)[0, 0] = 1
+
+
+def test_placement_survives_pickling_and_copying() -> None:
+    placement = Placement.of(zone_scenario(budget=5.0, module_cost=0.5), [(1, 2), (0, 0)])
+    assert placement.free.any()
+    for again in (pickle.loads(pickle.dumps(placement)), copy.deepcopy(placement)):
+        assert again == placement
+        assert (again.free == placement.free).all()
+        assert again.place((3, 3)).cost == 1.5
+
+
+def test_changed_copy_of_a_scenario_has_its_own_cells() -> None:
+    """What holds for the cells is kept from call to call, but not for another scenario."""
+    scenario = zone_scenario()
+    assert usable_cells(scenario).all()
+    assert scenario.build_zone is not None
+    path = zone_scenario(keep_outs=[area(0.0, 0.0, 4.0, 0.5, reason="path")]).build_zone
+    changed = scenario.model_copy(update={"build_zone": path})
+    assert usable_cells(changed).sum() == 56
+    assert usable_cells(scenario).all()

@@ -1,0 +1,186 @@
+"""How fast the blast front runs in the event engine, against the laws of strong blasts.
+
+The front is where the air is densest. Two laws for a charge in cold, dilute air, without any
+parameter to fit:
+
+- Elastic balls: the cylindrical strong blast of Taylor, von Neumann and Sedov. Hard discs are a gas
+  with gamma = 2, for which R = (E t^2 / (0.3519 rho))^(1/4); E is the energy of the charge per
+  length, rho the mass of the air per area.
+- Inelastic balls: energy is lost but momentum is not, and the air is swept up as by a snowplough.
+  A mass rho pi R^2 with the radial momentum P moves at dR/dt, so R = (3 P t / (pi rho))^(1/3), the
+  t^(1/(D + 1)) of Jabeen, Rajesh and Ray, Europhys. Lett. 89 (2010) 34001, for D = 2.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Final
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from blast_env.arrays import FloatArray
+from blast_env.evaluation.engines.particles import EventEngine
+from blast_env.geometry import Rectangle
+from blast_env.particles.run import BallStates
+from blast_env.site.balls import Balls, air_lattice, explosion_fan
+from blast_env.site.parameters import SimulationParameters, with_overrides
+from blast_env.site.scene import Charge, Scene, StructureOutline
+from blast_env.site.structure import ModularObstacle
+from blast_env.units import UNITS_PER_M
+
+SPACING_UNITS: Final = 10.0
+
+AIR_DENSITY: Final = 1.0 / SPACING_UNITS**2
+"""Mass of the air per area; every ball has the mass 1."""
+
+SEDOV_GAS: Final = 0.3519
+"""The constant for hard discs of no size."""
+
+_BIN: Final = 0.005  # of ln r, in which the density is counted
+
+_SMOOTHING: Final = 0.02  # of ln r; the front of so few balls is no sharper
+
+_INNERMOST_SPACINGS: Final = 15.0  # nearer by, a few balls make any density
+
+
+@dataclass(frozen=True)
+class FrontCase:
+    """A charge in the middle of a square of cold air.
+
+    Attributes:
+        restitution: Of all collisions.
+        side_spacings: Side of the square, in spacings of the air.
+        packing_fraction: Share of the area that the balls of the air cover.
+        ball_count: Balls of the charge, each as heavy as one of the air.
+        speed_units_per_s: Their speed.
+    """
+
+    restitution: float
+    side_spacings: int
+    packing_fraction: float = 0.03
+    ball_count: int = 300
+    speed_units_per_s: float = 1000.0
+
+    @property
+    def energy(self) -> float:
+        """Energy of the charge per length."""
+        return 0.5 * self.ball_count * self.speed_units_per_s**2
+
+    def scene(self, seed: int) -> Scene:
+        """Lay out the charge and the air."""
+        radius = SPACING_UNITS * (self.packing_fraction / pi) ** 0.5
+        of_ball = {"mass": 1.0, "radius_units": radius, "elasticity": self.restitution**0.5}
+        charge = {
+            "ball_count": self.ball_count,
+            "speed_units_per_s": self.speed_units_per_s,
+            "offset_units": SPACING_UNITS,
+        }
+        parameters = with_overrides(
+            SimulationParameters(),
+            {
+                "air": {**of_ball, "spacing_units": SPACING_UNITS},
+                "explosive": of_ball | charge,
+                "contact": {"air_shrink": 1.0, "minimum_radius_units": 0.001},
+                "stepping": {"time_limit_s": 60.0},
+            },
+        )
+        side = self.side_spacings * SPACING_UNITS
+        site, centre = Rectangle(0.0, 0.0, side, side), (side / 2.0, side / 2.0)
+        rng = np.random.default_rng(seed)
+        air = air_lattice(parameters.air, site, [], centre, SPACING_UNITS + radius, rng)
+        fan = explosion_fan(parameters.explosive, centre, rng)
+        # A run ends when no structure can be reached: this one is in a corner.
+        far = StructureOutline(ModularObstacle, "far", (0.5, 0.5), 1, 1, True, 1.0, None, None)
+        balls = Balls.concatenate((air, fan))
+        return Scene(
+            site_m=site.scaled(1.0 / UNITS_PER_M),
+            charge=Charge((side / 8.0, side / 8.0), 100.0),
+            balls=balls,
+            structures=(far,),
+            parameters=parameters,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FrontTrace:
+    """What a front did.
+
+    Attributes:
+        time_s: Times (n,).
+        radius: Where the air is densest, spacings (n,).
+        law: What the law says, spacings (n,).
+        compression: Density there over that of the air before (n,).
+    """
+
+    time_s: FloatArray
+    radius: FloatArray
+    law: FloatArray
+    compression: FloatArray
+
+    @property
+    def exponent(self) -> float:
+        """Of the power of the time that fits the radii best."""
+        return float(np.polyfit(np.log(self.time_s), np.log(self.radius), 1)[0])
+
+    @property
+    def ratio(self) -> float:
+        """Geometric mean of simulated over predicted radii."""
+        return float(np.exp(np.log(self.radius / self.law).mean()))
+
+
+def elastic_front(case: FrontCase, radii_spacings: Sequence[float], seed: int) -> FrontTrace:
+    """Run an elastic case; look where the front is when the law says it is at certain radii.
+
+    Args:
+        case: The case; its restitution is 1.
+        radii_spacings: Radii by the law for a gas, spacings.
+        seed: Draws the air.
+    """
+    law = np.asarray(radii_spacings, dtype=np.float64)
+    time_s = (law * SPACING_UNITS) ** 2 * (SEDOV_GAS * AIR_DENSITY / case.energy) ** 0.5
+    run = EventEngine().start(case.scene(seed))
+    peaks = []
+    for end_s in time_s.tolist():
+        run.advance(end_s)
+        peaks.append(density_peak(run.balls(), run.scene))
+    radius, compression = np.array(peaks).T
+    return FrontTrace(time_s, radius, law, compression)
+
+
+def inelastic_front(case: FrontCase, radii_spacings: Sequence[float], seed: int) -> FrontTrace:
+    """Run an inelastic case; `law` is with the radial momentum that there is at each time.
+
+    That is not quite the charge's: as long as the swept air is hot, its pressure adds to it.
+    """
+    momentum = case.ball_count * case.speed_units_per_s
+    volume = (np.asarray(radii_spacings) * SPACING_UNITS) ** 3 * pi * AIR_DENSITY / 3.0
+    time_s: FloatArray = volume / momentum
+    run = EventEngine().start(case.scene(seed))
+    peaks, law = [], []
+    for end_s in time_s.tolist():
+        run.advance(end_s)
+        balls = run.balls()
+        peaks.append(density_peak(balls, run.scene))
+        momentum = radial_momentum(balls, run.scene)
+        law.append((3.0 * momentum * end_s / (pi * AIR_DENSITY)) ** (1.0 / 3.0) / SPACING_UNITS)
+    radius, compression = np.array(peaks).T
+    return FrontTrace(time_s, radius, np.array(law), compression)
+
+
+def density_peak(balls: BallStates, scene: Scene) -> tuple[float, float]:
+    """Return where the mass per area is highest, spacings, and how high above the air's."""
+    distance = np.hypot(*(balls.position - scene.charge_centre).T) / SPACING_UNITS
+    outermost = 0.5 * (scene.site.right - scene.site.left) / SPACING_UNITS
+    edges = np.exp(np.arange(np.log(_INNERMOST_SPACINGS), np.log(outermost), _BIN))
+    mass, _ = np.histogram(distance, edges, weights=balls.mass)
+    density = gaussian_filter1d(mass / (pi * np.diff(edges**2)), _SMOOTHING / _BIN)
+    place = int(density.argmax())
+    return float((edges[place] * edges[place + 1]) ** 0.5), float(density[place])
+
+
+def radial_momentum(balls: BallStates, scene: Scene) -> float:
+    """Return the sum of the momenta outwards."""
+    from_centre = balls.position - scene.charge_centre
+    outwards = (balls.velocity * from_centre).sum(axis=1) / np.hypot(*from_centre.T)
+    return float((balls.mass * outwards).sum())

@@ -1,0 +1,159 @@
+"""The free-field study: resumable, parallel, summed up with intervals."""
+
+import json
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from blast_env.fitting import free_field as study_module
+from scipy import stats
+
+from blast_env import load_scenario, simulate
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.free_field import (
+    FreeFieldRun,
+    FreeFieldStudy,
+    impulse_by_seed,
+    summarise,
+)
+from blast_env.journal import Journal
+
+SMALL = load_scenario("free_field").with_simulation(
+    overrides={"explosive": {"ball_count": 120}, "stepping": {"time_limit_s": 0.1}}
+)
+STUDY = FreeFieldStudy(SMALL, (8.0, 12.0), (5, 6, 7))
+
+
+@pytest.fixture(scope="module")
+def runs() -> pd.DataFrame:
+    """What the study finds; not to be changed."""
+    return STUDY.run()
+
+
+def test_every_run_is_the_blast_of_its_distance_and_seed(runs: pd.DataFrame) -> None:
+    assert runs[["distance_m", "seed"]].to_numpy().tolist() == [
+        [d, s] for d in (8.0, 12.0) for s in (5, 6, 7)
+    ]
+    expected = simulate(SMALL.at_stand_off(12.0), seed=6)
+    (row,) = runs[(runs.distance_m == 12.0) & (runs.seed == 6)].itertuples()
+    assert row.impulse_sim == expected.impulse_sim("building")
+    assert row.transferred_impulse_sim == expected.obstacle("building").transferred_impulse
+    assert row.first_hit_s == expected.collisions.time_s.min()
+
+
+def test_two_processes_give_the_same_table(runs: pd.DataFrame) -> None:
+    pd.testing.assert_frame_equal(STUDY.run(processes=2), runs, check_exact=True)
+
+
+def test_an_interrupted_study_goes_on_without_repeating(
+    runs: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, run_one = tmp_path / "runs.jsonl", study_module._run_one
+    ran: list[tuple[float, int]] = []
+
+    def counted(job: tuple) -> object:
+        _, _, distance_m, seed, _ = job
+        if len(ran) == 4:
+            raise KeyboardInterrupt
+        ran.append((distance_m, seed))
+        return run_one(job)
+
+    monkeypatch.setattr(study_module, "_run_one", counted)
+    with pytest.raises(KeyboardInterrupt):
+        STUDY.run(store=store)
+    assert len(Journal(store, FreeFieldRun).read()) == 4
+    with store.open("a") as file:
+        file.write('{"key": "cut sho')  # what a killed process leaves
+    first, ran[:] = list(ran), []
+    pd.testing.assert_frame_equal(STUDY.run(store=store), runs, check_exact=True)
+    assert len(ran) == 2
+    assert not set(ran) & set(first)
+    ran.clear()
+    shares: list[float] = []
+    STUDY.run(store=store, progress=shares.append)
+    assert ran == []
+
+
+def test_runs_of_other_parameters_are_not_believed(tmp_path: Path) -> None:
+    store = tmp_path / "runs.jsonl"
+    FreeFieldStudy(SMALL, (8.0,), (5,)).run(store=store)
+    heavier = SMALL.with_simulation(overrides={"air": {"mass": 0.5}})
+    other = FreeFieldStudy(heavier, (8.0,), (5,)).run(store=store)
+    assert len(Journal(store, FreeFieldRun).read()) == 2
+    expected = simulate(heavier.at_stand_off(8.0), seed=5).impulse_sim("building")
+    assert other.impulse_sim.tolist() == [expected]
+
+
+def test_the_summary_has_means_and_student_intervals(runs: pd.DataFrame) -> None:
+    table = summarise(runs)
+    values = runs[runs.distance_m == 8.0].impulse_sim.to_numpy()
+    assert table.i_sim[0] == pytest.approx(values.mean())
+    low, high = stats.t.interval(0.95, 2, values.mean(), stats.sem(values))
+    assert table.ci95[0] == pytest.approx((high - low) / 2)
+    assert table.seeds.tolist() == [3, 3]
+    assert impulse_by_seed(runs).mean(axis=0) == pytest.approx(table.i_sim.to_numpy())
+
+
+@pytest.mark.parametrize(
+    ("distances", "seeds", "words"),
+    [
+        ((8.0, 8.0), (1,), "8 m follows 8 m"),
+        ((12.0, 8.0), (1,), "8 m follows 12 m"),
+        ((), (1,), "distances"),
+        ((8.0,), (), "seeds"),
+        ((8.0,), (1, 1), "seeds"),
+    ],
+)
+def test_bad_studies_are_refused(
+    distances: tuple[float, ...], seeds: tuple[int, ...], words: str
+) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        FreeFieldStudy(SMALL, distances, seeds)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"impulse_sim": -1.0}, "impulse_sim is -1.0: .* greater than or equal to 0"),
+        ({"impulse_sim": "much"}, "impulse_sim is 'much': .* number"),
+        ({"first_hit_s": 10**5000}, "1000.* has 5001 digits"),
+        ({"seed": 1.5}, "seed is 1.5: .* integer"),
+        ({"more": 1}, "more is 1: "),
+        ({"distance_m": [[[[1.0]]]]}, "distance_m is an array: .* number"),
+    ],
+)
+def test_a_run_that_is_none_is_refused_with_its_key_and_bound(
+    changed: dict, words: str, tmp_path: Path
+) -> None:
+    run = asdict(FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
+    sys.set_int_max_str_digits(10_000)
+    line = json.dumps(run | changed)
+    sys.set_int_max_str_digits(4300)
+    (tmp_path / "runs.jsonl").write_text(f"{line}\n")
+    with pytest.raises(BlastEnvError, match=f"runs.jsonl: line 1: {words}"):
+        Journal(tmp_path / "runs.jsonl", FreeFieldRun).read()
+
+
+def test_a_run_with_the_key_of_another_is_refused(tmp_path: Path) -> None:
+    """Its distance would stand in the table beside the impulse of another."""
+    study = FreeFieldStudy(SMALL, (8.0,), (5,))
+    study.run(store=tmp_path / "runs.jsonl")
+    text = (tmp_path / "runs.jsonl").read_text()
+    (tmp_path / "runs.jsonl").write_text(text.replace('"distance_m": 8.0', '"distance_m": 9.0'))
+    with pytest.raises(BlastEnvError, match=r"9 m with seed 5 has the key of one at 8 m"):
+        study.run(store=tmp_path / "runs.jsonl")
+
+
+def test_a_store_that_is_none_is_refused_with_its_line(tmp_path: Path) -> None:
+    store = tmp_path / "runs.jsonl"
+    Journal(store, FreeFieldRun).add(FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
+    with store.open("a") as file:
+        file.write("nonsense\n")
+    with pytest.raises(BlastEnvError, match=r"runs.jsonl: line 2: is not JSON"):
+        Journal(store, FreeFieldRun).read()
+    store.write_bytes(b"\xff\xfe\n")
+    with pytest.raises(BlastEnvError, match=r"line 1: is not UTF-8 text"):
+        Journal(store, FreeFieldRun).read()
+    assert Journal(tmp_path / "none.jsonl", FreeFieldRun).read() == []

@@ -1,0 +1,291 @@
+import tempfile
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import pandas as pd
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import BlastResult, simulate
+from blast_env.particles.tables import (
+    COLLISION_COLUMNS,
+    MODULE_COLUMNS,
+    STRUCTURE_COLUMNS,
+    RunRecord,
+)
+from blast_env.particles.workbook import (
+    EXCEL_ROWS,
+    MOST_PRINTED_ROWS,
+    SheetTable,
+    record_cells,
+    write_tables,
+    write_workbook,
+)
+from blast_env.tables import Column
+from tests.design.search_cases import small_scenario
+from tests.particles.recording import workbooks
+from tests.particles.recording.conftest import SEED
+
+TABLES = (
+    ("Structures", "structures"),
+    ("Modules", "modules"),
+    ("Collisions", "collisions"),
+)
+
+
+@pytest.fixture(scope="module")
+def workbook(blast: BlastResult, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    path = tmp_path_factory.mktemp("workbook") / "blast.xlsx"
+    assert blast.to_excel(path) == path
+    return workbooks.load(path)
+
+
+def run_record(sheet: Any) -> dict[str, Any]:
+    return dict(workbooks.rows(sheet)[1:])
+
+
+def test_sheets(workbook: Any) -> None:
+    names = ["Run", "Structures", "Modules", "Collisions", "Columns"]
+    assert workbook.sheetnames == names
+
+
+@pytest.mark.parametrize(("sheet", "attribute"), TABLES)
+def test_a_sheet_has_the_values_of_its_table(
+    workbook: Any, blast: BlastResult, sheet: str, attribute: str
+) -> None:
+    written = workbooks.rows(workbook[sheet])[1:]
+    assert written == workbooks.expected(getattr(blast, attribute))
+
+
+def test_headings_have_units(workbook: Any) -> None:
+    assert workbooks.rows(workbook["Structures"])[0] == [
+        "structure",
+        "kind",
+        "protected",
+        "weight",
+        "modules",
+        "hits",
+        "impulse, m|v| (sim)",
+        "transferred impulse (sim)",
+        "first hit (s)",
+        "modules destroyed",
+    ]
+    collisions = workbooks.rows(workbook["Collisions"])[0]
+    for heading in ("time (s)", "vx (sim units/s)", "mass (sim mass)", "angle (deg)"):
+        assert heading in collisions
+
+
+@pytest.mark.parametrize(
+    ("sheet", "columns"),
+    [
+        ("Structures", STRUCTURE_COLUMNS),
+        ("Modules", MODULE_COLUMNS),
+        ("Collisions", COLLISION_COLUMNS),
+    ],
+)
+def test_every_column_is_explained_in_a_note_and_on_a_sheet(
+    workbook: Any, sheet: str, columns: Any
+) -> None:
+    meanings = [column.meaning for column in columns]
+    assert [cell.comment.text for cell in workbook[sheet][1]] == meanings
+    explained = [row for row in workbooks.rows(workbook["Columns"]) if row[0] == sheet]
+    assert [row[1] for row in explained] == workbooks.rows(workbook[sheet])[0]
+    assert [row[3] for row in explained] == meanings
+
+
+def test_the_collisions_add_up_to_the_impulse_on_each_structure(
+    workbook: Any, blast: BlastResult
+) -> None:
+    heading, *rows = workbooks.rows(workbook["Collisions"])
+    structure, impulse = heading.index("structure"), heading.index("impulse, m|v| (sim)")
+    for name in blast.structures["structure"]:
+        total = sum(row[impulse] for row in rows if row[structure] == name)
+        assert total == pytest.approx(blast.impulse_sim(name), rel=1e-12)
+
+
+def test_the_run_sheet_has_the_run_record(workbook: Any, blast: BlastResult) -> None:
+    written, record = run_record(workbook["Run"]), blast.run_record
+    assert list(written) == list(record)
+    for name in ("scenario", "layout (row, column)", "digest", "engine version", "steps"):
+        assert written[name] == record[name]
+    assert written["parameter explosive.ball_count"] == 480
+    assert written["parameter explosive.collide_within_charge"] == "no"
+
+
+def test_a_seed_that_excel_would_round_is_kept_as_text(workbook: Any) -> None:
+    assert run_record(workbook["Run"])["seed"] == str(SEED)
+
+
+def test_headings_are_frozen_and_tables_have_filters(workbook: Any) -> None:
+    for sheet in workbook:
+        assert sheet.freeze_panes == "A2"
+        if sheet.title != "Run":
+            assert sheet.auto_filter.ref == sheet.dimensions
+
+
+def test_numbers_have_the_format_of_their_unit(workbook: Any) -> None:
+    headings, first = workbook["Collisions"]["1:2"]
+    formats = {
+        heading.value: cell.number_format for heading, cell in zip(headings, first, strict=True)
+    }
+    assert formats["time (s)"] == "0.000000"
+    assert formats["impulse, m|v| (sim)"] == "#,##0.00"
+    assert formats["particle id"] == "0"
+
+
+def test_no_number_is_wider_than_its_column(workbook: Any) -> None:
+    for sheet in (workbook["Structures"], workbook["Modules"], workbook["Collisions"]):
+        for column in sheet.iter_cols(min_row=2):
+            numbers = [cell for cell in column if isinstance(cell.value, int | float)]
+            shown = [len(f"{cell.value:,.{_decimals(cell)}f}") for cell in numbers]
+            if shown:
+                assert max(shown) < sheet.column_dimensions[numbers[0].column_letter].width
+
+
+def _decimals(cell: Any) -> int:
+    return len(cell.number_format.partition(".")[2])
+
+
+def test_a_blast_without_a_hit_has_empty_tables(quiet_blast: BlastResult, tmp_path: Path) -> None:
+    workbook = workbooks.load(quiet_blast.to_excel(tmp_path / "quiet.xlsx"))
+    assert workbook["Collisions"].max_row == 1
+    assert workbook["Modules"].max_row == 1 + len(quiet_blast.modules)
+
+
+@pytest.mark.parametrize("sheets", [1, 2, 3])
+def test_a_long_table_goes_on_in_further_sheets(
+    blast: BlastResult, tmp_path: Path, sheets: int
+) -> None:
+    per_sheet = -(-len(blast.collisions) // sheets)
+    path = write_workbook(blast, tmp_path / "long.xlsx", max_rows_per_sheet=per_sheet + 1)
+    workbook = workbooks.load(path)
+    names = ["Collisions", "Collisions 2", "Collisions 3"][:sheets]
+    assert [name for name in workbook.sheetnames if "Collisions" in name] == names
+    parts = [workbooks.rows(workbook[name]) for name in names]
+    assert all(part[0] == parts[0][0] for part in parts)
+    assert max(len(part) for part in parts) == per_sheet + 1
+    times = [row[0] for part in parts for row in part[1:]]
+    assert times == pytest.approx(blast.collisions["time_s"].tolist(), rel=1e-15)
+
+
+def test_a_long_layout_is_not_cut(blast: BlastResult) -> None:
+    layout = " ".join(f"{row},{column}" for row in range(100) for column in range(100))
+    lines = record_cells(layout)
+    assert max(len(str(line)) for line in lines) < 32_767  # what a cell can hold
+    assert " ".join(map(str, lines)) == layout
+
+
+def test_the_same_result_gives_the_same_bytes(blast: BlastResult, tmp_path: Path) -> None:
+    first, second = (blast.to_excel(tmp_path / f"{name}.xlsx") for name in "ab")
+    assert first.read_bytes() == second.read_bytes()
+    with ZipFile(first) as archive:
+        assert {entry.date_time[0] for entry in archive.infolist()} == {1980}
+        assert b"2000-01-01T00:00:00Z" in archive.read("docProps/core.xml")
+
+
+@pytest.mark.parametrize("name", ["blast.xls", "blast", "blast.parquet"])
+def test_another_suffix_is_refused_by_name(blast: BlastResult, tmp_path: Path, name: str) -> None:
+    with pytest.raises(BlastEnvError, match=rf"suffix {Path(name).suffix!r}, must have '\.xlsx'"):
+        write_workbook(blast, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("limit", [1, EXCEL_ROWS + 1])
+def test_a_limit_that_excel_cannot_have_is_refused(
+    blast: BlastResult, tmp_path: Path, limit: int
+) -> None:
+    with pytest.raises(ValueError, match=f"is {limit}, must be between 2 and {EXCEL_ROWS}"):
+        write_workbook(blast, tmp_path / "blast.xlsx", limit)
+
+
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        (OSError(28, "No space left on device"), BlastEnvError),
+        (RuntimeError("a bug"), RuntimeError),
+        (KeyboardInterrupt(), KeyboardInterrupt),
+    ],
+)
+@pytest.mark.parametrize(
+    "step", ["blast_env.particles.workbook._explanations", "xlsxwriter.workbook.Packager"]
+)
+def test_a_failure_in_the_middle_leaves_nothing_behind(
+    blast: BlastResult,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    raised: type[BaseException],
+    step: str,
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    target = tmp_path / "target" / "blast.xlsx"
+    scratch = tmp_path / "scratch"
+    target.parent.mkdir()
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    monkeypatch.setattr(step, fail)
+    with pytest.raises(raised):
+        write_workbook(blast, target)
+    assert not list(target.parent.iterdir())
+    assert not list(scratch.iterdir())
+    target.write_bytes(b"old")
+    with pytest.raises(raised):
+        write_workbook(blast, target)
+    assert target.read_bytes() == b"old"
+    assert list(target.parent.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("folder", ["nowhere", "file"])
+def test_a_folder_that_cannot_be_written_to_is_named(
+    blast: BlastResult, tmp_path: Path, folder: str
+) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(BlastEnvError, match=folder):
+        write_workbook(blast, tmp_path / folder / "blast.xlsx")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder closed even to root")
+def test_a_folder_closed_to_everybody(blast: BlastResult) -> None:
+    with pytest.raises(BlastEnvError, match=r"/proc/blast\.xlsx: cannot be written"):
+        write_workbook(blast, Path("/proc/blast.xlsx"))
+
+
+def test_a_long_table_prints_on_few_pages(tmp_path: Path) -> None:
+    """Thousands of collisions would be hundreds of pages; the sheet has them all the same."""
+    table = pd.DataFrame({"number": range(3000)})
+    record: RunRecord = {"scenario": "a", "engine": "b", "blast-env version": "c"}
+    columns = (Column("number", "", "a number"),)
+    path = write_tables(record, [SheetTable("Long", table, columns)], tmp_path / "a.xlsx")
+    with ZipFile(path) as file:
+        names = file.read("xl/workbook.xml").decode()
+        sheet = file.read("xl/worksheets/sheet2.xml").decode()
+    assert f"Long!$A$1:$A${MOST_PRINTED_ROWS + 1}" in names
+    assert "Long!$1:$1" in names  # the headings come again on every page
+    assert 'orientation="landscape"' in sheet
+    assert 'fitToHeight="0"' in sheet
+    assert sheet.count("<row ") == 3001
+    assert "of 3,000 rows" in sheet
+
+
+@pytest.fixture(scope="module")
+def calibrated() -> BlastResult:
+    """A charge that stands nearer than the calibration was made for."""
+    return simulate(small_scenario(), seed=0, engine="event")
+
+
+def test_a_calibrated_blast_has_pa_s_beside_simulation_units(
+    calibrated: BlastResult, tmp_path: Path
+) -> None:
+    workbook = workbooks.load(calibrated.to_excel(tmp_path / "blast.xlsx"))
+    structures = workbooks.table(workbook["Structures"])
+    building = next(row for row in structures if row["structure"] == "building")
+    scaled = calibrated.impulse("building")
+    assert building["impulse (Pa s)"] == pytest.approx(scaled.pa_s)
+    assert building["calibration in range"] == ("; ".join(scaled.notes) or "yes")
+    unit = calibrated.load_unit
+    for row in workbooks.table(workbook["Modules"]):
+        assert row["impulse (Pa s)"] == pytest.approx(unit.factor * row["impulse, m|v| (sim)"])

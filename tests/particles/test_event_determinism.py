@@ -1,0 +1,217 @@
+"""A run is the same to the last bit: in any process or thread, with any cells, in any slices."""
+
+import multiprocessing
+import pickle
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import cache, partial
+from hashlib import sha256
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from blast_env import load_scenario, simulate
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import ParticleEngine
+from blast_env.evaluation.engines.particles import EventEngine
+from blast_env.geometry import Rectangle
+from blast_env.particles.run import BlastRun
+from blast_env.site.balls import Balls, air_lattice, explosion_fan
+from blast_env.site.scene import Scene
+from tests.particles.scenes import AIR, EVENT, EXPLOSIVE, balls, finished, parameters, scene, wall
+
+LAYOUT = ((4, 0), (5, 0), (6, 1))
+CELLS = (None, 2.0, 2.7, 3.3, 7.0, 1000.0)
+
+
+@cache
+def blast(kind: str) -> Scene:
+    """Return a blast in front of modules that break.
+
+    - `random`: air as it is by default, only denser;
+    - `touching`: a bare lattice of balls that all touch, so that much happens at the same time, and
+      cells of the size of a ball are filled exactly;
+    - `friction`: balls that spin, with different masses.
+    """
+    of_air: dict[str, object] = {"mass": 0.2, "elasticity": 0.97, "spacing_units": 3.4}
+    of_charge: dict[str, object] = {"ball_count": 180, "elasticity": 0.97}
+    contact: dict[str, object] = {}
+    if kind == "touching":
+        of_air |= {"jitter": 0.0, "lattice_offset": "centred", "spacing_units": 2.0}
+        of_charge |= {"fan_phase": "fixed"}
+    elif kind == "friction":
+        of_air |= {"friction": 0.6}
+        of_charge |= {"friction": 0.4}
+        contact |= {"module_friction": 0.5, "base_impulse": 1.0}
+    stepping: dict[str, object] = {"time_limit_s": 0.03}
+    settings = parameters(air=of_air, explosive=of_charge, contact=contact, stepping=stepping)
+    rng = np.random.default_rng(11)
+    facade, site = wall((46.0, 10.0), 20, 2, capacity=2000.0), Rectangle(0.0, 0.0, 64.0, 60.0)
+    air = air_lattice(settings.air, site, [facade.build().rectangle], (30.0, 30.0), 2.0, rng)
+    fan = explosion_fan(settings.explosive, (30.0, 30.0), rng)
+    return replace(
+        scene(Balls.concatenate((air, fan)), [facade], settings), site_m=site.scaled(0.25)
+    )
+
+
+@cache
+def break_shot() -> Scene:
+    """Return a triangle of balls in touch that is hit in its axis, in front of a wall.
+
+    Left and right of the axis the first balls meet theirs at exactly the same time.
+    """
+    rows = [
+        (100.0 + sqrt(3.0) * row, 100.0 - row + 2.0 * i) for row in range(9) for i in range(row + 1)
+    ]
+    velocities = [(500.0, 0.0)] + [(0.0, 0.0)] * len(rows)
+    rack = balls([AIR] * (len(rows) + 1), [(80.0, 100.0), *rows], velocities)
+    contact: dict[str, object] = {"module_restitution": 0.9}
+    stepping: dict[str, object] = {"time_limit_s": 0.3}
+    settings = parameters(air={"elasticity": 0.99}, contact=contact, stepping=stepping)
+    return scene(rack, [wall((118.0, 70.0), 30, 1, capacity=400.0)], settings)
+
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "random": partial(blast, "random"),
+    "touching": partial(blast, "touching"),
+    "friction": partial(blast, "friction"),
+    "break shot": break_shot,
+}
+
+
+def digest_of(run: BlastRun) -> str:
+    """Return a digest of all that can be seen of a run."""
+    state = sha256(run.log.to_array().tobytes())
+    left = run.balls()
+    for array in (left.index, left.position, left.velocity, left.mass, left.radius):
+        state.update(np.ascontiguousarray(array).tobytes())
+    parts = [part for obstacle in run.obstacles for part in obstacle.parts]
+    seen = [(p.hits, p.impulse, p.transferred_impulse, p.first_hit_s, p.destroyed) for p in parts]
+    state.update(repr((seen, run.time_s, run.steps, run.end_reason)).encode())
+    return state.hexdigest()
+
+
+def digest(kind: str, engine: ParticleEngine = EVENT) -> str:
+    return digest_of(finished(SCENES[kind](), engine))
+
+
+def test_the_scenes_are_what_they_are_meant_to_be() -> None:
+    """Modules break in all of them."""
+    for kind, build in SCENES.items():
+        run = finished(build())
+        assert run.steps > 200, kind
+        assert any(part.destroyed for part in run.obstacles[0].parts), kind
+
+
+def test_the_break_shot_has_ties() -> None:
+    """Only the numbers of the balls decide between them: other numbers, another outcome."""
+    shot = break_shot()
+    of_balls = shot.balls
+    renumbered = Balls(
+        of_balls.kind,
+        of_balls.position[::-1],
+        of_balls.velocity[::-1],
+        of_balls.mass,
+        of_balls.radius,
+    )
+    ends = []
+    for start in (shot, replace(shot, balls=renumbered)):
+        run = EVENT.start(start)
+        run.advance(0.05)
+        ends.append(np.sort(run.balls().position[:, 1]))
+    assert np.abs(ends[0] - ends[1]).max() > 0.1
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_cells_of_any_size_give_the_same_run(kind: str) -> None:
+    digests = {digest(kind, EventEngine(cell_units=cell)) for cell in CELLS}
+    assert len(digests) == 1
+
+
+@pytest.mark.parametrize("kind", SCENES)
+@pytest.mark.parametrize("slice_s", [3e-5, 7e-4, 0.011])
+def test_cutting_a_run_into_slices_does_not_change_it(kind: str, slice_s: float) -> None:
+    """A slice may also end in the middle of what happens after a module broke."""
+    run = EVENT.start(SCENES[kind]())
+    end_s = 0.0
+    while run.end_reason is None:
+        end_s += slice_s
+        run.advance(end_s)
+        run.balls()
+    assert digest_of(run) == digest(kind)
+
+
+def test_more_collisions_than_one_batch_of_records_holds() -> None:
+    """The record is read in batches of some thousand: none is lost or doubled."""
+    one = balls([EXPLOSIVE], [(101.5, 50.0)], [(1000.0, 0.3)], radius=0.01)
+    box = (wall((100.0, 30.0), 40, 1), wall((102.05, 30.0), 40, 1, "right"))
+    settings = parameters(
+        contact={"module_restitution": 1.0, "module_shrink": 1.0, "minimum_radius_units": 0.001},
+        stepping={"time_limit_s": 1.0},
+    )
+    hits = finished(scene(one, box, settings)).log.to_array()
+    assert len(hits) > 10_000
+    assert hits["earlier_collisions"].tolist() == list(range(len(hits)))
+    assert np.diff(hits["time_s"])[1:] == pytest.approx(0.03 / 1000.0, rel=1e-6)
+
+
+def test_four_threads_at_once_give_what_one_gives() -> None:
+    kinds = [*SCENES] * 2
+    with ThreadPoolExecutor(4) as threads:
+        together = list(threads.map(digest, kinds))
+    assert together == [digest(kind) for kind in kinds]
+
+
+def simulated_digest(seed: int) -> str:
+    return simulate(load_scenario("courtyard"), LAYOUT, seed=seed, engine="event").digest
+
+
+def test_a_spawned_process_gives_the_same_digests() -> None:
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(simulated_digest, (7,)) == simulated_digest(7)
+        assert pool.apply(digest, ("random",)) == digest("random")
+
+
+def test_one_seed_gives_one_digest_and_another_seed_another() -> None:
+    assert simulated_digest(7) == simulated_digest(7) != simulated_digest(8)
+
+
+def test_a_run_does_not_depend_on_the_runs_before_it() -> None:
+    first = digest("friction")
+    digest("touching")
+    assert digest("friction") == first
+
+
+def test_the_engine_survives_pickling() -> None:
+    """With its settings: it travels to other processes with a blast."""
+    engine = EventEngine(cell_units=7.0)
+    copy = pickle.loads(pickle.dumps(engine))
+    assert copy == engine
+    assert digest("random", copy) == digest("random", engine)
+
+
+def test_a_scene_is_not_changed_by_running_it() -> None:
+    of_scene = blast("random")
+    before = [
+        of_scene.balls.position.copy(),
+        of_scene.balls.velocity.copy(),
+        of_scene.balls.mass.copy(),
+    ]
+    finished(of_scene)
+    after = [of_scene.balls.position, of_scene.balls.velocity, of_scene.balls.mass]
+    assert all((one == other).all() for one, other in zip(before, after, strict=True))
+
+
+@pytest.mark.parametrize("cell_units", [1.999, 0.0, -3.0, np.nan, np.inf])
+def test_cells_that_cannot_hold_a_ball_are_refused(cell_units: float) -> None:
+    """They would make the engine overlook collisions."""
+    with pytest.raises(BlastEnvError, match="must be at least 2, the diameter of the largest ball"):
+        EventEngine(cell_units=cell_units).start(blast("random"))
+
+
+def test_balls_off_the_site_are_refused() -> None:
+    off = scene(balls([AIR, AIR], [(5.0, 5.0), (201.0, 5.0)], [(1.0, 0.0)] * 2), [], parameters())
+    with pytest.raises(BlastEnvError, match=r"ball 1 is at \(201.0, 5.0\)"):
+        EVENT.start(off)

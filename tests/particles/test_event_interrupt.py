@@ -1,0 +1,92 @@
+"""Ctrl-C is heard while compiled code runs, and costs nothing of what a run comes to."""
+
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from blast_env.evaluation.engines import Blast
+from blast_env.evaluation.engines.particles import EventEngine
+from blast_env.particles.event import engine as event_engine
+from blast_env.particles.event.engine import EventRun
+from blast_env.site import Scenario
+from blast_env.site.scene import Scene
+
+
+def touching_air() -> Scene:
+    """Return air whose balls touch each other: a hundred thousand events in one moment."""
+    document = {
+        "schema_version": 2,
+        "name": "touching_air",
+        "site": {"width_m": 20.0, "height_m": 20.0},
+        "charge": [{"kind": "point", "position_m": (5.0, 5.0), "tnt_kg": 100.0}],
+        "structures": [
+            {
+                "kind": "ConcreteSquare",
+                "name": "house",
+                "corner_m": (8.0, 4.0),
+                "side_modules": 4,
+                "protected": True,
+            }
+        ],
+        "simulation": {
+            "preset": "ballistic",
+            "overrides": {
+                "air": {
+                    "spacing_units": 2.0,
+                    "radius_units": 1.0,
+                    "elasticity": 1.0,
+                    "jitter": 0.0,
+                }
+            },
+        },
+    }
+    return Blast(Scenario.from_document(document, "touching_air"), (), 0, "event").scene
+
+
+def outcome(run: EventRun) -> tuple[float, int, bytes, bytes]:
+    run.advance(np.inf)
+    return run.time_s, run.steps, run.log.to_array().tobytes(), run.balls().position.tobytes()
+
+
+def calls_of(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return a list that grows with every return of the compiled code, by its answer."""
+    answers: list[int] = []
+    compiled = event_engine._RUN
+
+    def run(*arguments: object) -> int:
+        answers.append(int(compiled(*arguments)))
+        return answers[-1]
+
+    run.signatures = [()]  # type: ignore[attr-defined]
+    monkeypatch.setattr(event_engine, "_RUN", run)
+    return answers
+
+
+def test_the_compiled_loop_comes_back_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It took 40 s and more to hear a signal. Ten thousand events take a tenth of a second."""
+    EventEngine().start(touching_air()).advance(1e-6)  # compiled by now
+    answers = calls_of(monkeypatch)
+    run = EventEngine().start(touching_air())
+    run.advance(np.inf)
+    events = run.steps + run.crossings + run.outdated
+    assert answers.count(event_engine.PAUSED) >= events // 10_000 > 3
+
+
+def test_an_interrupted_run_goes_on_to_the_same_end() -> None:
+    whole = outcome(EventEngine().start(touching_air()))
+    run = EventEngine().start(touching_air())
+    run.advance(1e-6)
+    # An alarm of the system: a thread might wait for the processor until the run has ended.
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    began_s = time.perf_counter()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.02)
+        with pytest.raises(KeyboardInterrupt):
+            run.advance(np.inf)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.perf_counter() - began_s < 2.0
+    assert outcome(run) == whole

@@ -1,0 +1,272 @@
+"""Whole runs, in every engine: the fan, tunnelling, symmetry, the end, the guard of the step."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine
+from blast_env.evaluation.engines.particles import PymunkEngine, find_particle_engine
+from blast_env.geometry import Rectangle
+from blast_env.particles.pymunk.engine import PymunkRun
+from blast_env.particles.run import BlastRun, EndReason
+from blast_env.site.balls import (
+    Balls,
+    CollisionType,
+    air_lattice,
+    explosion_fan,
+    lattice_capacity,
+)
+from blast_env.site.scene import Scene
+from tests.particles.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
+
+
+def step_s(run: BlastRun) -> float:
+    """Return how far behind an event the engine may notice it."""
+    return run.time_step_s if isinstance(run, PymunkRun) else 1e-12
+
+
+def fan_scene(distance: float, count: int = 720, facade: float = 20.0) -> Scene:
+    """A charge without air in front of a facade, far from its other sides."""
+    of_parameters = parameters(explosive={"ball_count": count, "radius_units": 0.05})
+    fan = explosion_fan(of_parameters.explosive, (50.0, 100.0), np.random.default_rng(0))
+    structure = wall((50.0 + distance, 100.0 - facade / 2), round(facade / 2), 1)
+    return scene(fan, [structure], of_parameters, size=(60.0 + distance, 200.0))
+
+
+@pytest.mark.parametrize("distance", [20.0, 40.0, 80.0])
+def test_hits_without_air_equal_the_view_factor(engine: ParticleEngine, distance: float) -> None:
+    """The share of the fan that the facade covers, as seen from the charge."""
+    count, facade, radius = 720, 20.0, 0.05
+    angle = 2.0 * np.arctan((facade / 2 + radius) / distance)
+    expected = count * angle / (2.0 * np.pi)
+    assert abs(len(finished(fan_scene(distance), engine).log) - expected) <= 1.0
+
+
+@pytest.mark.slow
+def test_a_facade_twice_as_far_gets_half_the_balls(engine: ParticleEngine) -> None:
+    near, far = (len(finished(fan_scene(d, facade=16.0), engine).log) for d in (40.0, 80.0))
+    assert near / far == pytest.approx(2.0, rel=0.08)
+
+
+def test_every_ball_of_the_fan_has_the_same_speed_and_its_own_direction() -> None:
+    of_parameters = parameters().explosive
+    fan = explosion_fan(of_parameters, (0.0, 0.0), np.random.default_rng(1))
+    assert np.hypot(*fan.velocity.T) == pytest.approx(2000.0)
+    angle = np.sort(np.arctan2(*fan.velocity.T[::-1]))
+    assert np.diff(angle) == pytest.approx(2.0 * np.pi / 720)
+    assert np.hypot(*fan.position.T) == pytest.approx(of_parameters.offset_units)
+    assert fan.mass == pytest.approx(of_parameters.mass)
+
+
+def test_air_keeps_clear_of_everything() -> None:
+    air, site = parameters(air={"jitter": 1.0, "spacing_units": 3.0}).air, Rectangle(0, 0, 90, 60)
+    obstacle = Rectangle(40.0, 20.0, 60.0, 40.0)
+    lattice = air_lattice(air, site, [obstacle], (15.0, 30.0), 2.0, np.random.default_rng(0))
+    x, y = lattice.position.T
+    assert ((x > 1.0) & (x < 89.0) & (y > 1.0) & (y < 59.0)).all()
+    assert np.hypot(x - 15.0, y - 30.0).min() > 3.0
+    assert not ((abs(x - 50.0) < 11.0) & (abs(y - 30.0) < 10.0)).any()
+    gaps = np.hypot(*(lattice.position[:, None] - lattice.position[None]).transpose(2, 0, 1))
+    assert gaps[~np.eye(len(lattice), dtype=bool)].min() >= 2.0  # no two overlap
+    assert len(lattice) == pytest.approx((88 * 58 - 22 * 22 - np.pi * 9) / 9.0, rel=0.05)
+
+
+def test_a_bare_centred_lattice_is_the_same_for_every_seed_and_symmetric() -> None:
+    air = parameters(air={"jitter": 0.0, "lattice_offset": "centred", "spacing_units": 8.0}).air
+    site = Rectangle(0.0, 0.0, 100.0, 60.0)
+    one, other = (
+        air_lattice(air, site, [], (0.0, 0.0), 0.0, np.random.default_rng(seed)).position
+        for seed in (0, 1)
+    )
+    assert (one == other).all()
+    assert np.diff(np.unique(one[:, 0])) == pytest.approx(8.0)
+    assert one.mean(axis=0) == pytest.approx([50.0, 30.0])
+
+
+@given(st.integers(0, 2**31), st.floats(2.0, 20.0), st.floats(30.0, 200.0))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, width: float) -> None:
+    air, site = parameters(air={"spacing_units": spacing}).air, Rectangle(0.0, 0.0, width, 50.0)
+    rng = np.random.default_rng(seed)
+    lattice = air_lattice(air, site, [], (-99.0, -99.0), 1.0, rng)
+    assert len(lattice) <= lattice_capacity(air, site)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine_name", CALIBRATED_ENGINES)
+@given(
+    kind=st.sampled_from([EXPLOSIVE, AIR]),
+    speed=st.floats(10.0, 1e6),
+    radius=st.floats(0.1, 5.0),
+    angle=st.floats(-1.2, 1.2),
+    restitution=st.floats(0.0, 1.0),
+    step_radii=st.floats(0.1, 0.5),
+)
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_nothing_tunnels_through_a_module_or_the_border(
+    engine_name: str,
+    kind: CollisionType,
+    speed: float,
+    radius: float,
+    angle: float,
+    restitution: float,
+    step_radii: float,
+) -> None:
+    """One module thick, at any speed, size and angle: the ball stays on its side and inside."""
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    time_s = 110.0 / speed  # the way to the wall is at most 75 units
+    of_scene = scene(
+        balls([kind], [tuple(80.0 - 20.0 * direction)], [tuple(speed * direction)], 1.0, radius),
+        # From border to border, so that the only way to the right is through it.
+        [wall((100.0, 0.0), 100, 1)],
+        parameters(
+            contact={"module_restitution": restitution, "minimum_radius_units": 1e-3},
+            stepping={"step_radii": step_radii, "time_limit_s": time_s},
+        ),
+    )
+    run = find_particle_engine(engine_name).start(of_scene)
+    hit = False
+    for share in np.linspace(0.05, 1.0, 20):
+        run.advance(share * time_s)
+        position = run.balls().position
+        hit = hit or len(run.log) > 0
+        assert (position >= 0.0).all()
+        assert (position <= 200.0).all()
+        assert (position[:, 0] < 100.0).all()
+    assert hit
+
+
+def test_a_ball_far_faster_than_expected_does_not_tunnel() -> None:
+    """A light ball between two heavy ones that close in gets much faster than either."""
+    kinds, mass = [EXPLOSIVE, AIR, EXPLOSIVE], [1e5, 1.0, 1e5]
+    of_scene = scene(
+        balls(
+            kinds,
+            [(60.0, 100.0), (70.0, 100.4), (80.0, 100.0)],
+            [(1000.0, 0.0), (0.0, 0.0), (-1000.0, 0.0)],
+            mass,
+        ),
+        [wall((100.0, 0.0), 100, 1), wall((30.0, 0.0), 100, 1, "other")],
+        parameters(
+            explosive={"elasticity": 1.0, "mass": 1e5},
+            air={"elasticity": 1.0, "mass": 1.0},
+            contact={"module_restitution": 1.0, "air_shrink": 1.0},
+            stepping={"time_limit_s": 0.2},
+        ),
+    )
+    run = PymunkEngine().start(of_scene)
+    first_step_s = shortest_step_s = run.time_step_s
+    fastest = 0.0
+    while run.end_reason is None:
+        run.advance(np.nextafter(run.time_s, np.inf))
+        states, shortest_step_s = run.balls(), min(shortest_step_s, run.time_step_s)
+        fastest = max(fastest, float(np.hypot(*states.velocity.T).max(initial=0.0)))
+        assert ((states.position[:, 0] > 32.0) & (states.position[:, 0] < 100.0)).all()
+    assert fastest > 4500.0  # more than twice the 2000 that the time step was made for
+    assert shortest_step_s < first_step_s
+
+
+def test_changing_the_time_step_gives_lasting_contacts_no_second_push() -> None:
+    """A slow pair overlaps for many steps while a fast ball leaves and the step is doubled."""
+    of_scene = scene(
+        balls(
+            [AIR, AIR, AIR],
+            [(20.0, 100.0), (60.0, 20.0), (62.3, 20.0)],
+            [(-2000.0, 0.0), (20.0, 0.0), (-20.0, 0.0)],
+        ),
+        [wall((100.0, 0.0), 100, 1)],
+        parameters(air={"elasticity": 0.9}),
+    )
+    run = PymunkEngine().start(of_scene)
+    first_step_s = run.time_step_s
+    run.advance(0.2)
+    assert run.time_step_s > 4.0 * first_step_s
+    assert run.balls().index.tolist() == [1, 2]
+    assert run.balls().velocity == pytest.approx(np.array([[-16.2, 0], [16.2, 0]]), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_mirrored_scene_gives_exactly_mirrored_loads(engine: ParticleEngine, seed: int) -> None:
+    """The site is centred on 0, so that mirroring it rounds nothing."""
+    size, rng = (160.0, 100.0), np.random.default_rng(seed)
+    of_parameters = parameters(stepping={"time_limit_s": 0.1})
+    right = wall((32.0, -10.0), 10, 4)
+    site = Rectangle(-80.0, -50.0, 80.0, 50.0)
+    air = air_lattice(of_parameters.air, site, [right.build().rectangle], (0.0, 0.0), 2.0, rng)
+    fan = explosion_fan(of_parameters.explosive, (0.0, 0.0), rng)
+    plain = replace(
+        scene(Balls.concatenate((air, fan)), [right], of_parameters, size), site_m=site.scaled(0.25)
+    )
+    mirrored = replace(
+        plain,
+        balls=replace(
+            plain.balls,
+            position=plain.balls.position * (-1.0, 1.0),
+            velocity=plain.balls.velocity * (-1.0, 1.0),
+        ),
+        structures=(replace(right, corner_m=(-10.0, -2.5)),),
+    )
+    loads = []
+    for of_scene in (plain, mirrored):
+        (obstacle,) = finished(of_scene, engine).obstacles
+        loads.append(np.array([part.impulse for part in obstacle.parts]).reshape(10, 4))
+    assert loads[0].sum() > 0.0
+    assert (loads[0][:, 0] > loads[0][:, -1]).any()  # facade and back differ, so order matters
+    assert (loads[1][:, ::-1] == loads[0]).all()
+
+
+def test_a_run_ends_when_nothing_can_reach_a_structure(engine: ParticleEngine) -> None:
+    of_scene = scene(
+        balls([AIR], [(20.0, 20.0)], [(10.0, 0.0)]),
+        [wall((150.0, 150.0), 2, 2)],
+        parameters(stepping={"time_limit_s": 1.0}),
+    )
+    run = finished(of_scene, engine)
+    assert run.end_reason is EndReason.OUT_OF_REACH
+    assert run.steps == 0
+
+
+def test_a_run_ends_when_all_balls_have_left(engine: ParticleEngine) -> None:
+    of_scene = scene(
+        balls([AIR], [(20.0, 20.0)], [(-200.0, 0.0)]), [wall((30.0, 150.0), 2, 2)], parameters()
+    )
+    run = finished(of_scene, engine)
+    assert run.end_reason is EndReason.OUT_OF_REACH
+    assert len(run.balls()) == 0
+
+
+def test_a_run_ends_at_the_time_limit(engine: ParticleEngine) -> None:
+    limit_s = 0.0123
+    of_scene = scene(
+        balls([AIR], [(26.0, 20.0)], [(200.0, 0.0)]),
+        [wall((30.0, 15.0), 5, 2)],
+        parameters(stepping={"time_limit_s": limit_s}),
+    )
+    run = finished(of_scene, engine)
+    assert run.end_reason is EndReason.TIME_LIMIT
+    assert limit_s <= run.time_s < limit_s + step_s(run)
+
+
+def test_a_ball_that_reaches_the_border_is_removed(engine: ParticleEngine) -> None:
+    of_scene = scene(
+        balls([AIR, AIR], [(20.0, 20.0), (50.0, 50.0)], [(-500.0, 0.0), (1.0, 0.0)]),
+        [wall((54.0, 45.0), 5, 2)],
+        parameters(),
+    )
+    run = engine.start(of_scene)
+    run.advance(19.0 / 500.0 - step_s(run))
+    assert run.balls().index.tolist() == [0, 1]
+    run.advance(19.0 / 500.0 + 2.0 * step_s(run))
+    assert run.balls().index.tolist() == [1]
+
+
+def test_cutting_a_run_into_calls_does_not_change_it(engine: ParticleEngine) -> None:
+    of_scene = fan_scene(40.0, count=200)
+    whole, cut = finished(of_scene, engine), engine.start(of_scene)
+    for end_s in np.arange(0.0, 10.0, 0.0007):
+        cut.advance(float(end_s))
+    assert (cut.log.to_array() == whole.log.to_array()).all()
+    assert (cut.time_s, cut.steps) == (whole.time_s, whole.steps)

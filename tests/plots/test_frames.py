@@ -1,0 +1,201 @@
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import Blast
+from blast_env.geometry import Rectangle
+from blast_env.plots.canvas import Frame
+from blast_env.plots.frames import FramePainter
+from blast_env.plots.plan import BARRIER, BORDER, EXPLOSIVE, PROTECTED
+from blast_env.plots.style import AIR
+from blast_env.site.balls import CollisionType
+from blast_env.site.structure import load_colour
+from blast_env.units import UNITS_PER_M
+from tests.plots.scenes import balls_at_start
+
+
+def pixel_at(painter: FramePainter, frame: Frame, x: float, y: float) -> tuple[int, ...]:
+    across, down = painter.sheet.pixel(x / UNITS_PER_M, y / UNITS_PER_M)
+    return tuple(int(channel) for channel in frame[down, across])
+
+
+def start_frame(painter: FramePainter, blast: Blast) -> Frame:
+    return painter.paint(balls_at_start(blast.scene), blast.scene.obstacles(), 0.0)
+
+
+@pytest.mark.parametrize("width_px", [320, 480, 960, 1921])
+def test_frames_have_the_width_asked_for_and_an_even_height(blast: Blast, width_px: int) -> None:
+    painter = FramePainter(blast, width_px=width_px)
+    frame = start_frame(painter, blast)
+    assert frame.shape == (painter.size_px[1], width_px, 3)
+    assert frame.dtype == np.uint8
+    assert frame.shape[0] % 2 == 0
+    assert frame.flags.writeable
+
+
+@pytest.mark.parametrize("width_px", [319, 4097])
+def test_width_out_of_bounds_is_refused(blast: Blast, width_px: int) -> None:
+    with pytest.raises(BlastEnvError, match=f"width_px is {width_px}, must be 320 to 4096"):
+        FramePainter(blast, width_px=width_px)
+
+
+def test_balls_are_where_they_should_be_in_the_papers_colours(blast: Blast) -> None:
+    run = blast.start()
+    run.advance(0.004)
+    balls = run.balls()
+    painter = FramePainter(blast)
+    frame = painter.paint(balls, run.obstacles, run.time_s)
+    # In a corner where nothing but balls is drawn.
+    in_corner = (balls.position < 32.0).all(axis=1)
+    for kind, colour in ((CollisionType.ExplosionBall, EXPLOSIVE), (CollisionType.AirBall, AIR)):
+        positions = balls.position[in_corner & (balls.kind == kind)]
+        assert len(positions) >= 5
+        for x, y in positions.tolist():
+            # The dark rim of a neighbour may cover a centre.
+            seen = np.array(pixel_at(painter, frame, x, y))
+            assert np.abs(seen / seen.max() - np.array(colour) / max(colour)).max() < 0.1
+
+
+def test_the_size_of_frames_does_not_depend_on_the_loads(blast: Blast) -> None:
+    loads = (1e-3, 0.0888, 7.0, 888.0, 8.88e4, 3e9)
+    painters = [FramePainter(blast, full_impulse=load) for load in loads]
+    assert len({painter.size_px for painter in painters}) == 1
+
+
+def test_small_balls_stay_visible(blast: Blast) -> None:
+    balls = balls_at_start(blast.scene)
+    balls = replace(balls, radius=np.full(len(balls), 0.01))
+    painter = FramePainter(blast, width_px=320)
+    frame = painter.paint(balls, blast.scene.obstacles(), 0.0)
+    x, y = balls.position[0].tolist()
+    assert pixel_at(painter, frame, x, y) == AIR
+
+
+def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
+    sheet = FramePainter(blast).sheet
+    left, low = sheet.pixel(0.0, 0.0)
+    right, high = sheet.pixel(20.0, 20.0)
+    assert high < low
+    assert right - left == pytest.approx(low - high, abs=1)
+    assert right - left == pytest.approx(20.0 * sheet.pixels_per_m, abs=1)
+
+
+def nearest(frame: Frame, colour: tuple[int, int, int], across: int, down: int) -> float:
+    """Return how far the colour is from that of the pixel around here that has it most."""
+    around = frame[down - 2 : down + 3, across - 2 : across + 3].astype(float)
+    return float(np.abs(around - colour).max(axis=2).min())
+
+
+def edge_of(painter: FramePainter, rectangle_m: Rectangle) -> list[tuple[int, int]]:
+    """Return pixels on the four sides of a rectangle."""
+    left, bottom, right, top = rectangle_m
+    x_m, y_m = rectangle_m.centre
+    sides = ((left, y_m), (right, y_m), (x_m, bottom), (x_m, top))
+    return [painter.sheet.pixel(*place) for place in sides]
+
+
+def test_the_border_is_red_all_around(blast: Blast) -> None:
+    painter = FramePainter(blast)
+    frame = start_frame(painter, blast)
+    for place in edge_of(painter, blast.scene.site_m):
+        assert nearest(frame, BORDER, *place) < 60.0
+
+
+def test_a_modules_colour_follows_its_load(blast: Blast) -> None:
+    painter = FramePainter(blast, full_impulse=100.0)
+    obstacles = blast.scene.obstacles()
+    part = obstacles[0].parts[0]
+    seen = []
+    for load in (0.0, 0.1, 50.0, 100.0, 1000.0):
+        part.impulse, part.hits = load, int(load > 0.0)
+        frame = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
+        seen.append(pixel_at(painter, frame, part.x, part.y))
+    shares = (0.0, 0.5, 1.0, 1.0)
+    for colour, share in zip(seen[1:], shares, strict=True):
+        assert colour == pytest.approx(load_colour(share), abs=2)
+    assert seen[0] == (255, 255, 255)  # not hit
+    assert len(set(seen)) == 4
+
+
+def test_protected_structures_and_barrier_modules_have_their_outlines(barrier_blast: Blast) -> None:
+    painter = FramePainter(barrier_blast)
+    frame = start_frame(painter, barrier_blast)
+    shelter, _, barrier = barrier_blast.scene.obstacles()
+    for place in edge_of(painter, shelter.rectangle_m):
+        assert nearest(frame, PROTECTED, *place) < 60.0
+    for part in barrier.parts:
+        for place in edge_of(painter, part.rectangle_m):
+            assert nearest(frame, BARRIER, *place) < 60.0
+
+
+def test_a_destroyed_module_looks_different(blast: Blast) -> None:
+    painter = FramePainter(blast)
+    obstacles = blast.scene.obstacles()
+    part = obstacles[0].parts[0]
+    part.impulse, part.hits = 1.0, 1
+    whole = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
+    part.capacity = 0.5
+    broken = painter.paint(balls_at_start(blast.scene), obstacles, 0.0)
+    changed = np.argwhere((whole != broken).any(axis=2))
+    left, bottom, right, top = part.rectangle_m
+    low, high = painter.sheet.pixel(left, top), painter.sheet.pixel(right, bottom)
+    assert len(changed) > 0.05 * (high[0] - low[0]) * (high[1] - low[1])
+    assert (changed.min(axis=0)[::-1] >= np.subtract(low, 2)).all()
+    assert (changed.max(axis=0)[::-1] <= np.add(high, 2)).all()
+
+
+def test_equal_states_give_equal_frames(barrier_blast: Blast) -> None:
+    frames = []
+    for _ in range(2):
+        run = barrier_blast.start()
+        run.advance(0.01)
+        painter = FramePainter(barrier_blast)
+        frames.append(painter.paint(run.balls(), run.obstacles, run.time_s))
+    assert np.array_equal(frames[0], frames[1])
+
+
+def test_the_scale_of_all_layouts_of_a_scenario_is_the_same(
+    blast: Blast, barrier_blast: Blast
+) -> None:
+    one, other = (FramePainter(each).full_impulse for each in (blast, barrier_blast))
+    assert one == other > 0.0
+
+
+def test_frames_need_no_display() -> None:
+    code = (
+        "import sys\n"
+        "from blast_env.plots.frames import FramePainter\n"
+        "from tests.plots.scenes import balls_at_start, small_blast\n"
+        "blast = small_blast()\n"
+        "painter = FramePainter(blast)\n"
+        "frame = painter.paint(balls_at_start(blast.scene), blast.scene.obstacles(), 0.0)\n"
+        "assert 'pygame' not in sys.modules\n"
+        "print(frame.shape)\n"
+    )
+    hidden = ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY")
+    environment = {key: value for key, value in os.environ.items() if key not in hidden}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("(")
+    assert done.stderr == ""
+
+
+def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
+    code = (
+        "import sys\n"
+        "sys.modules['matplotlib'] = None\n"
+        "from blast_env.errors import BlastEnvError\n"
+        "try:\n"
+        "    import blast_env.plots.frames\n"
+        "except BlastEnvError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "pip install blast-env[render]" in done.stdout
+    assert "'matplotlib" in done.stdout

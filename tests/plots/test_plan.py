@@ -1,0 +1,195 @@
+"""The list of what is on a site, and that every picture and drawing shows all of it."""
+
+import re
+from collections.abc import Sequence
+from itertools import combinations
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import blast_env.plots.plan
+from blast_env.app.plan import PixelView, plan_svg
+from blast_env.geometry import Rectangle
+from blast_env.io.export import LayoutPlan
+from blast_env.io.export.dxf import drawing
+from blast_env.io.export.files import feature_collection
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import vehicle_reach
+from blast_env.plots.labels import Label, labels_of, settled_labels
+from blast_env.plots.placing import PlacingPainter, sources_text
+from blast_env.plots.plan import (
+    Feature,
+    FeatureKind,
+    Kinds,
+    Look,
+    area_feature,
+    rectangles_of,
+    site_features,
+    stand_off_text,
+    vehicle_features,
+)
+from blast_env.plots.site_picture import site_picture
+from blast_env.site import BuildZone, load_scenario
+from tests.office_park import office_park
+from tests.vehicle_sites import POSTS, gate_site, vehicle_of
+
+COLOUR = (1, 2, 250)
+SOFT = FeatureKind("soft_ground", "soft ground", 1.55, Look(COLOUR, fill=COLOUR, cad_colour=4))
+PLACE = Rectangle(14.0, 6.0, 16.0, 8.0)
+
+
+@pytest.fixture
+def _soft_ground(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the zone say one more thing, as a new condition of it would."""
+    known = blast_env.plots.plan.zone_features
+
+    def more(zone: BuildZone, structures_m: Sequence[Rectangle]) -> list[Feature]:
+        return [*known(zone, structures_m), area_feature(SOFT, PLACE, "a bog")]
+
+    monkeypatch.setattr(blast_env.plots.plan, "zone_features", more)
+
+
+@pytest.mark.usefixtures("_soft_ground")
+def test_a_new_condition_of_the_zone_is_in_all_pictures_and_drawings() -> None:
+    site = load_scenario("courtyard")
+    figure = site_picture(site)
+    assert "soft ground" in [text.get_text() for text in figure.legends[0].get_texts()]
+    fills = [patch.get_facecolor()[:3] for patch in figure.axes[0].patches]
+    assert tuple(np.array(COLOUR) / 255.0) in fills
+    frame = PlacingPainter(site, site.charge).paint(Placement.empty(site))
+    assert (frame == COLOUR).all(axis=2).sum() > 1000
+    svg = plan_svg(PixelView.of(site, 600, 400), site, (), None)
+    assert 'fill="#0102fa"' in svg
+    plan = LayoutPlan(site, ())
+    (outline,) = drawing(plan).modelspace().query('LWPOLYLINE[layer=="SOFT_GROUND"]')
+    assert outline.dxf.layer == "SOFT_GROUND"
+    kinds = [each["properties"]["kind"] for each in feature_collection(plan)["features"]]
+    assert kinds.count("soft_ground") == 1
+
+
+def test_what_lies_on_top_comes_last() -> None:
+    for name in ("courtyard", "hotel_forecourt"):
+        levels = [feature.kind.level for feature in site_features(load_scenario(name))]
+        assert levels == sorted(levels)
+
+
+def test_a_building_in_parts_has_one_label_and_charges_in_one_place_share_theirs() -> None:
+    texts = [label.text for label in labels_of(site_features(office_park()))]
+    assert [text for text in texts if text.startswith("office")] == ["office\n13 m"]
+    assert "charge 1: 100 kg\ncharge 2: 500 kg" in texts
+    assert "door\ndoor_upper_floor" in texts
+    same = Feature(Kinds.CHARGE, ((1.0, 2.0),), "a", label="T1")
+    assert [label.text for label in labels_of([same, same])] == ["T1"]
+
+
+def overlapping(boxes: Sequence[Rectangle]) -> int:
+    return sum(one.overlaps(other, tolerance=0.5) for one, other in combinations(boxes, 2))
+
+
+def test_no_label_of_a_crowded_site_lies_on_another_in_a_figure() -> None:
+    figure = site_picture(office_park())
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        texts = [text for text in axes.texts if text.get_text() and text.get_clip_on()]
+        assert {"kerb", "office\n13 m"} <= {text.get_text() for text in texts}
+        boxes = [Rectangle(*text.get_window_extent().extents) for text in texts]
+        assert overlapping(boxes) == 0
+
+
+def test_no_label_of_a_crowded_site_lies_on_another_on_the_page() -> None:
+    site = office_park()
+    svg = plan_svg(PixelView.of(site, 900, 640), site, (), None)
+    found = re.findall(r'<text x="(\S+)" y="(\S+)" font-size="(\d+)"[^>]*>([^<]*)<', svg)
+    boxes = []
+    for x, y, size, text in found:
+        half, high = 0.25 * float(size) * len(text), 0.8 * float(size)  # letters at their least
+        boxes.append(Rectangle(float(x) - half, -float(y), float(x) + half, high - float(y)))
+    assert len(boxes) > 12
+    assert overlapping(boxes) == 0
+
+
+def places_of_texts(
+    owns: list[Rectangle], size: tuple[float, float], within: Rectangle, *, inside: bool
+) -> list[Rectangle]:
+    """Return where texts of structures stand."""
+    features = [area_feature(Kinds.STRUCTURE, own, "a structure") for own in owns]
+    settled = settled_labels(
+        features,
+        [Label(each.name, each) for each in features],
+        [size] * len(owns),
+        lambda each: each.bounds_m,
+        lambda each: each.bounds_m if inside else None,
+        within,
+        gap=4.0,
+        far=inf,
+    )
+    return [each.place for each in settled]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.tuples(st.integers(50, 550), st.integers(50, 350)), min_size=1, max_size=8))
+def test_texts_have_places_of_their_own_wherever_their_things_are(
+    places: list[tuple[int, int]],
+) -> None:
+    owns = [Rectangle(x, y, x, y).grown(8.0) for x, y in places]
+    within = Rectangle(0.0, 0.0, 600.0, 400.0)
+    boxes = places_of_texts(owns, (90.0, 15.0), within, inside=False)
+    assert overlapping(boxes) == 0
+    assert not any(box.overlaps(own, tolerance=0.5) for box in boxes for own in owns)
+    assert all(within.contains(box) for box in boxes)
+
+
+def test_a_text_stands_inside_its_own_where_there_is_room() -> None:
+    house, shed = Rectangle(0.0, 0.0, 100.0, 40.0), Rectangle(200.0, 0.0, 210.0, 10.0)
+    within = Rectangle(-50.0, -50.0, 400.0, 100.0)
+    first, second = places_of_texts([house, shed], (60.0, 12.0), within, inside=True)
+    assert house.contains(first)
+    assert not shed.overlaps(second)
+    assert abs(second.centre[0] - 205.0) < 40.0
+
+
+@given(st.integers(1, 8), st.integers(1, 8), st.integers(0, 2**32))
+def test_rectangles_cover_exactly_the_squares_that_they_should(
+    rows: int, columns: int, seed: int
+) -> None:
+    squares = np.random.default_rng(seed).random((rows, columns)) < 0.6
+    covered = np.zeros((rows, columns), dtype=int)
+    for left, bottom, right, top in rectangles_of(squares, (3.0, 5.0), 1.0):
+        covered[int(bottom) - 5 : int(top) - 5, int(left) - 3 : int(right) - 3] += 1
+    assert (covered == squares).all()
+
+
+def test_the_ground_is_where_the_vehicle_gets_to() -> None:
+    site = gate_site()
+    for layout in ((), POSTS):
+        expected = vehicle_reach(site, vehicle_of(site), layout).ground(16, 28)
+        features = vehicle_features(site, layout)
+        reached = [each.bounds_m for each in features if each.kind is Kinds.REACHED]
+        y, x = (0.5 * (np.argwhere(expected).T + 0.5)).tolist()
+        assert sum((r.right - r.left) * (r.top - r.bottom) for r in reached) == 0.25 * len(x)
+        for place in zip(x, y, strict=True):
+            assert any(r.left < place[0] < r.right and r.bottom < place[1] < r.top for r in reached)
+
+
+def test_the_stand_off_has_its_length_to_the_nearest_wall() -> None:
+    for layout, label, ends in (
+        ((), "stand-off 1.0 m", ((9.0, 4.0), (10.0, 4.0))),
+        (POSTS, "stand-off 7.0 m", ((3.0, 4.0), (10.0, 4.0))),
+    ):
+        features = vehicle_features(gate_site(), layout)
+        (line,) = (each for each in features if each.kind is Kinds.STAND_OFF)
+        (star,) = (each for each in features if each.kind is Kinds.CHARGE)
+        assert (line.label, line.places_m) == (label, ends)
+        assert star.places_m == ends[:1]
+
+
+def test_the_words_have_both_stand_offs() -> None:
+    site, courtyard = gate_site(), load_scenario("courtyard")
+    assert stand_off_text(site, POSTS) == "stand-off 7.0 m, 1.0 m without the barrier"
+    assert stand_off_text(site, ()) == "stand-off 1.0 m"
+    assert sources_text(site.charge) == "vehicle with 5 kg TNT"
+    assert vehicle_features(courtyard) == ()
+    assert stand_off_text(courtyard, ()) == ""

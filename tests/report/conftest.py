@@ -1,0 +1,16 @@
+"""One small study for all tests of reports: a hut and a wall, a second or two a blast."""
+
+import pytest
+
+from blast_env.report import Limit, Study, StudyOptions, run_study
+from tests.report.sites import LAYOUT, glazed_hut
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    front = tmp_path_factory.mktemp("front") / "front.csv"
+    rows = ("blasts,impulse_pa_s,threats,modules,layout", "3,1,1,0,", '4,1,1,2,"2,0 3,0"')
+    front.write_text("\n".join(rows) + "\n")
+    limits = (Limit("hut", impulse_pa_s=300.0),)
+    options = StudyOptions(limits=limits, front=front, places=1, stills=2)
+    return run_study(glazed_hut(), LAYOUT, options)

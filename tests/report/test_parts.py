@@ -1,0 +1,237 @@
+"""The parts of a report that need no blast: threats, limits, units, durations, fronts."""
+
+from math import hypot, inf
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.evaluation.governing import Severity
+from blast_env.geometry import Piece
+from blast_env.report import UNITS, Limit, StudyOptions, UnitSystem
+from blast_env.report.loads import TargetLoad, first_phase_s, targets_of
+from blast_env.report.outcomes import check_limits
+from blast_env.report.peaks import CountedPeak, PeakSource
+from blast_env.report.study import Runs, layout_from
+from blast_env.report.threats import (
+    NamedCharge,
+    asked_threats,
+    chief_threats,
+    other_masses,
+    other_places,
+)
+from blast_env.site import Scenario, ScenarioError
+from blast_env.site.scene import Charge
+from tests.gas_sites import site_document
+from tests.report.sites import small_hut
+from tests.vehicle_sites import POSTS, gate_site, vehicle_document
+
+SI, PSI = UNITS["si"], UNITS["psi"]
+
+
+def site_with(*charges: dict[str, object]) -> Scenario:
+    return Scenario.from_document(site_document(charge=list(charges)), "hut")
+
+
+ROAD = {"kind": "segment", "start_m": [1.0, 1.0], "end_m": [1.0, 7.0], "tnt_kg": 8.0}
+YARD = {"kind": "rectangle", "corner_m": [1.0, 1.0], "size_m": [2.0, 1.0], "tnt_kg": 1.0}
+
+
+def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> None:
+    scenario = site_with(ROAD, YARD)
+    places = other_places(scenario, 3)
+    loads = {each.charge: float(number) for number, each in enumerate(places)}
+    loads[places[1].charge] = 1e3
+
+    def severity(place: NamedCharge) -> Severity:
+        return Severity(load=loads[place.charge])
+
+    first, second = chief_threats(places, severity, 6)
+    assert (first.name, second.name) == ("T1", "T2")
+    assert (first.charge, second.charge) == (places[1].charge, places[-1].charge)
+    assert first.why == ("charge source 1, the worst with the layout of 4 places examined")
+    assert [each.charge for each in chief_threats(places, severity, 1)] == [first.charge]
+
+
+@given(st.floats(1.0, 3.0), st.floats(1.0, 7.0), st.floats(1.0, 3.0), st.floats(1.0, 7.0))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_no_place_of_a_street_is_nearer_than_those_looked_at(
+    x0: float, y0: float, x1: float, y1: float
+) -> None:
+    road = {**ROAD, "start_m": [x0, y0], "end_m": [x1, y1]}
+    scenario = site_with(road)
+    left, bottom, right, top = scenario.structures[0].rectangle_m
+
+    def away_m(x_m: float, y_m: float) -> float:
+        return hypot(max(left - x_m, x_m - right, 0.0), max(bottom - y_m, y_m - top, 0.0))
+
+    places = other_places(scenario, 1)
+    shares = np.linspace(0.0, 1.0, 1000)
+    nearest = min(away_m(x0 + s * (x1 - x0), y0 + s * (y1 - y0)) for s in shares)
+    looked_at_m = min(away_m(*each.against(scenario).position_m) for each in places)
+    assert looked_at_m == pytest.approx(nearest, abs=0.01)
+
+
+def test_other_places_are_spread_over_every_source() -> None:
+    site = site_with(ROAD, YARD, ROAD)
+    places = other_places(site, 3)
+    along_m = [each.against(site).position_m for each in places[:3]]
+    assert along_m == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
+    assert 3.0 <= places[3].against(site).position_m[1] <= 5.0  # before the hut
+    assert len(places) == 4 + 9  # the second road has the same places, the yard its nearest corner
+    assert {each.charge.tnt_kg for each in places[4:]} == {1.0}
+
+
+def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
+    site = gate_site(vehicle_document(places=3, apart_m=2.0))
+    places = other_places(site, 5)
+    threat = places[0]
+    # Its square of 2 m touches the hut at x = 10 m, or the posts at x = 4 m.
+    assert threat.against(site) == Charge((9.0, 4.0), 5.0)
+    assert threat.against(site, POSTS) == Charge((3.0, 4.0), 5.0)
+    assert threat.place_text(site, POSTS) == (
+        "(9.0, 4.0) m without the layout, (3.0, 4.0) m with it"
+    )
+    assert len({each.against(site, POSTS) for each in places}) == len(places) == 3
+    masses, notes = other_masses(site, threat.charge, (2.0, 1e9))
+    assert [each.against(site, POSTS) for each in masses] == [Charge((3.0, 4.0), 10.0)]
+    assert "5e+09 kg is omitted" in notes[0]
+
+
+def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
+    site = gate_site()
+    runs = Runs(site, POSTS, StudyOptions(), targets_of(site), (), lambda _, __: None)
+    (outcome,) = runs.other_places()[:1]
+    runs.choose_threats()
+    assert [each.name for each in runs.threats] == ["T1"]
+    near, far = (
+        GasBlast(site, layout, charge=Charge((x_m, 4.0), 5.0)).run().impulse("hut").pa_s
+        for layout, x_m in (((), 9.0), (POSTS, 3.0))
+    )
+    assert outcome.bare_pa_s == pytest.approx(near)
+    assert outcome.walled_pa_s == pytest.approx(far)
+
+
+def test_masses_that_the_scenario_cannot_have_are_left_out_by_name() -> None:
+    charge = Charge((2.0, 4.0), 80_000.0)
+    possible, notes = other_masses(small_hut(), charge, (0.5, 2.0))
+    assert "160000 kg is omitted" in notes[-1]
+    assert all(each.charge.tnt_kg < 100_000.0 for each in possible)
+
+
+def test_threats_that_are_asked_for_must_be_clear() -> None:
+    assert asked_threats(small_hut(), (Charge((2.0, 3.0), 5.0),))[0].name == "T1"
+    with pytest.raises(ScenarioError, match="hut"):
+        asked_threats(small_hut(), (Charge((6.5, 4.0), 5.0),))
+
+
+def test_structures_of_a_building_are_one_target() -> None:
+    document = site_document()
+    hut = document["structures"][0]
+    document["structures"] = [
+        hut | {"name": "shed", "corner_m": [0.5, 0.5], "rows": 1, "protected": False},
+        hut | {"name": "hut_a", "building": "hut"},
+        hut | {"name": "hut_b", "corner_m": [6.0, 5.0], "rows": 2, "building": "hut"},
+    ]
+    first, second = targets_of(Scenario.from_document(document, "hut"))
+    assert (first.name, first.names, first.protected) == ("hut", ("hut_a", "hut_b"), True)
+    assert first.bounds_m == (6.0, 3.0, 8.0, 6.0)
+    assert first.height_m == 2.0
+    assert (second.name, second.protected) == ("shed", False)
+
+
+# Limits.
+
+
+def load(impulse_pa_s: float, peak_pa: float) -> TargetLoad:
+    counted = CountedPeak(peak_pa, PeakSource.CURVE)
+    return TargetLoad(
+        "hut", 1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True, False
+    )
+
+
+def test_limit_is_kept_by_loads_up_to_it() -> None:
+    limit = Limit.parsed("hut=200,40", SI)
+    assert limit == Limit("hut", 200.0, 40_000.0)
+    assert limit.is_kept(load(200.0, 40_000.0))
+    assert not limit.is_kept(load(200.1, 1.0))
+    assert not limit.is_kept(load(1.0, 40_001.0))
+    assert Limit.parsed("hut=,40", SI) == Limit("hut", inf, 40_000.0)
+    assert Limit.parsed("hut=200", SI) == Limit("hut", 200.0, inf)
+
+
+def test_limits_in_psi() -> None:
+    limit = Limit.parsed("hut=29,5.8", PSI)
+    assert limit.impulse_pa_s == pytest.approx(199.9, abs=0.1)  # 29 psi ms
+    assert limit.peak_pa == pytest.approx(39_990.0, abs=10.0)
+
+
+@pytest.mark.parametrize("text", ["hut", "=1,2", "hut=", "hut=a", "hut=1,2,3", "hut=-1", "hut=,"])
+def test_limit_that_is_none_is_named(text: str) -> None:
+    with pytest.raises(BlastEnvError) as caught:
+        Limit.parsed(text, SI)
+    assert f"--limit is {text!r}" in str(caught.value)
+
+
+def test_limits_are_of_buildings_that_exist() -> None:
+    targets = targets_of(small_hut())
+    with pytest.raises(UnknownNameError, match="no building 'hat', did you mean 'hut'"):
+        check_limits([Limit("hat", 1.0)], targets)
+    with pytest.raises(BlastEnvError, match="twice for 'hut'"):
+        check_limits([Limit("hut", 1.0), Limit("hut", 2.0)], targets)
+
+
+# Units, options, durations.
+
+
+def test_units() -> None:
+    assert PSI.pressure_of(6894.757) == pytest.approx(1.0)
+    assert PSI.impulse_of(6.894757) == pytest.approx(1.0)  # a psi ms
+    assert UnitSystem.named("si").pressure_of(2000.0) == 2.0
+    with pytest.raises(UnknownNameError, match="no units 'bar'"):
+        UnitSystem.named("bar")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"most_threats": 7}, "threats is 7, must be 1 to 6"),
+        ({"cells": (0.25, 0.5)}, "must be two sizes, the coarser one first"),
+        ({"cells": (0.5, 0.3)}, "cell_m is 0.3"),
+        ({"places": 0}, "places is 0"),
+        ({"stills": 13}, "stills is 13"),
+    ],
+)
+def test_options_out_of_bounds(options: dict, words: str) -> None:
+    with pytest.raises(BlastEnvError) as caught:
+        StudyOptions(**options)
+    assert words in str(caught.value)
+
+
+def test_duration_of_a_triangle() -> None:
+    """It rises at once at 3 ms and falls to 0 at 13 ms, then below."""
+    time_s = np.arange(0.0, 0.03, 0.0005)
+    pressure = np.where(time_s < 0.003, 0.0, 20_000.0 * (0.013 - time_s) / 0.01)
+    pressure[time_s >= 0.02] = 5000.0  # a second wave, which does not count
+    assert first_phase_s(time_s, pressure) == pytest.approx(0.0105, abs=1e-6)
+
+
+def test_duration_of_what_never_comes_or_never_ends() -> None:
+    time_s = np.linspace(0.0, 0.01, 11)
+    assert np.isnan(first_phase_s(time_s, np.full(11, 900.0)))  # below 1 kPa
+    assert np.isnan(first_phase_s(time_s, np.full(11, 2000.0)))
+
+
+def test_fronts_have_cells_or_pieces() -> None:
+    assert layout_from("") == ()
+    assert layout_from("3,4 3,5") == ((3, 4), (3, 5))
+    assert layout_from("3,4,t_wall 7,4,t_wall,turned") == (
+        Piece(3, 4, "t_wall"),
+        Piece(7, 4, "t_wall", True),
+    )
+    for text in ("3", "3;4", "a,4", "3,4,t_wall,left", "1,2,3,turned,5"):
+        with pytest.raises(ValueError, match=r"must|invalid"):
+            layout_from(text)

@@ -1,0 +1,432 @@
+"""Whole reports: what they say is what the blasts gave."""
+
+import re
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pypdfium2
+import pytest
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.cli import app
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.grid_error import convergence_index
+from blast_env.gas.settings import Cells
+from blast_env.geometry import Layout, Measure, layout_text
+from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
+from blast_env.layout import write_layout
+from blast_env.report import UNITS, Limit, Study, StudyOptions, run_study, write_report
+from blast_env.report.loads import MeasuredBlast, measure, targets_of
+from blast_env.report.page import report_html
+from blast_env.report.study import Runs, blasts_of
+from blast_env.report.threats import other_places
+from blast_env.report.verdict import verdict_of
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import catalogue
+from blast_env.site import Scenario, save_scenario
+from blast_env.site.catalogue import Hardening
+from blast_env.site.scene import Charge
+from tests.catalogue_sites import WALL, yard
+from tests.report.sites import LAYOUT, glazed_hut, small_hut
+from tests.site.test_hardening import TAKEN, glazed_yard
+
+
+@pytest.fixture(scope="module")
+def page(study: Study) -> str:
+    return report_html(study, ["blast-env", "report", "a site.toml"])
+
+
+@pytest.fixture
+def _without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare a study its pictures, which take as long as its blasts."""
+    for name in ("blast_pictures", "damage_pictures"):
+        monkeypatch.setattr(f"blast_env.report.study.{name}", lambda *_: ())
+    monkeypatch.setattr("blast_env.report.study.risk_picture", lambda *_: ("risk", b""))
+
+
+@pytest.fixture(scope="module")
+def measured() -> MeasuredBlast:
+    scenario = small_hut()
+    return measure(GasBlast(scenario, LAYOUT), targets_of(scenario))
+
+
+def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> None:
+    (threat,), (target,) = study.threats, study.targets
+    result = blast_env.simulate(glazed_hut(), LAYOUT, engine="gas")
+    (row,) = result.structures.to_dict("records")
+    pair = study.pair(target, threat, 0.5)
+    assert pair.walled.impulse_pa_s == pytest.approx(row["impulse_pa_s"])
+    assert pair.walled.peak_pa == row["peak_pa"]
+    assert pair.walled.arrival_s == row["arrival_s"]
+    assert pair.walled.wall == row["most_loaded_face"]
+    assert pair.walled.wall_impulse_pa_s == pytest.approx(row["most_loaded_pa_s"])
+    assert pair.walled == measured.loads["hut"]
+    assert 0.1 < pair.reduction < 0.5
+    assert {each.cells for each in study.pairs} == {0.5, 0.25}
+    fine = study.pair(target, threat, 0.25)
+    errors = study.errors(fine)
+    assert study.grid_error == errors.reduction
+    assert errors.reduction == pytest.approx(convergence_index(fine.reduction, pair.reduction))
+    both = (each.walled.impulse_pa_s for each in (fine, pair))
+    assert errors.walled_pa_s == pytest.approx(convergence_index(*both))
+    assert np.isnan(study.errors(pair).reduction)  # of the coarser cells there is none
+    digests = dict(study.digests)
+    assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
+
+
+def test_histories_are_the_momentum_of_the_walls(measured: MeasuredBlast) -> None:
+    """Mean overpressure over time is the running impulse at the end."""
+    faces = measured.result.faces
+    for wall in ("west", "north"):
+        own = faces[faces["face"] == wall]
+        own = own[own["structure"] == "hut"]
+        total = own["net_impulse_pa_s"]
+        history = measured.histories.of("hut", wall)
+        assert history is not None
+        along = np.trapezoid(history, measured.histories.time_s)
+        assert along == pytest.approx(float(total.mean()), abs=0.02 * own["impulse_pa_s"].mean())
+    assert measured.histories.of("hut", "roof") is None  # type: ignore[arg-type]
+
+
+def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
+    (threat,) = study.threats
+    impulses = [
+        GasBlast(small_hut(), layout, charge=threat.charge).run().impulse("hut").pa_s
+        for layout in ((), LAYOUT, LAYOUT[1:])
+    ]
+    bare, whole, without = impulses
+    worths = {each.name: each.worth for each in study.items}
+    first, second, third, last = (layout_text([each]) for each in LAYOUT)
+    assert worths.keys() == {first, second, third, last}
+    assert worths[first] == pytest.approx((without - whole) / bare)
+    assert [each.worth for each in study.items] == sorted(worths.values(), reverse=True)
+    # The charge is in the middle before the wall: both halves are worth alike, but for rounding.
+    assert worths[first] == pytest.approx(worths[last], rel=0.05)
+    assert worths[second] == pytest.approx(worths[third], rel=0.05)
+    assert min(worths.values()) > 0.0
+
+
+def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: Study) -> None:
+    outcomes = study.masses["T1"]
+    assert [each.name for each in outcomes] == ["2.5 kg", "5 kg", "10 kg"]
+    bare = [each.bare_pa_s for each in outcomes]
+    assert bare == sorted(bare)
+    (place,) = study.places
+    assert place.walled_pa_s == outcomes[1].walled_pa_s
+    (point,) = study.front
+    assert point.layout == ((2, 0), (3, 0))
+    assert point.cost == 2.0
+    assert 0.0 < point.reduction < outcomes[1].reduction  # two modules of four
+
+
+def test_pieces_of_a_catalogue_are_the_items() -> None:
+    """Ranked one by one, each left out whole."""
+    scenario, threats = yard(), other_places(yard(), 1)[:1]
+    runs = Runs(scenario, WALL, StudyOptions(), targets_of(scenario), threats, lambda _, __: None)
+    worths = {each.name: each for each in runs.item_worths()}
+    assert worths.keys() == {"5,1,wall,turned", "8,1,wall,turned", "4,1,post"}
+    assert worths["5,1,wall,turned"].rectangle_m == (4.0, 5.0, 4.5, 6.5)
+    assert worths["5,1,wall,turned"].worth > worths["4,1,post"].worth
+
+
+def test_page_needs_nothing_else(page: str) -> None:
+    sources = re.findall(r'(?:src|href)="([^"]{0,40})', page)
+    assert len(sources) >= 8
+    assert all(each.startswith("data:image/png;base64,iVBOR") for each in sources)
+    assert "<script" not in page
+    assert "@import" not in page
+    assert "url(" not in page
+
+
+def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: str) -> None:
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    pm, errors = "\N{PLUS-MINUS SIGN}", study.errors(fine)
+    assert f"<td>{fine.bare.impulse_pa_s:.0f} {pm} {errors.bare_pa_s:.1f}</td>" in page
+    assert f"<td>{100 * fine.reduction:.1f} % {pm} {100 * errors.reduction:.1f}</td>" in page
+    assert small_hut().content_hash in page
+    assert "<code>blast-env report &#34;a site.toml&#34;</code>" in page
+    assert "&#34;cells&#34;: [[1, 0], [2, 0], [3, 0], [4, 0]]" in page
+    assert "name = &#34;hut&#34;" in page
+    for label, digest in study.digests:
+        assert f'{label}</td><td class="l"><code>{digest[:16]}' in page
+    titles = re.findall(r"<h2>(\d+)\. ([^<]+)</h2>", page)
+    assert titles == [
+        (str(number), title)
+        for number, title in enumerate(
+            (
+                *("Assumptions", "Site and threats", "Layout", "Loads", "The blast"),
+                *("Contribution of each item", "Other masses and places", "Reduction against cost"),
+                *("Validity and limits", "Sources of the numbers", "Reproduction"),
+            ),
+            start=1,
+        )
+    ]
+
+
+def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert fine.walled.wall_impulse_pa_s < 300.0 < fine.bare.wall_impulse_pa_s
+    whole, *limits = re.findall(r'<span class="(\w+)">([^<]+)</span>', page)
+    assert fine.bare.flagged  # 6.8 cells per m/kg^(1/3)
+    assert fine.walled.flagged
+    assert whole[1] in ("PASSES (flagged)", "FAILS")
+    assert limits == [("fail", "fails"), ("pass", "passes (flagged)")]
+    assert ">passes<" not in page
+    assert "1 of 1</strong> cases with the layout, 0 without" in page
+
+
+def test_other_units_and_loads_within_what_was_checked(study: Study, page: str) -> None:
+    """What is outside is said by name; here a copy of the study without notes, in psi."""
+    assert any("checked from 9.2" in note for note in study.notes)
+    assert "outside the validated range of the engine" in page
+    other = replace(study, notes=(), options=replace(study.options, units=UNITS["psi"]))
+    changed = report_html(other, ["blast-env"])
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert f"<td>{fine.bare.impulse_pa_s / 6.894757:.1f} \N{PLUS-MINUS SIGN} " in changed
+    assert f"<td>{fine.bare.peak_pa / 6894.757:.1f}</td>" in changed
+    assert "Impulses in psi·ms, overpressures in psi" in changed
+    assert "No load in this report is outside that range." in changed
+
+
+def test_pdf_has_the_same_pages_of_text_and_pictures(study: Study, tmp_path: Path) -> None:
+    html, pdf = write_report(study, tmp_path / "a.html", tmp_path / "a.pdf", ["blast-env"])
+    assert html.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    document = pypdfium2.PdfDocument(pdf)
+    text = "".join(each.get_textpage().get_text_range() for each in document)
+    assert "Contribution of each item" in text
+    assert small_hut().content_hash[:20] in text
+    assert f"{len(document)} / {len(document)}" in text
+    pictures = sum(1 for each in document for item in each.get_objects() if item.type == 3)
+    assert pictures >= 8
+    # Nothing runs out of the page: the outermost pixels are white.
+    for each in document:
+        pixels = np.asarray(each.render(scale=0.5).to_numpy())
+        assert (pixels[:, :12] > 250).all()
+        assert (pixels[:, -12:] > 250).all()
+
+
+@pytest.mark.parametrize(
+    ("html", "pdf", "words"),
+    [("a.txt", None, "must be .html"), ("a.html", "a.ps", "must be .pdf")],
+)
+def test_suffixes(study: Study, html: str, pdf: str | None, words: str, tmp_path: Path) -> None:
+    with pytest.raises(BlastEnvError, match=words):
+        write_report(study, tmp_path / html, None if pdf is None else tmp_path / pdf)
+
+
+@pytest.mark.parametrize("content", ["", "a,b\n1,2\n", "layout\n3;4\n", 'layout\n"90,0"\n'])
+def test_front_of_another_kind_is_named(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "front.csv"
+    path.write_text(content)
+    with pytest.raises(BlastEnvError):
+        run_study(small_hut(), LAYOUT, StudyOptions(front=path))
+
+
+def test_layout_of_nothing_is_refused() -> None:
+    with pytest.raises(BlastEnvError, match="the layout is empty"):
+        run_study(small_hut(), ())
+
+
+def test_command_passes_on_what_it_was_asked(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[Scenario, Layout, StudyOptions]] = []
+
+    def run(scenario: Scenario, layout: Layout, options: StudyOptions, _: object) -> Study:
+        asked.append((scenario, layout, options))
+        return study
+
+    monkeypatch.setattr("blast_env.report.run_study", run)
+    monkeypatch.setattr("blast_env.report.write_report", lambda _, *paths: list(paths))
+    site, wall, out, pdf = (
+        str(tmp_path / name) for name in ("s.toml", "w.json", "a.html", "a.pdf")
+    )
+    save_scenario(small_hut(), site)
+    write_layout(wall, small_hut(), LAYOUT, {})
+    files = ("report", site, "--layout", wall, "--out", out, "--pdf", pdf)
+    few = ("--stills", "0", "--no-items", "--charge", "2,3,4", "--units", "psi", "--limit", "hut=9")
+    done = CliRunner().invoke(app, [*files, *few])
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.split()[-4:] == ["wrote", out, "wrote", pdf]
+    ((scenario, layout, options),) = asked
+    assert (scenario, layout) == (small_hut(), LAYOUT)
+    assert (options.stills, options.items, options.units.name) == (0, False, "psi")
+    assert options.charges == (Charge((2.0, 3.0), 4.0),)
+    assert options.limits[0].impulse_pa_s == pytest.approx(9 * 6.894757)
+
+
+def test_engines_of_both_sizes_are_gas() -> None:
+    assert StudyOptions().coarse == GasEngine(cell_m=0.5)
+
+
+def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: str) -> None:
+    verdict = verdict_of(study)
+    (line,) = verdict.buildings
+    assert line.levels[0] <= line.levels[1]
+    assert (line.panes, line.panels) == (8, 4)
+    assert verdict.passes == (study.walled.passes(study.target) and verdict.limits[0].kept)
+    first = page[page.index("<h3>Verdict") : page.index("<h2>")]
+    assert f">{verdict.word}<" in first
+    assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
+    assert "costs 4" in first
+    assert all(f"all windows: {each.title}" in page for each in verdict.glazing)
+    assert page.count("no price given in the site file") == len(verdict.glazing) - 1
+    assert "installed already" in page  # of the windows as they are
+    bays = page[page.index("Bay by bay") :]
+    assert all(f"hut/{wall}/1/1" in bays for wall in ("west", "east", "south", "north"))
+
+
+def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
+    strict = replace(study, options=replace(study.options, target=LevelOfProtection.HIGH))
+    assert verdict_of(strict).passes is False
+    harsh = replace(study.options, limits=(Limit("hut", impulse_pa_s=1.0),))
+    assert verdict_of(replace(study, options=harsh)).passes is False
+
+
+def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) -> None:
+    empty = Consequences(())
+    options = replace(study.options, limits=())
+    bare = replace(study, bare=empty, walled=empty, walled_coarse=empty, options=options)
+    assert verdict_of(bare).word == "NO VERDICT"
+    page = report_html(bare, ["blast-env"])
+    assert "no building has a facade" in page
+    assert "Loads of the protected buildings" in page
+
+
+def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) -> None:
+    table = page[page.index("Sources of the numbers") : page.index("Reproduction")]
+    digests = dict(study.digests)
+    for words in ("without a barrier", "with the layout"):
+        assert digests[f"T1 {words}, cells of 0.25 m"][:16] in table
+    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    assert f"{fine.walled.impulse_pa_s:.0f} Pa\N{MIDDLE DOT}s" in table.replace(" Pa s", " Pa·s")
+    assert "bill of quantities" in table
+
+
+@pytest.mark.usefixtures("_without_pictures")
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ((0.5, 0.5), "cells of 0.5 m"),
+        (("coarse", "fine"), "coarse cells from 0.5 m and fine cells from 0.25 m"),
+    ],
+)
+def test_a_report_that_is_stopped_has_what_was_done(
+    cells: tuple[Cells, Cells], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(_: Runs) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Runs, "other_masses", stop)
+    stopped = run_study(small_hut(), LAYOUT, StudyOptions(stills=0, cells=cells))
+    assert stopped.stopped == "other masses"
+    assert {each.cells for each in stopped.pairs} == {*cells}
+    page = report_html(stopped, ["blast-env"])
+    assert "This report was stopped before: other masses" in page
+    assert f"three dimensions), {words}." in page
+    assert f"take those with {words.split(' and ')[-1]} as a lower bound" in page
+    assert not re.search(r"\b(coarse|fine) m\b", page)
+    shown = f"{100.0 * stopped.pairs[-1].reduction:.1f} %"
+    error = f"{shown} \N{PLUS-MINUS SIGN} {100.0 * stopped.grid_error:.1f}"
+    assert (error in page) == ("\N{PLUS-MINUS SIGN}" in page) == (cells[0] != cells[1])
+
+
+@pytest.mark.usefixtures("_without_pictures")
+def test_stopped_among_the_finer_cells_a_report_has_the_coarser_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sizes: list[float] = []
+
+    def measured(blast: GasBlast, *rest: object) -> MeasuredBlast:
+        sizes.append(blast.engine.cell_m)
+        if len(sizes) == 4:
+            raise KeyboardInterrupt
+        return measure(blast, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("blast_env.report.study.measure", measured)
+    stopped = run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0))
+    assert sizes == [0.5, 0.5, 0.25, 0.25]
+    assert stopped.stopped == "cells of 0.25 m"
+    assert {each.cells for each in stopped.pairs} == {0.5}
+    page = report_html(stopped, ["blast-env"])
+    assert "This report was stopped before: cells of 0.25 m" in page
+    assert "only one cell size was used" in page
+    assert not re.search(r"\bnan\b", re.sub(r"base64,[^\"]*", "", page))
+    sizes[:] = [0.5] * 2
+    with pytest.raises(KeyboardInterrupt):  # nothing is done yet
+        run_study(glazed_hut(), LAYOUT, StudyOptions(stills=0, cells=(0.5, 0.5)))
+
+
+def test_other_glass_has_the_price_of_the_measures_that_put_it_into_all_windows(
+    study: Study,
+) -> None:
+    glass = "window_laminated_6"
+    west = Hardening(name="w", glazing=glass, walls=("west",), cost=10.0)
+    others = Hardening(name="o", glazing=glass, walls=("east", "south", "north"), cost=20.0)
+    every = Hardening(name="e", glazing=glass, cost=50.0)
+
+    def price(*measures: Hardening, taken: tuple[Measure, ...] = ()) -> float | None:
+        zone = study.scenario.zone.model_copy(update={"hardening": measures})
+        site = study.scenario.model_copy(update={"build_zone": zone})
+        verdict = verdict_of(replace(study, scenario=site, layout=(*LAYOUT, *taken)))
+        title = catalogue()[glass].title
+        return next(each.cost for each in verdict.glazing if each.title == title)
+
+    assert price() is None
+    assert price(west) is None
+    assert price(west, others) == 30.0
+    assert price(west, others, every) == 30.0
+    assert price(west, every) == 50.0
+    assert price(west, others, taken=(Measure.named("w"),)) == 20.0
+
+
+def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
+    bill = bill_of_quantities(LayoutPlan(glazed_yard(), (TAKEN,)))
+    page = report_html(replace(study, bill=bill), ["blast-env"])
+    row = re.search(r"<tr><td class=\"l\">glass</td>.*</tr>", page)
+    assert row is not None
+    assert row[0].count("<td></td>") == 3
+
+
+@pytest.mark.usefixtures("_without_pictures")
+@pytest.mark.parametrize("items", [False, True])
+def test_the_blasts_that_are_counted_before_are_those_that_are_run(
+    study: Study, items: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each part that is told of is one that was counted; the threats' own blasts run twice."""
+    told: list[str] = []
+    charges: list[Any] = []
+    run = GasBlast.run
+
+    def counted_run(self: GasBlast, *arguments: Any) -> GasResult:
+        charges.append(self.threat)
+        return run(self, *arguments)
+
+    monkeypatch.setattr(GasBlast, "run", counted_run)
+    options = replace(study.options, front=None, items=items, stills=0, cache=tmp_path)
+    run_study(small_hut(), LAYOUT, options, lambda label, _: told.append(label))
+    parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
+    assert set(told) == {each.label for each in parts if each.charges}
+    assert Counter(charges) == Counter(charge for each in parts for charge in each.charges)
+    assert len(charges) == 2 + 4 + 4 + (len(LAYOUT) if items else 0)  # 2 to choose the threat by
+
+    threat = Threat(study.threats[0].charge, 0)
+    kept = BlastEvaluator(small_hut(), options.coarse, cache=tmp_path)
+    anew = BlastEvaluator(small_hut(), options.coarse)
+    for layout in ((), LAYOUT):
+        one, other = (
+            [
+                (each.impulse_pa_s, each.peak_pa)
+                for each in evaluator.loads(layout, threat).structures
+            ]
+            for evaluator in (kept, anew)
+        )
+        assert one == other
+    assert kept.blasts == 0

@@ -1,0 +1,161 @@
+"""Wherever a scenario is asked for, its bundled name or the path of its file will do."""
+
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import FrozenInstanceError, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import blast_env
+from blast_env.design.rules import random_layout, wall_near_charge
+from blast_env.design.search import layouts_by_rule
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastEvaluator, Case, Evaluators, Threat, draw_threats
+from blast_env.io.export import LayoutPlan
+from blast_env.layout import LayoutFile, Placement, check_layout, usable_cells
+from blast_env.site import ScenarioError, scenario_hash
+from blast_env.site.scene import Charge
+from blast_env.sites import SiteMeasures, turned
+from tests.scenarios import BALLISTIC_COURTYARD
+
+NAME = "courtyard"
+COURTYARD = blast_env.load_scenario(NAME)
+CHARGE = Charge((5.0, 15.0), 100.0)
+THREAT = Threat(CHARGE, 0)
+
+PUBLIC = (
+    "blast_env",
+    "blast_env.site",
+    "blast_env.evaluation.engines",
+    "blast_env.evaluation",
+    "blast_env.io.export",
+    "blast_env.sites",
+    "blast_env.design.rules",
+    "blast_env.design.proposal",
+    "blast_env.design.search",
+    "blast_agents.training",
+    "blast_agents.league",
+)
+GIVEN_BY_THE_CALLER = {
+    "Observable",  # what an observation is given
+    "TrainedAgent",
+    "Placement",  # whose constructor checks nothing: `of` does
+}
+
+
+FOR_AUTHORS = {"Engine"}  # who write one, and are given a loaded scenario
+
+
+def _callables(module_name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
+    module = import_module(module_name)
+    names = getattr(module, "__all__", [name for name in vars(module) if name[0] != "_"])
+    for name in names:
+        value = getattr(module, name)
+        if not callable(value) or not getattr(value, "__module__", "").startswith("blast"):
+            continue
+        if getattr(value, "_is_protocol", False) or inspect.isabstract(value):
+            continue
+        if name in FOR_AUTHORS:
+            continue
+        if name not in GIVEN_BY_THE_CALLER:
+            yield name, value
+        if inspect.isclass(value):
+            for method_name, method in inspect.getmembers(value, inspect.isroutine):
+                if method_name[0] != "_" and _qualified(method).startswith(name):
+                    yield f"{name}.{method_name}", method
+
+
+def _qualified(method: object) -> str:
+    """Return the name of a method with its class; a function in an attribute has another."""
+    return str(getattr(method, "__qualname__", ""))
+
+
+@pytest.mark.parametrize("module_name", PUBLIC)
+def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> None:
+    if module_name == "blast_agents.training":
+        pytest.importorskip("torch")  # an extra, which `make matrix` may leave out
+    insisting = []
+    for name, value in _callables(module_name):
+        try:
+            parameters = inspect.signature(value).parameters
+        except ValueError:  # an exception or enumeration made in C
+            continue
+        annotation = str(getattr(parameters.get("scenario"), "annotation", "str"))
+        if "str" not in annotation and "ScenarioField" not in annotation:
+            insisting.append(f"{name}(scenario: {annotation})")
+    assert insisting == []
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda it: blast_env.site.scenario_hash(it),
+        lambda it: Placement.of(it, [(0, 0)]).cells,
+        lambda it: Placement.empty(it).free.tolist(),
+        lambda it: usable_cells(it).tolist(),
+        lambda it: check_layout(it, [(1, 1)]),
+        lambda it: LayoutFile.of(it, [(1, 1)]),
+        lambda it: LayoutFile.of(COURTYARD, [(1, 1)]).layout_for(it),
+        lambda it: draw_threats(it, range(3)),
+        lambda it: BlastEvaluator(it).scenario,
+        lambda it: Evaluators("event").of(it).scenario,
+        lambda it: Case(it, (THREAT,)).scenario,
+        lambda it: LayoutPlan(it, ((1, 1),)).scenario,
+        lambda it: blast_env.Blast(it, seed=3).scenario,
+        lambda it: wall_near_charge(it, CHARGE),
+        lambda it: random_layout(it, np.random.default_rng(0)),
+        lambda it: layouts_by_rule(it, CHARGE),
+        lambda it: SiteMeasures.of(it),
+        lambda it: turned(it, 1),
+    ],
+)
+def test_name_path_and_scenario_mean_the_same(call: Callable[[Any], Any], tmp_path: Path) -> None:
+    path = tmp_path / "courtyard.toml"
+    blast_env.save_scenario(NAME, path)
+    plain = COURTYARD.model_dump(mode="json", exclude_none=True)
+    assert call(NAME) == call(str(path)) == call(path) == call(plain) == call(COURTYARD)
+
+
+def test_blasts_and_evaluations_of_a_path(tmp_path: Path) -> None:
+    path = tmp_path / "thin.toml"
+    blast_env.save_scenario(BALLISTIC_COURTYARD, path)
+    wall = [(10, 0), (11, 0)]
+    expected = blast_env.simulate(BALLISTIC_COURTYARD, wall, seed=5, engine="event").digest
+    assert blast_env.simulate(path, wall, seed=5, engine="event").digest == expected
+    blasts = [blast_env.Blast(str(path), wall, seed, "event") for seed in (5, 6)]
+    assert blast_env.simulate_many(blasts)[0].digest == expected
+    evaluations = [
+        blast_env.evaluate_layout(each, wall, seeds=(5,), engine="event")
+        for each in (path, BALLISTIC_COURTYARD)
+    ]
+    assert evaluations[0].to_dict() == evaluations[1].to_dict()
+
+
+def test_layout_files_for_a_name(tmp_path: Path) -> None:
+    path = blast_env.write_layout(tmp_path / "wall.json", NAME, [(1, 1)])
+    assert blast_env.load_layout(path, NAME) == blast_env.load_layout(path, COURTYARD) == ((1, 1),)
+
+
+def test_a_blast_stays_as_it_was_made() -> None:
+    blast = blast_env.Blast(NAME)
+    assert replace(blast, seed=2).scenario is blast.scenario
+    with pytest.raises(FrozenInstanceError):
+        blast.scenario = COURTYARD  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("make", [scenario_hash, blast_env.Blast, blast_env.simulate])
+def test_a_misspelt_name_is_answered_with_the_nearest(make: Callable[[str], object]) -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'courtyard'"):
+        make("courtyrad")
+
+
+@pytest.mark.parametrize("make", [scenario_hash, blast_env.Blast, blast_env.simulate])
+def test_anything_else_is_no_scenario(make: Callable[[Any], object]) -> None:
+    with pytest.raises(BlastEnvError, match="scenario is 3, must be a name, a path or a Scenario"):
+        make(3)
+    with pytest.raises(TypeError, match="missing 1 required positional argument"):
+        make()  # type: ignore[call-arg]

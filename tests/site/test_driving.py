@@ -1,0 +1,505 @@
+"""How fast a vehicle gets, against closed forms and simulated drives, and what its speed breaks."""
+
+from math import cos, hypot, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from blast_env.design.posts import line_of_posts
+from blast_env.geometry import Piece, Rectangle
+from blast_env.layout import Placement
+from blast_env.layout.build_scene import vehicle_drive, worst_places
+from blast_env.site import Scenario, ScenarioError, driving_kernels
+from blast_env.site.crash_rating import CrashRating
+from blast_env.site.driving import KM_H_PER_M_S, STEP_M, SpeedField
+from blast_env.site.driving_steps import (
+    DIRECTIONS,
+    LENGTHS,
+    NEVER,
+    Arcs,
+    all_arcs,
+    arcs_up_to,
+)
+from blast_env.site.sections import Site, VehicleSource
+from blast_env.site.vehicles import Obstacles, RatedPiece, VehicleGround
+from tests.vehicle_sites import gate_site, site_document, vehicle_document
+
+LORRY: dict[str, Any] = {
+    "mass_kg": 7200.0,
+    "max_speed_km_h": 90.0,
+    "acceleration_m_s2": 2.0,
+    "entry_speed_km_h": 0.0,
+    "grip": 0.7,
+}
+
+
+def ground(
+    width_m: float,
+    height_m: float,
+    entry: tuple[float, float],
+    drivable: list[tuple[float, float, float, float]],
+    **motion: Any,
+) -> VehicleGround:
+    """A site with roads (left, bottom, right, top) that a lorry of 2 m enters in the west."""
+    areas = [
+        {"corner_m": [left, bottom], "size_m": [right - left, top - bottom]}
+        for left, bottom, right, top in drivable
+    ]
+    low, high = entry
+    document = vehicle_document(
+        entries=[{"start_m": [0.0, low], "end_m": [0.0, high]}],
+        drivable=areas,
+        motion=LORRY | motion,
+    )
+    source = VehicleSource.model_validate(document)
+    return VehicleGround(source, Site(width_m=width_m, height_m=height_m), ())
+
+
+def speeds_of(ground: VehicleGround, obstacles: Obstacles | None = None) -> SpeedField:
+    speeds = ground.drive(obstacles or Obstacles()).speeds
+    assert speeds is not None
+    return speeds
+
+
+@pytest.mark.parametrize("entry_speed_km_h", [0.0, 40.0])
+@pytest.mark.parametrize("run_up_m", [10.0, 30.0, 60.0])
+def test_a_straight_run_up_gives_what_constant_acceleration_gives(
+    run_up_m: float, entry_speed_km_h: float
+) -> None:
+    road = ground(80.0, 6.0, (2.0, 4.0), [(0, 2, 80, 4)], entry_speed_km_h=entry_speed_km_h)
+    wall = Rectangle(run_up_m + 2.0, 2.0, run_up_m + 2.5, 4.0)
+    speed_km_h = speeds_of(road, Obstacles((wall,))).impact_km_h(wall)
+    exact = [
+        KM_H_PER_M_S * sqrt((entry_speed_km_h / KM_H_PER_M_S) ** 2 + 4.0 * metres)
+        for metres in (run_up_m, run_up_m + 2.0 * STEP_M)
+    ]
+    assert speed_km_h is not None
+    assert exact[0] - 1e-3 <= speed_km_h <= exact[1] + 1e-3
+
+
+def test_no_speed_is_above_the_largest() -> None:
+    road = ground(120.0, 6.0, (2.0, 4.0), [(0, 2, 120, 4)], max_speed_km_h=50.0)
+    assert np.nanmax(speeds_of(road).places_km_h) == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(("road_m", "most"), [(4.0, 1.35), (6.0, 1.2), (10.0, 1.2)])
+def test_a_corner_lets_through_what_grip_allows_on_the_widest_arc(
+    road_m: float, most: float
+) -> None:
+    """The widest arc touches both outer edges of the way of the centre and the inner corner."""
+    roads = [(0.0, 20.0, 40.0 + road_m, 20.0 + road_m), (40.0, 20.0, 40.0 + road_m, 60.0)]
+    corner = ground(
+        60.0,
+        60.0,
+        (20.0, 20.0 + road_m),
+        roads,
+        entry_speed_km_h=90.0,
+        acceleration_m_s2=0.1,
+    )
+    beyond = float(np.nanmax(speeds_of(corner).places_km_h[round(58.0 / STEP_M)]))
+    exact = KM_H_PER_M_S * sqrt(0.7 * 9.81 * (road_m - 2.0) * (2.0 + sqrt(2.0)))
+    assert exact <= beyond <= most * exact
+
+
+def test_a_speed_table_slows_what_comes_after_it() -> None:
+    table = {"corner_m": [30.0, 0.0], "size_m": [3.0, 6.0], "speed_km_h": 20.0, "reason": "table"}
+    road = ground(80.0, 6.0, (1.0, 5.0), [], entry_speed_km_h=60.0, slow=[table])
+    wall = Rectangle(63.0, 0.0, 63.5, 6.0)
+    speed_km_h = speeds_of(road, Obstacles((wall,))).impact_km_h(wall)
+    assert speed_km_h is not None
+    exact = [KM_H_PER_M_S * sqrt((20.0 / KM_H_PER_M_S) ** 2 + 4.0 * m) for m in (29.0, 33.5)]
+    assert exact[0] <= speed_km_h <= exact[1]
+
+
+boxes = st.lists(
+    st.tuples(st.integers(8, 36), st.integers(0, 26), st.integers(1, 6), st.integers(1, 12)),
+    max_size=5,
+)
+
+
+@settings(max_examples=8, deadline=None)
+@given(boxes=boxes, seed=st.integers(0, 999))
+def test_no_simulated_drive_is_faster_than_the_bound(
+    boxes: list[tuple[int, int, int, int]], seed: int
+) -> None:
+    """Drives with random steering, at the largest speed that it leaves, among random obstacles."""
+    yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
+    stops = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
+    places_km_h = speeds_of(yard, Obstacles(stops)).places_km_h
+    grown = np.array([each.grown(1.0 - 1e-9) for each in stops]).reshape(-1, 4)
+    rng = np.random.default_rng(seed)
+    drives, step_m, most = 600, 0.2, 0.7 * 9.81
+    x, y = np.full(drives, 1.0), rng.uniform(11.0, 19.0, drives)
+    heading = rng.uniform(-1.2, 1.2, drives)
+    square = np.full(drives, (30.0 / KM_H_PER_M_S) ** 2)
+    curvature = np.zeros(drives)
+    driving = np.ones(drives, dtype=bool)
+    for _ in range(400):
+        other = rng.choice([-1, 0, 1], drives) * rng.uniform(0, 0.25, drives)
+        curvature = np.where(rng.random(drives) < 0.05, other, curvature)
+        with np.errstate(divide="ignore"):
+            square = np.minimum(square + 4.0 * step_m, most / np.abs(curvature))
+        square = np.minimum(square, (90.0 / KM_H_PER_M_S) ** 2)
+        heading = heading + curvature * step_m
+        x, y = x + step_m * np.cos(heading), y + step_m * np.sin(heading)
+        inside = (x >= 1.0) & (x <= 44.0) & (y >= 1.0) & (y <= 29.0)
+        for left, bottom, right, top in grown:
+            inside &= (x <= left) | (x >= right) | (y <= bottom) | (y >= top)
+        driving &= inside
+        at = np.rint(y[driving] / STEP_M).astype(int), np.rint(x[driving] / STEP_M).astype(int)
+        assert (places_km_h[at] >= KM_H_PER_M_S * np.sqrt(square[driving]) - 0.01).all()
+
+
+@settings(max_examples=10, deadline=None)
+@given(boxes=boxes)
+def test_more_obstacles_never_make_a_vehicle_faster(boxes: list[tuple[int, int, int, int]]) -> None:
+    yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
+    stops = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
+    more = speeds_of(yard, Obstacles(stops)).run_up_m
+    fewer = speeds_of(yard, Obstacles(stops[:-1])).run_up_m
+    assert (more <= fewer).all()
+
+
+@settings(max_examples=10, deadline=None)
+@given(boxes=boxes, arc_step=st.sampled_from([2, 6, 50]))
+def test_fewer_arcs_never_make_a_vehicle_faster(
+    boxes: list[tuple[int, int, int, int]], arc_step: int
+) -> None:
+    yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
+    stops = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
+    every = speeds_of(yard, Obstacles(stops))
+    start = np.zeros_like(every.is_open)
+    start[20:41, :4] = True
+    some = [
+        SpeedField.of(every.motion, every.half_m, every.is_open, [(start, (1.0, 0.0))], step)
+        for step in (1, arc_step)
+    ]
+    assert (some[1].run_up_m <= some[0].run_up_m).all()
+    assert np.isnan(some[1].places_km_h).sum() == np.isnan(some[0].places_km_h).sum()
+
+
+@settings(max_examples=20, deadline=None)
+@given(boxes=boxes, over_km_h=st.lists(st.sampled_from([-0.1, 0.1]), min_size=5, max_size=5))
+def test_what_gives_way_is_what_a_full_search_of_every_round_says(
+    boxes: list[tuple[int, int, int, int]], over_km_h: list[float]
+) -> None:
+    """Ratings are just above or below the speed of a hit while all pieces stand."""
+    yard = ground(45.0, 30.0, (10.0, 20.0), [], entry_speed_km_h=30.0)
+    rectangles = tuple(Rectangle.from_corner((x, y), (a, b)) for x, y, a, b in boxes)
+    every = speeds_of(yard, Obstacles(rectangles))
+    held = tuple(
+        RatedPiece(each, CrashRating(mass_kg=7200.0, speed_km_h=km_h + over), f"piece {number}")
+        for number, (each, over) in enumerate(zip(rectangles, over_km_h, strict=False))
+        if (km_h := every.impact_km_h(each)) is not None
+    )
+    drive = yard.drive(Obstacles(rated=held))
+    broken: tuple[RatedPiece, ...] = ()
+    while True:
+        stops, solid = (tuple(each.rectangle for each in some) for some in (held, broken))
+        speeds = speeds_of(yard, Obstacles(stops, solid))
+        hits_km_h = [speeds.impact_km_h(each.rectangle) or 0.0 for each in held]
+        weak = [
+            each
+            for each, km_h in zip(held, hits_km_h, strict=True)
+            if km_h > each.rating.speed_km_h
+        ]
+        if not weak:
+            break
+        broken = (*broken, *weak)
+        held = tuple(each for each in held if each not in weak)
+    assert (drive.held, drive.broken) == (held, broken)
+
+
+def shifted(places: np.ndarray, x: int, y: int, outside: Any) -> np.ndarray:
+    """Return what is at the places that are x columns and y rows on; outside of all, a value."""
+    found = np.full_like(places, outside)
+    rows, columns = places.shape
+    if abs(y) < rows and abs(x) < columns:
+        found[max(0, -y) : rows - max(0, y), max(0, -x) : columns - max(0, x)] = places[
+            max(0, y) : rows - max(0, -y), max(0, x) : columns - max(0, -x)
+        ]
+    return found
+
+
+def spread_by_planes(
+    is_open: np.ndarray,
+    is_wide: np.ndarray,
+    most: np.ndarray,
+    labels: np.ndarray,
+    arcs: Arcs,
+    arc_most: np.ndarray,
+    slow_most: float,
+    spot_most: float,
+) -> None:
+    """Try every step from every place, again and again, until nothing rises."""
+    slow = most < most.max()
+    ways = []
+    for arc, begin in enumerate(arcs.first[:-1]):
+        points = arcs.points[begin : arcs.first[arc + 1]].tolist()
+        passable = np.logical_and.reduce([shifted(is_open, x, y, False) for x, y in points])
+        slowed = np.logical_or.reduce([shifted(slow, x, y, False) for x, y in points])
+        limit = np.where(slowed, min(arc_most[arc], np.float32(slow_most)), arc_most[arc])
+        ways.append((passable, limit))
+    before = None
+    while before is None or (before != labels).any():
+        before = labels.copy()
+        steps = []
+        for number, (x, y) in enumerate(DIRECTIONS.tolist()):
+            middles = [(x // 2, 0), (x // 2, y)] if abs(x) == 2 else [(0, y // 2), (x, y // 2)]
+            beside = np.logical_or(*(shifted(is_open, *each, False) for each in middles))
+            passable = shifted(is_open, x, y, False) & (beside | (max(abs(x), abs(y)) < 2))
+            steps.append((number, number, x, y, LENGTHS[number], passable, shifted(most, x, y, 0)))
+        for (one, other), (x, y), length, (passable, limit) in zip(
+            arcs.of.tolist(), arcs.ends.tolist(), arcs.lengths, ways, strict=True
+        ):
+            steps.append((one, other, x, y, length, passable, limit))
+        for one, other, x, y, length, passable, limit in steps:
+            value = np.minimum(labels[one] + length, limit).astype(np.float32)
+            value[~passable | (labels[one] < 0.0)] = NEVER
+            labels[other] = np.maximum(labels[other], shifted(value, -x, -y, NEVER))
+        spot = np.minimum(labels.max(axis=0), np.float32(spot_most))
+        labels[:] = np.where(is_wide, np.maximum(labels, spot), labels)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_step_raises_a_speed_any_further_and_none_is_raised_too_far(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bit for bit, among random walls and with ground that slows, against a search by planes."""
+    asked: list[tuple[Any, ...]] = []
+    spread = driving_kernels.spread
+
+    def noted(*args: Any) -> None:
+        asked.append((*args[:4], args[4].copy(), *args[5:]))
+        spread(*args)
+        asked.append((args[4].copy(),))
+
+    monkeypatch.setattr(driving_kernels, "spread", noted)
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform([4.0, 0.0], [34.0, 20.0], (4, 2)).round().tolist()
+    sides = rng.uniform(1.0, 7.0, (4, 2)).round().tolist()
+    stops = tuple(map(Rectangle.from_corner, map(tuple, corners), map(tuple, sides)))
+    table = {"corner_m": [12.0, 0.0], "size_m": [4.0, 22.0], "speed_km_h": 15.0, "reason": "table"}
+    slow = [table] * (seed % 2)
+    yard = ground(36.0, 22.0, (6.0, 14.0), [], entry_speed_km_h=30.0, slow=slow)
+    speeds_of(yard, Obstacles(stops))
+    (is_open, is_wide, _, most, labels, *_, arc_most, slow_most, spot_most), (found,) = asked
+    per_radius = arc_most[0] / all_arcs().radii[0]
+    arcs = arcs_up_to(float(most.max()) / per_radius)
+    assert len(arcs.of) == len(arc_most)
+    spread_by_planes(is_open, is_wide, most, labels, arcs, arc_most, slow_most, spot_most)
+    assert (found >= 0.0).mean() > 0.3
+    assert (found == labels).all()
+
+
+def test_a_grip_of_twice_as_much_takes_a_circle_root_two_times_as_fast() -> None:
+    """A yard of 20 m leaves circles of 9 m; a turn on them is all that limits the speed."""
+    fastest = []
+    for grip in (0.4, 0.8):
+        yard = ground(20.0, 20.0, (5.0, 15.0), [], grip=grip, acceleration_m_s2=9.0)
+        ring = speeds_of(yard, Obstacles((Rectangle(3.0, 3.0, 17.0, 17.0),)))
+        fastest.append(float(np.nanmax(ring.places_km_h[10:30, 3])))
+    assert 1.0 <= fastest[1] / fastest[0] <= sqrt(2.0) + 1e-3
+
+
+RATING = CrashRating(mass_kg=7200.0, speed_km_h=48.0)
+
+
+@pytest.mark.parametrize(
+    ("rating", "run_up_m", "holds"),
+    [
+        (RATING, 30.0, True),  # 39 km/h
+        (RATING, 60.0, False),  # 56 km/h
+        (CrashRating(mass_kg=7199.0, speed_km_h=96.0), 30.0, False),  # much more energy, too light
+        (CrashRating(mass_kg=30000.0, speed_km_h=32.0), 30.0, False),  # more energy, too slow
+    ],
+)
+def test_a_rated_piece_stops_what_is_no_heavier_and_no_faster(
+    rating: CrashRating, run_up_m: float, holds: bool
+) -> None:
+    road = ground(90.0, 6.0, (2.0, 4.0), [(0, 2, 90, 4)])
+    piece = RatedPiece(Rectangle(run_up_m + 2.0, 2.0, run_up_m + 2.5, 4.0), rating, "block")
+    drive = road.drive(Obstacles(rated=(piece,)))
+    assert (piece in drive.held) is holds
+    assert bool(drive.reach.places_m[:, 0].max() > run_up_m + 2.0) is not holds
+    (impact,) = drive.impacts
+    assert impact.holds is holds
+
+
+def test_a_piece_in_front_slows_nothing_but_one_that_narrows_the_way_may_save_the_next() -> None:
+    """A weak post is run over; a strong one that makes the lorry turn saves the weak one."""
+    road = ground(60.0, 12.0, (0.0, 12.0), [], entry_speed_km_h=50.0)
+    weak = RatedPiece(Rectangle(40.0, 0.0, 40.5, 12.0), RATING, "fence")
+    over = RatedPiece(Rectangle(20.0, 0.0, 20.5, 12.0), RATING, "first fence")
+    assert road.drive(Obstacles(rated=(weak, over))).broken
+    walls = (Rectangle(30.0, 0.0, 30.5, 9.5), Rectangle(36.0, 2.5, 36.5, 12.0))
+    assert road.drive(Obstacles(stops=walls, rated=(weak,))).held == (weak,)
+
+
+def test_what_gives_way_opens_the_run_up_to_the_next() -> None:
+    road = ground(90.0, 6.0, (2.0, 4.0), [(0, 2, 90, 4)], entry_speed_km_h=60.0)
+    pieces = tuple(
+        RatedPiece(Rectangle(x, 2.0, x + 0.5, 4.0), CrashRating(mass_kg=7200.0, speed_km_h=v), n)
+        for x, v, n in ((20.0, 48.0, "first"), (50.0, 64.0, "second"), (80.0, 96.0, "third"))
+    )
+    obstacles = Obstacles(rated=pieces)
+    drive = road.drive(obstacles)
+    assert [each.name for each in drive.broken] == ["first", "second"]
+    assert [each.name for each in drive.held] == ["third"]
+
+
+def rated_site(rating: Any, vehicle: dict[str, Any] | None = None, **motion: Any) -> Scenario:
+    """The gate's site with posts of one rating."""
+    post = {"name": "post", "length_modules": 1, "height_m": 1.0, "cost": 1.0, "stock": 16}
+    items = [post | {"crash_rating": rating}]
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": items}
+    drives = {"motion": LORRY | {"max_speed_km_h": 60.0, "entry_speed_km_h": 50.0} | motion}
+    return gate_site(vehicle_document(**drives, **(vehicle or {})), build_zone=zone)
+
+
+PIECES = tuple(Piece(row, 0, "post") for row in (0, 3, 6, 9, 12, 15))
+
+
+def test_stand_off_is_what_the_ratings_leave_and_explained() -> None:
+    strong, weak = (rated_site(f"V/7200[N2A]/{km_h}/90:0.0") for km_h in (64, 48))
+    assert worst_stand_off_m(strong) == pytest.approx(7.0)
+    assert worst_stand_off_m(weak) == pytest.approx(1.0)
+    (text,) = Placement.of(weak, PIECES).explain_vehicles()
+    assert "in at (1, " in text
+    assert "with 5" in text
+    assert "rated 7200 kg at 48 km/h (V/7200[N2A]/48/90:0.0)" in text
+    (text,) = Placement.of(strong, PIECES).explain_vehicles()
+    assert "comes as near as 7.0 m" in text
+    assert "through" not in text
+
+
+def worst_stand_off_m(scenario: Scenario) -> float:
+    (source,) = scenario.vehicles
+    placement = Placement.of(scenario, PIECES)
+    return worst_places(scenario, source, placement.layout).stand_off_m
+
+
+def test_the_load_of_a_stopped_vehicle_gets_as_far_as_the_penetration() -> None:
+    # The posts end at x = 4.5 m, and the hut begins at 10 m.
+    for penetration_m, stand_off_m in ((0.0, 7.0), (1.2, 4.3), (0.3, 5.0)):
+        site = rated_site(f"V/7200[N2A]/64/90:{penetration_m}")
+        assert worst_stand_off_m(site) == pytest.approx(stand_off_m)
+
+
+def test_without_a_speed_ratings_are_not_heeded() -> None:
+    site = rated_site("V/7200[N2A]/32/90:0.0")
+    assert worst_stand_off_m(site) == pytest.approx(1.0)
+    (source,) = site.vehicles
+    still = source.model_copy(update={"motion": None}).model_dump()
+    site = gate_site(still, build_zone=site.zone.model_dump())
+    assert worst_stand_off_m(site) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ("M30/P1", (6800.0, 48.0, 1.0)),
+        ("M50-P3", (6800.0, 80.0, 30.0)),
+        ("C7 50/P2".replace(" ", ""), (7200.0, 80.0, 7.0)),
+        ("V/7200[N2B]/80/90:0.7", (7200.0, 80.0, 0.7)),
+        ("V/7500[N3]/64/90.0/1.1/0", (7500.0, 64.0, 1.1)),
+        ("7500[N3]/80/90:2.3/4.0", (7500.0, 80.0, 2.3)),
+    ],
+)
+def test_codes_of_tests_are_read(code: str, expected: tuple[float, float, float]) -> None:
+    rating = CrashRating.model_validate(code)
+    assert (rating.mass_kg, rating.speed_km_h, rating.penetration_m) == expected
+
+
+@pytest.mark.parametrize("rating", ["K12", "M35/P1", "V/7200[N2A]/64", 7200.0])
+def test_what_is_no_code_is_refused_with_examples(rating: Any) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        rated_site(rating)
+    (problem,) = map(str, caught.value.problems)
+    assert problem.startswith("build_zone.items[0].crash_rating: is ")
+
+
+def test_a_rating_of_what_stops_nothing_is_refused() -> None:
+    post = {"name": "post", "length_modules": 1, "height_m": 1.0, "cost": 1.0, "stock": 16}
+    hedge = post | {"name": "hedge", "stops_vehicles": False, "crash_rating": "M30/P1"}
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": [post, hedge]}
+    with pytest.raises(ScenarioError, match=r"items\[1\].*must be left out"):
+        gate_site(build_zone=zone)
+
+
+def test_words_of_a_test_and_of_a_slow_area_count_for_no_hash() -> None:
+    table = {"corner_m": [1.0, 0.0], "size_m": [2.0, 8.0], "speed_km_h": 15.0}
+    hashes = {
+        rated_site(rating, slow=[table | {"reason": reason}]).content_hash
+        for rating in ("V/7200[N2A]/64/90:0.0", {"mass_kg": 7200.0, "speed_km_h": 64.0})
+        for reason in ("speed table", "hump")
+    }
+    assert len(hashes) == 1
+    assert rated_site("V/7200[N2A]/48/90:0.0").content_hash not in hashes
+
+
+def test_a_gate_with_a_rating_gives_way_to_what_is_faster() -> None:
+    gate = {"corner_m": [4.0, 3.0], "size_m": [0.5, 2.0], "crash_rating": "V/7200[N2A]/32/90:0"}
+    way = {"width_m": 2.0, "between": "left_right", "gate": gate}
+    zone = site_document()["build_zone"] | {"access_way": way}
+    posts = tuple((row, 0) for row in (0, 3, 5, 10, 12, 15))
+    for motion, stand_off_m in ((None, 7.0), (LORRY | {"entry_speed_km_h": 50.0}, 1.0)):
+        scenario = gate_site(vehicle_document(motion=motion), build_zone=zone)
+        (source,) = scenario.vehicles
+        assert worst_places(scenario, source, posts).stand_off_m == pytest.approx(stand_off_m)
+
+
+def test_the_way_leads_from_the_entry_to_the_worst_place_in_short_steps() -> None:
+    site = rated_site("V/7200[N2A]/64/90:0.0")
+    (source,) = site.vehicles
+    drive = vehicle_drive(site, source, PIECES)
+    way, through = drive.weakest_way
+    assert through == ()
+    assert way[0].place_m[0] <= 1.25
+    assert hypot(*np.subtract(way[-1].place_m, drive.worst.places_m[0])) <= 1.0
+    assert all(point.speed_km_h <= 60.0 + 1e-3 for point in way)
+
+
+def test_a_lane_at_any_angle_is_as_fast_as_straight() -> None:
+    """Sixteen directions: whatever lies between two of them costs little in open ground."""
+    yard = ground(60.0, 60.0, (20.0, 40.0), [], entry_speed_km_h=0.0)
+    places_km_h = speeds_of(yard).places_km_h
+    for angle in np.linspace(-pi / 3, pi / 3, 13):
+        x, y = 1.0 + 25.0 * cos(angle), 30.0 + 25.0 * sin(angle)
+        exact = KM_H_PER_M_S * sqrt(4.0 * 25.0)
+        assert places_km_h[round(y / STEP_M), round(x / STEP_M)] >= exact - 1.5
+
+
+def test_the_rule_of_posts_takes_those_that_hold() -> None:
+    """Light posts are cheaper, but rated for less than the lorry's speed on its way to them."""
+    light = {"name": "light", "length_modules": 1, "height_m": 1.0, "cost": 1.0, "stock": 16}
+    heavy = light | {"name": "heavy", "cost": 3.0, "crash_rating": "V/7200[N2A]/64/90:0.0"}
+    zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4}
+    taken = []
+    for km_h in (32, 64):
+        items = [light | {"crash_rating": f"V/7200[N2A]/{km_h}/90:0.0"}, heavy]
+        motion = LORRY | {"max_speed_km_h": 60.0, "entry_speed_km_h": 50.0}
+        site = gate_site(vehicle_document(motion=motion), build_zone=zone | {"items": items})
+        posts = line_of_posts(site)
+        taken.append({each.item for each in posts if isinstance(each, Piece)})
+    assert taken == [{"heavy"}, {"light"}]
+
+
+def test_the_way_names_all_that_it_breaks_through_in_that_order() -> None:
+    """On a straight road, and where the last of the way is one long arc."""
+    yard = ground(60.0, 40.0, (2.0, 12.0), [], entry_speed_km_h=40.0)
+    hut = gate_site().structures[0].model_copy(update={"corner_m": (56.0, 24.0)})
+    site = VehicleGround(yard.source, yard.site, (hut,))
+    fences = tuple(
+        RatedPiece(
+            Rectangle(x, 0.0, x + 0.5, 40.0), CrashRating(mass_kg=3500.0, speed_km_h=32.0), n
+        )
+        for x, n in ((15.0, "first"), (30.0, "second"), (45.0, "third"))
+    )
+    way, through = site.drive(Obstacles(rated=fences)).weakest_way
+    assert [each.piece.name for each in through] == ["first", "second", "third"]
+    assert "first" in site.explain(Obstacles(rated=fences))
+    assert way[-1].place_m[0] > 46.0

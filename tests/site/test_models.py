@@ -1,0 +1,274 @@
+import math
+import pickle
+from functools import partial
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from blast_env.errors import BlastEnvError
+from blast_env.layout import usable_cells
+from blast_env.site import (
+    PointSource,
+    RectangleSource,
+    Scenario,
+    ScenarioError,
+    SegmentSource,
+    Site,
+    load_scenario,
+)
+from blast_env.site.parameters import preset
+from blast_env.site.scene import Charge
+from tests.site.documents import (
+    Document,
+    KeyPath,
+    changed,
+    full_document,
+    minimal_document,
+    without,
+)
+
+
+def scenario_from(document: Document) -> Scenario:
+    return Scenario.from_document(document, "test")
+
+
+def test_point_source_is_always_there() -> None:
+    source = PointSource(tnt_kg=1.0, position_m=(3.0, 4.0))
+    assert source.sample_position_m(np.random.default_rng(0)) == (3.0, 4.0)
+
+
+def test_segment_source_reaches_all_of_the_segment_and_nothing_else() -> None:
+    source = SegmentSource(kind="segment", tnt_kg=1.0, start_m=(1.0, 2.0), end_m=(5.0, 10.0))
+    rng = np.random.default_rng(0)
+    points = np.array([source.sample_position_m(rng) for _ in range(500)])
+    assert np.allclose(points[:, 1], 2.0 * points[:, 0])
+    assert points[:, 0].min() < 1.1
+    assert points[:, 0].max() > 4.9
+    assert ((points[:, 0] >= 1.0) & (points[:, 0] <= 5.0)).all()
+
+
+def test_rectangle_source_reaches_all_of_the_rectangle_and_nothing_else() -> None:
+    source = RectangleSource(kind="rectangle", tnt_kg=1.0, corner_m=(1.0, 2.0), size_m=(4.0, 8.0))
+    rng = np.random.default_rng(0)
+    points = np.array([source.sample_position_m(rng) for _ in range(500)])
+    assert np.allclose(points.min(axis=0), [1.0, 2.0], atol=0.1)
+    assert np.allclose(points.max(axis=0), [5.0, 10.0], atol=0.1)
+    assert (points >= [1.0, 2.0]).all()
+    assert (points <= [5.0, 10.0]).all()
+
+
+def test_sources_are_drawn_by_their_weights() -> None:
+    document = minimal_document()
+    document["charge"] = [
+        {"kind": "point", "position_m": [3.0, 5.0], "tnt_kg": 1.0, "weight": 3.0},
+        {"kind": "point", "position_m": [4.0, 5.0], "tnt_kg": 2.0},
+    ]
+    scenario, rng = scenario_from(document), np.random.default_rng(0)
+    charges = [scenario.sample_charge(rng) for _ in range(2000)]
+    assert set(charges) == {Charge((3.0, 5.0), 1.0), Charge((4.0, 5.0), 2.0)}
+    assert charges.count(Charge((3.0, 5.0), 1.0)) / 2000 == pytest.approx(0.75, abs=0.04)
+
+
+def test_charge_of_a_seed_is_reproducible() -> None:
+    scenario = scenario_from(full_document())
+    first, second = (scenario.sample_charge(np.random.default_rng(7)) for _ in range(2))
+    assert first == second
+
+
+def test_charge_radius_is_that_of_the_fan_with_its_balls() -> None:
+    # Offset 1 unit and radius 1 unit; 4 units are a metre.
+    assert scenario_from(minimal_document()).charge_radius_m == 0.5
+
+
+def test_values_in_code_are_as_strict_as_in_files() -> None:
+    with pytest.raises(ValidationError):
+        Site.model_validate({"width_m": "10", "height_m": 10.0})
+    with pytest.raises(ValidationError):
+        Site(width_m=math.inf, height_m=10.0)
+
+
+def test_structures_of_a_scenario_made_in_code_may_not_overlap() -> None:
+    document = full_document()
+    document["structures"][1]["corner_m"] = [21.0, 11.0]
+    with pytest.raises(ValidationError, match="overlaps"):
+        Scenario.model_validate(document)
+
+
+def test_scenario_survives_pickling() -> None:
+    scenario = scenario_from(full_document())
+    assert pickle.loads(pickle.dumps(scenario)) == scenario
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("site", "width_m"), 31.0),
+        (("charge", 0, "tnt_kg"), 51.0),
+        (("structures", 0, "weight"), 2.0),
+        (("structures", 1, "module_capacity"), 501.0),
+        (("build_zone", "stock"), 13),
+        (("build_zone", "keep_outs", 0, "size_m"), [4.0, 1.0]),
+        (("build_zone", "clearance_m"), 1.0),
+        (("build_zone", "module_cost"), 2.5),
+        (("build_zone", "cost_areas", 0, "module_cost"), 6.0),
+        (("build_zone", "budget"), 41.0),
+        (("build_zone", "access_way", "between"), "bottom_top"),
+        (("simulation", "overrides", "air", "jitter"), 0.3),
+        (("calibration",), "another"),
+    ],
+)
+def test_hash_changes_with_what_affects_a_result(path: KeyPath, value: object) -> None:
+    other = changed(full_document(), path, value)
+    assert scenario_from(other).content_hash != scenario_from(full_document()).content_hash
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("name",), "other"),
+        (("description",), "Other words."),
+        (("build_zone", "keep_outs", 0, "reason"), "other"),
+        (("build_zone", "cost_areas", 0, "reason"), "other"),
+        (("site", "width_m"), 30.0),  # written as 30
+        (("structures", 1, "protected"), False),  # the default
+        (("simulation", "overrides", "air", "mass"), 0.79),  # the preset's value
+    ],
+)
+def test_hash_ignores_words_and_ways_of_writing(path: KeyPath, value: object) -> None:
+    other = changed(full_document(), path, value)
+    assert scenario_from(other).content_hash == scenario_from(full_document()).content_hash
+
+
+def test_hash_ignores_the_sign_of_zero() -> None:
+    document = changed(minimal_document(), ("structures", 0, "corner_m"), [10.0, 0.0])
+    negative = changed(document, ("structures", 0, "corner_m"), [10.0, -0.0])
+    assert scenario_from(document).content_hash == scenario_from(negative).content_hash
+
+
+@pytest.mark.parametrize("distance_m", [15.0, 30.0, 60.0, 90.0, 120.0, 0.75])
+def test_stand_off_is_the_distance_from_charge_to_facade(distance_m: float) -> None:
+    original = load_scenario("free_field")
+    scenario = original.at_stand_off(distance_m)
+    building = scenario.structures[0].rectangle_m
+    source = scenario.charge[0]
+    assert isinstance(source, PointSource)
+    assert building.left - source.position_m[0] == distance_m
+    assert building.bottom == original.structures[0].rectangle_m.bottom
+    assert scenario.site.width_m - building.right == 10.0
+    assert scenario.site.height_m == original.site.height_m
+
+
+def test_same_stand_off_is_the_same_scenario() -> None:
+    scenario = load_scenario("free_field")
+    assert scenario.at_stand_off(30.0) == scenario
+    assert scenario.at_stand_off(120.0).at_stand_off(30.0) == scenario
+    assert scenario.at_stand_off(31.0).content_hash != scenario.content_hash
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "words"),
+    [
+        (0.25, "must keep clear of it by 0.5 m"),
+        (1e6, "must be at most 2000"),
+        (math.inf, "must be a finite number"),
+    ],
+)
+def test_stand_off_out_of_bounds_is_named(distance_m: float, words: str) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        load_scenario("free_field").at_stand_off(distance_m)
+
+
+@pytest.mark.parametrize("distance_m", [0.0, -15.0, math.nan])
+def test_stand_off_must_be_positive(distance_m: float) -> None:
+    with pytest.raises(BlastEnvError, match="must be greater than 0"):
+        load_scenario("free_field").at_stand_off(distance_m)
+
+
+def test_stand_off_needs_one_point_and_one_structure() -> None:
+    segment = {"kind": "segment", "start_m": [3.0, 3.0], "end_m": [3.0, 7.0], "tnt_kg": 1.0}
+    for document in (full_document(), changed(minimal_document(), ("charge", 0), segment)):
+        with pytest.raises(BlastEnvError, match="one point charge and one structure"):
+            scenario_from(document).at_stand_off(15.0)
+
+
+def test_stand_off_needs_the_structure_on_the_right() -> None:
+    document = changed(minimal_document(), ("charge", 0, "position_m"), [18.0, 5.0])
+    with pytest.raises(BlastEnvError, match="to the right of the charge"):
+        scenario_from(document).at_stand_off(15.0)
+
+
+def test_optional_sections_may_be_left_out() -> None:
+    scenario = scenario_from(without(full_document(), ("build_zone",)))
+    assert scenario.build_zone is None
+
+
+def test_strip_behind_the_structure_keeps_its_width() -> None:
+    scenario = scenario_from(minimal_document()).at_stand_off(20.0)
+    # 3 m before the charge, 20 m, 2 m of structure, 8 m behind it.
+    assert scenario.site.width_m == 33.0
+
+
+def test_another_charge_replaces_the_threat_and_changes_the_hash() -> None:
+    scenario = load_scenario("courtyard")
+    fixed = scenario.with_charge(Charge((8.0, 15.0), 50.0))
+    drawn = fixed.sample_charge(np.random.default_rng(0))
+    assert drawn == Charge((8.0, 15.0), 50.0)
+    assert fixed.content_hash != scenario.content_hash
+    with pytest.raises(ScenarioError, match="building"):
+        scenario.with_charge(Charge((28.0, 15.0), 50.0))
+
+
+def test_other_parameters_are_added_to_the_scenario_s_own() -> None:
+    scenario = load_scenario("courtyard")
+    changed = scenario.with_simulation(overrides={"air": {"mass": 0.2}})
+    again = changed.with_simulation(overrides={"air": {"spacing_units": 6.0}})
+    assert (again.parameters.air.mass, again.parameters.air.spacing_units) == (0.2, 6.0)
+    assert scenario.parameters.air.mass == preset("collisional").air.mass
+    with pytest.raises(ScenarioError, match="did you mean 'mass'"):
+        scenario.with_simulation(overrides={"air": {"mas": 0.2}})
+    with pytest.raises(ScenarioError, match="did you mean 'ballistic'"):
+        scenario.with_simulation(preset="balistic")
+
+
+@pytest.mark.parametrize(
+    "charge",
+    [
+        Charge((20.5, 8.5), 50.0),  # in a structure
+        Charge((0.0, 15.0), 50.0),  # on the border
+        Charge((10.0, 8.0), 50.0),  # in the build zone: fewer usable cells than modules
+        Charge((8.0, 15.0), -1.0),
+        Charge((8.0, 15.0), 1e-6),
+        Charge((float("nan"), 15.0), 50.0),
+        Charge((20.5, 8.5), float("inf")),
+    ],
+)
+def test_a_charge_that_does_not_fit_has_the_problems_of_the_whole_document(charge: Charge) -> None:
+    """`with_charge` checks the charge alone, and must find all that a file with it would have."""
+    full = full_document()
+    full["build_zone"]["stock"] = usable_cells(scenario_from(full)).sum().item()
+    scenario = scenario_from(full)
+    document = scenario.model_dump()
+    point = {"kind": "point", **charge._asdict()}
+    for change, sources in (
+        (partial(scenario.with_charge, charge), [point]),
+        (partial(scenario.with_possible_charges, [charge]), [*document["charge"], point]),
+    ):
+        changes = {"charge": sources}
+        with pytest.raises(ScenarioError) as expected:
+            Scenario.from_document(document | changes, scenario.name)
+        with pytest.raises(ScenarioError) as found:
+            change()
+        assert str(found.value) == str(expected.value)
+
+
+def test_a_copy_has_a_hash_of_its_own() -> None:
+    """The hash is computed once for each scenario, and copies take over what a scenario holds."""
+    scenario = load_scenario("courtyard")
+    before = scenario.content_hash
+    lighter = tuple(each.model_copy(update={"tnt_kg": 50.0}) for each in scenario.charge)
+    copied = scenario.model_copy(update={"charge": lighter})
+    assert copied.content_hash != before
+    assert copied.model_copy(update={"charge": scenario.charge}).content_hash == before
+    assert scenario == load_scenario("courtyard")
+    assert copied != scenario

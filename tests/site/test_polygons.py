@@ -1,0 +1,262 @@
+"""Buildings as polygons: errors with their places, and all that a site does with them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from ezdxf.entities.lwpolyline import LWPolyline
+from ezdxf.filemanagement import readfile
+
+from blast_env.app.edits import SiteThing, ThingKind, moved, resized, section_of
+from blast_env.app.page.fields import fields_of, value_of
+from blast_env.app.solids import boxes
+from blast_env.calibration import load_calibration
+from blast_env.envs.display import placing_text
+from blast_env.evaluation.engines import Blast, find_engine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.governing import Severity
+from blast_env.geometry import Layout
+from blast_env.io.export import LayoutPlan, export_layout
+from blast_env.io.export.dxf import clearance_outlines
+from blast_env.layout import Placement, usable_cells
+from blast_env.layout.build_scene import build_scene, vehicle_reach, worst_places
+from blast_env.plots.facade import damage_view
+from blast_env.plots.plan import Kinds, site_features
+from blast_env.plots.site_picture import site_picture
+from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.site.scene import Charge
+from blast_env.site.worst_places import stand_off_m
+from blast_env.sites.turning import turned
+from tests.gas_sites import site_document
+from tests.vehicle_sites import gate_site, vehicle_of
+
+OUTLINE = [(6.0, 3.0), (8.9, 2.2), (9.4, 5.0), (8.0, 5.0), (8.0, 6.2), (6.6, 6.0)]
+COURT = [(7.0, 3.6), (8.0, 3.6), (8.0, 4.6), (7.0, 4.6)]
+
+
+def with_polygon(**changes: Any) -> dict[str, Any]:
+    document = site_document()
+    section = {
+        "kind": "polygon",
+        "name": "museum",
+        "outline_m": OUTLINE,
+        "height_m": 2.0,
+        "protected": True,
+    }
+    document["structures"] = [section | changes]
+    return document
+
+
+def museum(**changes: Any) -> Scenario:
+    return Scenario.from_document(with_polygon(**changes), "museum")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        (
+            {"outline_m": [(6.0, 3.0), (9.0, 5.0), (9.0, 3.0), (6.0, 5.0)]},
+            "structures[0].outline_m",
+            "crosses or touches itself at (7.5, 4) m",
+        ),
+        (
+            {"outline_m": [(6.0, 3.0), (11.0, 3.0), (9.0, 5.0)]},
+            "structures[0]",
+            "must lie inside the site (x 0 to 10",
+        ),
+        (
+            {"outline_m": [(6.3, 3.3), (6.4, 3.3), (6.4, 3.4)]},
+            "structures[0].outline_m",
+            "encloses 0.005 m2 and the centre of no module",
+        ),
+        ({"outline_m": [(6.0, 3.0), (7.0, 3.0)]}, "structures[0].outline_m", "at least 3"),
+        (
+            {"courtyards_m": [[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]]},
+            "structures[0].outline_m",
+            "must lie inside the outline",
+        ),
+        ({"rows": 3}, "structures[0].rows", "unknown"),
+        ({"outline_m": [(1.0, 3.0), (9.0, 3.0), (9.0, 5.0), (1.0, 5.0)]}, "charge[0]", "museum"),
+    ],
+)
+def test_errors_name_value_bound_and_place(changes: dict[str, Any], key: str, words: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        museum(**changes)
+    found = [each for each in caught.value.problems if each.key == key]
+    assert found, caught.value
+    assert any(words in each.message for each in found), caught.value
+
+
+def test_overlaps_are_of_modules_not_of_rectangles_around() -> None:
+    """A hut in the corner of an L-shaped building stands free."""
+    document = with_polygon(outline_m=[(6, 2), (9, 2), (9, 3), (7, 3), (7, 6), (6, 6)])
+    document["structures"][0]["outline_m"] = [
+        (6.0, 2.0),
+        (9.0, 2.0),
+        (9.0, 3.0),
+        (7.0, 3.0),
+        (7.0, 6.0),
+        (6.0, 6.0),
+    ]
+    hut = {"kind": "ModularObstacle", "name": "hut", "rows": 2, "columns": 2, "height_m": 2.0}
+    document["structures"].append(hut | {"corner_m": [8.0, 4.0]})
+    Scenario.from_document(document, "free")
+    document["structures"][1]["corner_m"] = [6.5, 4.0]
+    with pytest.raises(ScenarioError, match="overlaps"):
+        Scenario.from_document(document, "not free")
+
+
+def test_files_hold_it(tmp_path: Path) -> None:
+    scenario = museum(courtyards_m=[COURT])
+    path = tmp_path / "museum.toml"
+    save_scenario(scenario, path)
+    again = load_scenario(path)
+    assert again == scenario
+    assert again.content_hash == scenario.content_hash != museum().content_hash
+
+
+def test_legality_and_clearance_keep_to_the_walls() -> None:
+    """Cells in the notch of an L are free; the rectangle around it would close them."""
+    ell = [(4.5, 2.5), (8.0, 2.5), (8.0, 5.5), (6.0, 5.5), (6.0, 3.5), (4.5, 3.5)]
+    document = with_polygon(outline_m=ell)
+    document["build_zone"]["stock"] = 2
+    scenario = Scenario.from_document(document, "notch")
+    assert usable_cells(scenario).sum() == 12 - 2
+    document["build_zone"]["clearance_m"] = 0.6
+    assert usable_cells(Scenario.from_document(document, "clearance")).sum() < 12 - 2
+
+
+def test_a_vehicle_reaches_the_wall_itself() -> None:
+    """The stand-off is to the slanting wall, not to the rectangle around it."""
+    building = {
+        "kind": "polygon",
+        "name": "wedge",
+        "outline_m": [(13.0, 1.0), (13.0, 7.0), (10.0, 7.0)],
+        "height_m": 2.0,
+        "protected": True,
+    }
+    scenario = gate_site(structures=[building])
+    source = vehicle_of(scenario)
+    places = worst_places(scenario, source)
+    assert vehicle_reach(scenario, source).enters
+    assert places.stand_off_m == pytest.approx(1.0, abs=0.45)
+    assert stand_off_m(scenario.structures, (10.0, 1.0)) == pytest.approx(3.0 * 6.0 / 45**0.5)
+
+
+def test_particles_hit_its_modules() -> None:
+    scenario = museum(courtyards_m=[COURT])
+    (structure,) = scenario.structures
+    scene = build_scene(scenario)
+    (obstacle,) = scene.obstacles()
+    assert len(obstacle.parts) == structure.modules
+    result = Blast(scenario, charge=Charge((2.0, 4.0), 5.0), engine="event").run()
+    loads = result.loads(load_calibration("ballistic_ufc", "event"))
+    assert loads.are_for(scenario)
+    assert loads.structures[0].impulse_sim > 0.0
+
+
+def test_gas_loads_every_wall_and_the_courtyard() -> None:
+    scenario = museum(courtyards_m=[COURT])
+    result = GasBlast(scenario, engine=GasEngine(border_m=0.0, until=0.02)).run()
+    loads = result.loads()
+    assert loads.are_for(scenario)
+    footprint = scenario.structures[0].footprint
+    assert footprint is not None
+    perimeter_m = footprint.polygon.length
+    assert loads.structures[0].area_m2 == pytest.approx(2.0 * perimeter_m, rel=0.08)
+    walls = result.run.table.wall[result.run.table.structure == 0]
+    assert set(range(len(footprint.walls))) <= set(walls.tolist())
+    by_face = result.walls.set_index("face")["impulse_pa_s"]
+    assert by_face["west"] > by_face["east"]
+
+
+def test_the_worst_charge_is_guessed_as_for_a_rectangle() -> None:
+    """By the open impulse on points of the walls, which the modules before them do not hide."""
+    ring = [(6.0, 3.0), (8.0, 3.0), (8.0, 5.0), (6.0, 5.0)]
+    plain, own = (
+        Severity.in_the_open(each, Charge((2.0, 4.0), 5.0)).load
+        for each in (Scenario.from_document(site_document(), "hut"), museum(outline_m=ring))
+    )
+    assert own == pytest.approx(plain, rel=0.2)
+
+
+def test_the_surrogate_knows_its_walls() -> None:
+    """A slanted wall has the load of points along it; the area is that of the walls."""
+    loads = find_engine("surrogate").loads(museum(), (), Charge((2.0, 4.0), 5.0), 0)
+    plain = find_engine("surrogate").loads(
+        museum(outline_m=[(6.0, 3.0), (9.0, 3.0), (9.0, 6.0), (6.0, 6.0)]),
+        (),
+        Charge((2.0, 4.0), 5.0),
+        0,
+    )
+    assert loads.protected_impulse_pa_s == pytest.approx(plain.protected_impulse_pa_s, rel=0.5)
+
+
+def test_pictures_and_drawings_show_the_outline(tmp_path: Path) -> None:
+    scenario = museum(courtyards_m=[COURT], facade={"wall": "brick_215", "bay_m": 1.0})
+    (feature,) = (
+        each for each in site_features(scenario) if each.kind is Kinds.PROTECTED_STRUCTURE
+    )
+    assert set(feature.places_m) == set(OUTLINE)
+    assert {place for hole in feature.holes_m for place in hole} == set(COURT)
+    layout: Layout = ((0, 0),)
+    site_picture(scenario, layout)
+    assert "P" in placing_text(Placement.of(scenario, layout), scenario.charge)
+    assert len([each for each in boxes(scenario, layout) if each.name == "museum"]) > 1
+    path = tmp_path / "museum.dxf"
+    export_layout(LayoutPlan(scenario, layout), path)
+    lines = readfile(path).modelspace().query("LWPOLYLINE[layer=='PROTECTED_STRUCTURE']")
+    assert sorted(len(list(each.vertices())) for each in lines if isinstance(each, LWPolyline)) == [
+        4,
+        6,
+    ]
+
+
+def test_drawings_have_the_clearance_around_its_modules_and_in_courtyards() -> None:
+    document = with_polygon(courtyards_m=[[(7.0, 3.6), (8.6, 3.6), (8.6, 4.9), (7.0, 4.9)]])
+    document["build_zone"]["clearance_m"] = 0.3
+    scenario = Scenario.from_document(document, "clear")
+    rings = [
+        shapely.LinearRing([(x, y) for x, y, _ in ring])
+        for ring in clearance_outlines(LayoutPlan(scenario, ()))
+    ]
+    modules = shapely.union_all([shapely.box(*box) for box in scenario.structures[0].boxes_m])
+    assert len(rings) == 2
+    for ring in rings:
+        places = shapely.points(shapely.get_coordinates(ring))
+        assert shapely.distance(places, modules) == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_facade_is_set_once_for_all_walls() -> None:
+    scenario = museum(facade={"wall": "brick_215", "bay_m": 1.0})
+    names = [each.bay.name for each in scenario.bays]
+    assert len(names) == len(set(names))
+    assert {each.bay.wall for each in scenario.bays} == {"west", "east", "south", "north"}
+    result = GasBlast(scenario, engine=GasEngine(border_m=0.0, until=0.02)).run()
+    assert not result.unjudged
+    assert len(result.bays)
+    damage_view(scenario, [("view", (), [])], "museum")
+
+
+def test_the_page_edits_what_a_polygon_has() -> None:
+    scenario, thing = museum(), SiteThing(ThingKind.STRUCTURE, 0)
+    section = section_of(scenario, thing)
+    values = {each.label: value_of(section, each) for each in fields_of(scenario, thing)}
+    assert values["height (m)"] == 2.0
+    assert "left (m)" not in values
+    assert resized(scenario, thing, (9.0, 7.0)) == scenario
+
+
+def test_turning_and_moving_keep_its_modules() -> None:
+    scenario = museum(courtyards_m=[COURT])
+    modules = scenario.structures[0].modules
+    assert turned(scenario, 1).structures[0].modules == pytest.approx(modules, abs=2)
+    assert turned(scenario, 4).structures[0].modules == modules
+    aside = moved(scenario, SiteThing(ThingKind.STRUCTURE, 0), (-0.5, 0.5))
+    assert aside.structures[0].modules == modules
+    assert np.subtract(aside.structures[0].corner_m, scenario.structures[0].corner_m).tolist() == [
+        -0.5,
+        0.5,
+    ]

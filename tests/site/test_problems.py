@@ -1,0 +1,170 @@
+import pickle
+
+import pytest
+from pydantic import ValidationError
+
+from blast_env.site import Problem, Scenario, ScenarioError
+from blast_env.site.problems import MAX_PROBLEMS
+from tests.site.documents import (
+    KeyPath,
+    changed,
+    full_document,
+    lines_for,
+    minimal_document,
+    without,
+)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "line"),
+    [
+        (("structures", 0, "rows"), -3, "structures[0].rows: is -3, must be at least 1"),
+        (("structures", 0, "rows"), 2.0, "structures[0].rows: is 2.0, must be a whole number"),
+        (("structures", 0, "weight"), 0, "structures[0].weight: is 0, must be greater than 0"),
+        (("site", "width_m"), "ten", "site.width_m: is 'ten' (a string), must be a number"),
+        (("site", "width_m"), "10", "site.width_m: is '10' (a string), must be a number"),
+        (("site", "width_m"), True, "site.width_m: is true (a truth value), must be a number"),
+        (("site", "width_m"), [], "site.width_m: is an array, must be a number"),
+        (("site", "width_m"), 2000.5, "site.width_m: is 2000.5, must be at most 2000"),
+        (("site", "width_m"), float("nan"), "site.width_m: is nan, must be a finite number"),
+        (("site", "width_m"), 16**300, "site.width_m: is an integer of about 362 digits, which"),
+        (("site",), 3, "site: is 3, must be a table"),
+        (("structures",), [], "structures: has 0 values, must have at least 1"),
+        (("structures",), {}, "structures: is a table, must be an array (for a list of tables"),
+        (("structures", 1, "protected"), "yes", "structures[1].protected: is 'yes' (a string), mu"),
+        (("structures", 1, "name"), "a b", "structures[1].name: is 'a b', must be 1 to 40 letter"),
+        (("structures", 1, "kind"), "ConcretSquare", "did you mean 'ConcreteSquare'?"),
+        (("structures", 1, "kind"), 7, "structures[1].kind: is 7, must be 'ModularObstacle',"),
+        (("charge", 0, "position_m"), [1, 2, 3], "charge[0].position_m: has 3 values, must have"),
+        (("charge", 0, "position_m"), [1.0], "charge[0].position_m[1]: missing"),
+        (("charge", 0, "position_m"), [1, "a"], "charge[0].position_m[1]: is 'a' (a string), mus"),
+        (("schema_version",), 1, "schema_version: is 1, must be 2, the version of this release"),
+        (("schema_version",), True, "schema_version: is true (a truth value), must be a whole"),
+        (("simulation", "preset"), "balistic", "simulation.preset: is 'balistic', there is no su"),
+        (("simulation", "preset"), "balistic", "did you mean 'ballistic'?"),
+        (("simulation", "overrides"), 1, "simulation.overrides: is 1, must be a table"),
+        (("simulation", "overrides", "air"), 1, "simulation.overrides.air: is 1, must be a table"),
+        (
+            ("simulation", "overrides", "air", "jitter"),
+            1.5,
+            "simulation.overrides.air.jitter: is 1.5, must be at most 1",
+        ),
+        (
+            ("simulation", "overrides", "air", "jitter"),
+            "1",
+            "simulation.overrides.air.jitter: is '1' (a string), must be a number",
+        ),
+        (
+            ("simulation", "overrides", "explosive", "fan_phase"),
+            "randm",
+            "is 'randm', must be 'fixed' or 'random', did you mean 'random'?",
+        ),
+        (("build_zone", "keep_outs", 0, "reason"), "", "reason: has 0 characters, must have at le"),
+    ],
+)
+def test_bad_value_is_named_with_its_bound(path: KeyPath, value: object, line: str) -> None:
+    lines = lines_for(changed(full_document(), path, value))
+    assert any(line in each for each in lines), lines
+    assert all(each.startswith("f.toml: ") for each in lines)
+
+
+@pytest.mark.parametrize(
+    ("path", "line"),
+    [
+        (("site", "widht_m"), "f.toml: site.widht_m: unknown key, did you mean 'width_m'?"),
+        (("srtuctures",), "f.toml: srtuctures: unknown key, did you mean 'structures'?"),
+        (
+            ("charge", 1, "strat_m"),
+            "f.toml: charge[1].strat_m: unknown key, did you mean 'start_m'?",
+        ),
+        (
+            ("simulation", "overrides", "air", "spacing_unit"),
+            "f.toml: simulation.overrides.air.spacing_unit: unknown key,"
+            " did you mean 'spacing_units'?",
+        ),
+        (
+            ("simulation", "overrides", "exlosive"),
+            "f.toml: simulation.overrides.exlosive: unknown key, did you mean 'explosive'?",
+        ),
+        (("site", "zzz"), "f.toml: site.zzz: unknown key; known: width_m, height_m, air_height_m"),
+        (
+            ("site", "a b\n"),
+            "f.toml: site.'a b\\n': unknown key; known: width_m, height_m, air_height_m",
+        ),
+    ],
+)
+def test_unknown_key_is_answered_with_the_nearest_one(path: KeyPath, line: str) -> None:
+    assert lines_for(changed(full_document(), path, {})) == [line]
+
+
+def test_misspelt_required_key_gives_both_lines() -> None:
+    document = changed(without(minimal_document(), ("site", "width_m")), ("site", "widht_m"), 3.0)
+    assert lines_for(document) == [
+        "f.toml: site.width_m: missing",
+        "f.toml: site.widht_m: unknown key, did you mean 'width_m'?",
+    ]
+
+
+def test_misspelt_kind_does_not_hide_the_rest_of_the_table() -> None:
+    document = changed(full_document(), ("structures", 0, "kind"), "ModularObstacel")
+    document = changed(document, ("structures", 0, "rows"), 0)
+    assert lines_for(document) == [
+        "f.toml: structures[0].kind: is 'ModularObstacel', must be 'ModularObstacle',"
+        " 'ConcreteSquare' or 'polygon', did you mean 'ModularObstacle'?",
+        "f.toml: structures[0].rows: is 0, must be at least 1",
+    ]
+
+
+def test_misspelt_key_kind_does_not_hide_the_rest_of_the_table() -> None:
+    document = without(full_document(), ("structures", 0, "kind"))
+    document = changed(document, ("structures", 0, "knid"), "ModularObstacle")
+    document = changed(document, ("structures", 0, "rows"), 0)
+    assert lines_for(document) == [
+        "f.toml: structures[0].kind: missing, must be 'ModularObstacle', 'ConcreteSquare' or"
+        " 'polygon'",
+        "f.toml: structures[0].knid: unknown key, did you mean 'kind'?",
+        "f.toml: structures[0].rows: is 0, must be at least 1",
+    ]
+
+
+def test_bad_override_hides_neither_the_preset_nor_other_groups() -> None:
+    document = changed(full_document(), ("simulation", "preset"), "none")
+    document = changed(document, ("simulation", "overrides", "air"), 3)
+    document = changed(document, ("simulation", "overrides", "explosive"), {"mass": 0})
+    keys = [line.split(": ")[1] for line in lines_for(document)]
+    assert keys == [
+        "simulation.preset",
+        "simulation.overrides.air",
+        "simulation.overrides.explosive.mass",
+    ]
+
+
+def test_one_bad_structure_does_not_make_the_list_count_as_too_short() -> None:
+    lines = lines_for(changed(minimal_document(), ("structures", 0, "side_modules"), 0))
+    assert lines == ["f.toml: structures[0].side_modules: is 0, must be at least 1"]
+
+
+def test_long_values_and_keys_are_shortened() -> None:
+    document = changed(minimal_document(), ("site", "width_m"), "x" * 10_000)
+    document["y" * 10_000] = 1
+    assert all(len(line) < 300 for line in lines_for(document))
+
+
+def test_countless_problems_are_counted() -> None:
+    document = {**minimal_document(), **{f"zz{number}": 0 for number in range(MAX_PROBLEMS + 5)}}
+    lines = lines_for(document)
+    assert len(lines) == MAX_PROBLEMS + 1
+    assert "f.toml: 5 more problems" in lines
+
+
+def test_models_made_in_code_are_checked_as_well() -> None:
+    with pytest.raises(ValidationError, match="did you mean 'ballistic'"):
+        Scenario.model_validate({**minimal_document(), "simulation": {"preset": "balistic"}})
+
+
+def test_error_survives_pickling() -> None:
+    error = ScenarioError("f.toml", [Problem("site", "missing"), Problem("", "is odd")])
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is ScenarioError
+    assert (copy.source, copy.problems, str(copy)) == (error.source, error.problems, str(error))
+    assert str(copy) == "f.toml: site: missing\nf.toml: is odd"
