@@ -42,11 +42,12 @@ with import_extra("maps", "maps and drawings"):
     from ezdxf.entities.text import Text
     from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import DXFError
-    from ezdxf.math import Vec2, Vec3
+    from ezdxf.math import Matrix44, Vec2, Vec3
     from ezdxf.path import Path as DrawnPath
     from ezdxf.path import from_hatch, make_path
     from ezdxf.protocols import SupportsVirtualEntities, virtual_entities
     from ezdxf.render.mesh import MeshBuilder
+    from ezdxf.transform import copies
     from shapely.geometry import LineString, Point, Polygon
     from shapely.geometry.base import BaseGeometry
 
@@ -289,8 +290,8 @@ class _Drawn:
             entity: Any entity; blocks, dimensions and lines with many lines are taken apart.
             above: Layer of the insert around it.
         """
-        own = str(entity.dxf.get("layer", "0"))
-        layer = above if own == "0" else own
+        layer = str(entity.dxf.get("layer", "0"))
+        layer = above if layer == "0" else layer
         if isinstance(entity, Insert):
             block = entity.block()
             if block is None or block.block is None or block.block.is_xref:
@@ -299,17 +300,23 @@ class _Drawn:
             for insert in entity.multi_insert() if entity.mcount > 1 else (entity,):
                 for attribute in insert.attribs:
                     yield from self._parts(attribute, layer)
-                found = insert.virtual_entities(skipped_entity_callback=self._skip)
-                for part in found:
-                    yield from self._parts(part, layer)
+                place = insert.matrix44()
+                for inner in block:
+                    for part, own in self._parts(inner, layer):
+                        yield from ((each, own) for each in self._placed(part, place))
         elif isinstance(entity, SupportsVirtualEntities):
             for part in virtual_entities(entity):
                 yield from self._parts(part, layer)
         else:
             yield entity, layer
 
-    def _skip(self, entity: DXFEntity, reason: str) -> None:
-        self.skipped.append((entity, reason))
+    def _placed(self, entity: DXFEntity, place: Matrix44) -> list[DXFEntity]:
+        """Return an entity of a block where its insert has it: in several parts if it must be."""
+        if entity.dxftype() == "ATTDEF":
+            return []  # the insert has the attribute
+        faults, found = copies([entity], place)
+        self.skipped += [(each.entity, each.error.name.lower()) for each in faults]
+        return found
 
     def _feature(self, entity: DXFEntity, layer: str, place: str) -> MapFeature:
         tags: dict[str, str | float | bool] = {"layer": layer}
