@@ -552,6 +552,7 @@ def _ends_of(
 # Structures and charges.
 
 
+_MOST_LABELS: Final = 4  # of charges that are alike
 _LINE: Final = 20
 _MOST_LINES: Final = 3
 
@@ -605,24 +606,41 @@ def _said_of(structure: AnyStructure) -> dict[str, str | float]:
 
 
 def source_features(sources: Iterable[AnySource]) -> Iterator[Feature]:
-    """Yield the possible places of charges: points, lines or areas, or the entries of vehicles."""
+    """Yield the possible places of charges: points, lines or areas, or the entries of vehicles.
+
+    Of many that are alike only the first has a label, for all.
+    """
+    sources = tuple(sources)
+    groups = Counter(map(_charge_of, sources))
+    begun = set()
     for number, source in enumerate(sources, start=1):
-        yield from _places_of(source, number)
+        own = _charge_of(source)
+        count = groups[own] if groups[own] > _MOST_LABELS else 0
+        for feature in _places_of(source, number, count):
+            yield replace(feature, label="") if own in begun else feature
+        if count:
+            begun.add(own)
 
 
-def _places_of(source: AnySource, number: int) -> Iterator[Feature]:
+def _charge_of(source: AnySource) -> tuple[bool, float, float]:
+    return isinstance(source, VehicleSource), source.tnt_kg, source.height_m
+
+
+def _places_of(source: AnySource, number: int, count: int) -> Iterator[Feature]:
+    """Yield the places of a source; of one of `count` alike, labelled with their number."""
     name = f"charge of {source.tnt_kg:g} kg TNT may be here"
     raised = f", {source.height_m:g} m up" if source.height_m > 0.0 else ""
     said: dict[str, str | float | bool] = {"tnt_kg": source.tnt_kg, "weight": source.weight}
     said |= {"above_ground_m": source.height_m}
-    label, words, kind = f"charge {number}: {source.tnt_kg:g} kg{raised}", "", Kinds.CHARGE_PLACE
+    label = f"{count} charges" if count else f"charge {number}"
+    label, words, kind = f"{label}: {source.tnt_kg:g} kg{raised}", "", Kinds.CHARGE_PLACE
     if isinstance(source, RectangleSource):
         area, words = area_feature(kind, source.rectangle_m, name), "area in which a charge may be"
         yield Feature(kind, area.places_m, name, said, words, label)
         return
     if isinstance(source, VehicleSource):
         name, words = f"vehicle with {source.tnt_kg:g} kg TNT enters here", "entry of a vehicle"
-        label = f"vehicle {number}: {source.tnt_kg:g} kg{raised}"
+        label = label.replace("charge", "vehicle")
         said |= {"width_m": source.width_m}
     elif not isinstance(source, PointSource):
         words = "road on which a charge may be"

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from itertools import combinations
 from math import inf
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ from blast_env.plots.plan import (
     vehicle_features,
 )
 from blast_env.plots.site_picture import site_picture
-from blast_env.site import BuildZone, load_scenario
+from blast_env.site import BuildZone, Scenario, load_scenario
 from tests.office_park import office_park
 from tests.vehicle_sites import POSTS, gate_site, vehicle_of
 
@@ -87,6 +88,29 @@ def test_a_building_in_parts_has_one_label_and_charges_in_one_place_share_theirs
 
 def overlapping(boxes: Sequence[Rectangle]) -> int:
     return sum(one.overlaps(other, tolerance=0.5) for one, other in combinations(boxes, 2))
+
+
+def test_charges_of_a_street_share_a_label_and_no_name_lies_on_another_building() -> None:
+    """Fifteen parking places had fifteen labels; a shed was named in the yard of a block."""
+    block: dict[str, Any] = {"kind": "polygon", "name": "block", "height_m": 9.0, "protected": True}
+    block |= {"outline_m": [[10.0, 10.0], [40.0, 10.0], [40.0, 40.0], [10.0, 40.0]]}
+    block |= {"courtyards_m": [[[15.0, 15.0], [35.0, 15.0], [35.0, 35.0], [15.0, 35.0]]]}
+    shed = {"kind": "ModularObstacle", "name": "a_rather_long_name_of_a_shed", "height_m": 3.0}
+    shed |= {"corner_m": [41.0, 24.0], "rows": 4, "columns": 4}
+    points = [
+        {"kind": "point", "position_m": [4.0 * number + 2.0, 4.0], "tnt_kg": 100.0}
+        for number in range(15)
+    ]
+    document = office_park().model_dump(mode="json", exclude_none=True, exclude={"build_zone"})
+    document |= {"structures": [block, shed], "charge": points, "gauges": []}
+    document["site"] = {"width_m": 64.0, "height_m": 50.0}
+    site = Scenario.from_document(document, "street")
+    texts = [each.label for each in blast_env.plots.plan.site_features(site) if each.label]
+    assert [each for each in texts if "kg" in each] == ["15 charges: 100 kg"]
+    view = PixelView.of(site, 680, 560)
+    svg = plan_svg(view, site, (), None)
+    (x,) = re.findall(r'<text x="([\d.]+)"[^>]*>a_rather_long_name_of_a_shed<', svg)
+    assert float(x) - 60.0 > view.pixel(35.0, 0.0)[0]
 
 
 def test_no_label_of_a_crowded_site_lies_on_another_in_a_figure() -> None:
