@@ -352,11 +352,12 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
         save_figure(ground_map(result, quantity, levels=levels), folder / name)
         yield Picture(file=name, label=f"{quantity} over the ground")
     for building in _facades_of(result):
+        title = result.blast.scenario.title_of(building)
         for quantity in _QUANTITIES[::-1]:
             name = f"walls_{building}_{quantity}.png"
             full = scale.walls.get(building, {}).get(quantity)
             save_figure(facades(result, building, quantity, full=full), folder / name)
-            yield Picture(file=name, label=f"{quantity} on the walls of {building}")
+            yield Picture(file=name, label=f"{quantity} on the walls of {title}")
 
 
 def gas_loads(result: GasResult) -> tuple[Load, ...]:

@@ -466,7 +466,7 @@ def comparison(
                 Row(
                     layout=name,
                     threat=record.threat,
-                    structure=load.structure or TOGETHER,
+                    structure=scenario.title_of(load.structure) if load.structure else TOGETHER,
                     impulse=_impulse_text(load) + _error(impulse_off * load.impulse_pa_s),
                     peak=_number(load.peak_kpa),
                     load=judge.text(counted) + _error(load_off * counted),

@@ -408,7 +408,10 @@ class Session:
             for each in self.shown(threat)
             if (record := self.folder.record_of(each.key)) is not None
         ]
-        return [*verdict_rows(found)]
+        titled = self.scenario.title_of
+        return [
+            row.model_copy(update={"building": titled(row.building)}) for row in verdict_rows(found)
+        ]
 
     def verdicts_on(self, shown: Shown, threat: NamedThreat) -> tuple[Verdict, ...]:
         """Return the verdicts of a blast on the buildings with their current facades."""

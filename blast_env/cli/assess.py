@@ -18,6 +18,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     ResultTable,
+    building_words,
     print_cost,
     print_line,
     print_pieces,
@@ -139,7 +140,7 @@ class AssessCommand(ChargeOptions):
         if coarser is not None:
             _print_cells(scenario, layouts, found, coarse, coarser)
         self._print(scenario, found, coarse)
-        self._print_neighbours(found, coarse)
+        self._print_neighbours(scenario, found, coarse)
         self._print_barriers(found)
         self._print_glazing(scenario, list(found.values())[-1], target)
         self._write(scenario, layouts, found)
@@ -170,7 +171,7 @@ class AssessCommand(ChargeOptions):
         coarse: dict[str, Consequences],
     ) -> None:
         rows = [
-            (name, building, *_row(each, building, coarse.get(name)))
+            (name, building_words(scenario, building), *_row(each, building, coarse.get(name)))
             for name, each in found.items()
             for building in each.buildings
         ]
@@ -180,7 +181,7 @@ class AssessCommand(ChargeOptions):
                 print_line(f"flag, {name}: {note}")
 
     def _print_neighbours(
-        self, found: dict[str, Consequences], coarse: dict[str, Consequences]
+        self, scenario: Scenario, found: dict[str, Consequences], coarse: dict[str, Consequences]
     ) -> None:
         if not any(each.neighbours for each in found.values()):
             return
@@ -193,7 +194,8 @@ class AssessCommand(ChargeOptions):
                     _with_cells(worst, each, coarse.get(name), load, unit, digits)
                     for load, unit, digits in (("peak_pa", PA_PER_KPA, 1), ("impulse_pa_s", 1.0, 0))
                 )
-                table.add_row(name, worst.building, peak, impulse, *shares)
+                words = building_words(scenario, worst.building)
+                table.add_row(name, words, peak, impulse, *shares)
         result_console().print(table)
 
     def _print_barriers(self, found: dict[str, Consequences]) -> None:
@@ -217,7 +219,8 @@ class AssessCommand(ChargeOptions):
             other = judged.with_glazing(glazing)
             for building in other.buildings:
                 passes = verdict_word(other.level(building) >= target, other.is_flagged)
-                table.add_row(name, building, *_row(other, building), passes.lower())
+                words = building_words(scenario, building)
+                table.add_row(name, words, *_row(other, building), passes.lower())
         result_console().print(table)
 
     def _write(
@@ -235,7 +238,7 @@ class AssessCommand(ChargeOptions):
 
         rows = _worst_rows(found)
         charge = rows[0][1].charge
-        title = f"{rows[0][1].building}: {_charge_text(charge)}, the worst"
+        title = f"{scenario.title_of(rows[0][1].building)}: {_charge_text(charge)}, the worst"
         figures: list[tuple[Path | None, Figure]] = []
         if self.picture is not None:
             figures.append((self.picture, facade_picture(rows, title)))

@@ -23,6 +23,7 @@ from blast_env.cli.options import (
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
     ResultTable,
+    building_words,
     percent,
     print_cost,
     print_json,
@@ -314,7 +315,7 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
     for row in evaluation.building_table.to_dict("records"):
         reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
         table.add_row(
-            str(row["structure"]),
+            building_words(evaluation.scenario, str(row["structure"])),
             "yes" if row["protected"] else "no",
             _number(row["unprotected_impulse_pa_s"], row["unprotected_impulse_error_pa_s"]),
             _number(row["impulse_pa_s"], row["impulse_error_pa_s"]),

@@ -14,10 +14,11 @@ from blast_env.cli.output import (
     print_written,
     result_console,
     save_pictures,
+    titled,
 )
 from blast_env.cli.targets import PICTURES
 from blast_env.files import write_atomically
-from blast_env.io.importing.options import ImportOptions, plain
+from blast_env.io.importing.options import ImportOptions
 from blast_env.site import save_scenario
 
 if TYPE_CHECKING:
@@ -114,8 +115,7 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
 
 def _words(building: "FittedBuilding") -> str:
     """Return the name of a building, with its name on the map if that is another."""
-    title = "" if plain(building.title) in ("", building.name) else f": {building.title}"
-    return f"{building.name}{title}" + (" (cut)" if building.is_cut else "")
+    return titled(building.name, building.title) + (" (cut)" if building.is_cut else "")
 
 
 def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:

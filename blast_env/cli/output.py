@@ -22,6 +22,7 @@ from rich.text import Text
 
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.geometry import Element
+from blast_env.io.importing.options import plain
 from blast_env.site import AnyCharge, Scenario
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from blast_env.values import STEERING
@@ -49,6 +50,16 @@ def result_console() -> Console:
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     width = None if known else _PIPE_COLUMNS
     return _plain(width=width)
+
+
+def building_words(scenario: Scenario, name: str) -> str:
+    """Return the name of a building, with its title if that says more."""
+    return titled(name, scenario.title_of(name))
+
+
+def titled(name: str, title: str) -> str:
+    """Return a name, with its title if that says more."""
+    return name if plain(title) in ("", name) else f"{name}: {title}"
 
 
 def print_line(text: str, style: str | None = None) -> None:

@@ -22,6 +22,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     ResultTable,
+    building_words,
     print_json,
     print_line,
     print_pieces,
@@ -319,7 +320,7 @@ class ShownParticles(ShownBlast[Blast, BlastResult]):
             buildings.setdefault(names.get(obstacle.name, obstacle.name), []).append(obstacle)
         rows = [
             (
-                name,
+                building_words(blast.scenario, name),
                 "yes" if any(each.protected for each in parts) else "no",
                 f"{sum(len(each.parts) for each in parts):,}",
                 f"{sum(each.hits for each in parts):,}",
@@ -468,7 +469,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         }
         rows = [
             (
-                each["building"],
+                building_words(self.blast.scenario, each["building"]),
                 "yes" if each["protected"] else "no",
                 f"{'' if in_range[each['building']] else '~'}{each['impulse_pa_s']:,.0f}",
                 _known_text(each),

@@ -306,7 +306,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
         draw_enlarged(axes, obstacles, scale, 0.4)
         pa_s = building[column.replace("_sim", "_pa_s")]
         axes.set_title(
-            f"{name} {words} barrier\n{pa_s:,.0f} Pa·s",
+            f"{evaluation.scenario.title_of(name)} {words} barrier\n{pa_s:,.0f} Pa·s",
             fontsize=11,
             color=unit_interval(PROTECTED),
         )

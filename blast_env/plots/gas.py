@@ -224,7 +224,8 @@ def facades(
         axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
     colours = ScalarMappable(scale, load_colours())
     add_bar(figure, panels.ravel().tolist(), colours, kind.label, shrink=0.85, pad=0.02)
-    title, subtitle = gas_heading(results, f"{kind.name} on the walls of {outline.name}")
+    name = results[0].blast.scenario.title_of(outline.name)
+    title, subtitle = gas_heading(results, f"{kind.name} on the walls of {name}")
     write_heading(figure, title, f"{subtitle}; walls seen from outside")
     return figure
 

@@ -238,8 +238,9 @@ def _draw_panel(
 ) -> None:
     draw_enlarged(axes, building.obstacles, scale.norm, 0.6, scale.unit.factor)
     hits = sum(part.hits for part in building.modules)
+    title = result.blast.scenario.title_of(building.name)
     axes.set_title(
-        f"{building.name}{' (protected)' if building.protected else ''}\n"
+        f"{title}{' (protected)' if building.protected else ''}\n"
         f"{_total(result, building)} from {count_of('hit', hits)}",
         fontsize=11,
         color=unit_interval(PROTECTED if building.protected else INK),

@@ -124,6 +124,7 @@ def report_html(study: Study, commands: list[str]) -> str:
     environment.filters |= {
         "impulse": lambda pa_s: _number(units.impulse_of(pa_s)),
         "pressure": lambda pa: _number(units.pressure_of(pa)),
+        "titled": study.scenario.title_of,
         "counted": lambda load: _counted(load, units),
         "word": lambda passes, flagged: verdict_word(passes, flagged).lower(),
         "percent": _percent,
@@ -268,7 +269,8 @@ def _bay_tables(study: Study) -> list[BayTable]:
             for first, second in both[:_MOST_BAYS]
         )
         x_m, y_m = walled.charge.position_m
-        title = f"{walled.building}, {walled.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
+        name = study.scenario.title_of(walled.building)
+        title = f"{name}, {walled.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
         tables.append(BayTable(title, rows, len(both) - len(rows)))
     return tables
 
@@ -293,7 +295,7 @@ Source = tuple[str, str, str]
 def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine]) -> list[Source]:
     """Return every number of the summary with its source."""
     units, fine = study.options.units, study.options.words[1]
-    digests = dict(study.digests)
+    digests, titled = dict(study.digests), study.scenario.title_of
 
     def blasts(words: str) -> str:
         found = (
@@ -312,7 +314,8 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
                 ("panes that break", f"{each.broken[number]:.1f} of {each.panes}"),
                 ("panels that fail", f"{each.failed[number]} of {each.panels}"),
             )
-            found += [(f"{each.name}, {words}: {what}", value, where) for what, value in values]
+            name = titled(each.name)
+            found += [(f"{name}, {words}: {what}", value, where) for what, value in values]
     for line in summary:
         for words, of_blast, load, error in (
             (*sides[0], line.worst.bare, line.errors.bare_pa_s),
@@ -323,11 +326,13 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
             impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
             impulse += _of_cells(_error(units.impulse_of(error)))
             peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
-            found.append((f"{line.name}, {words}: impulse", impulse, where))
-            found.append((f"{line.name}, {words}: peak", peak, where))
+            found.append((f"{titled(line.name)}, {words}: impulse", impulse, where))
+            found.append((f"{titled(line.name)}, {words}: peak", peak, where))
         span = f"{_percent(line.least)} to {_percent(line.most)}"
         span += _of_cells(_error(100.0 * line.error, 1))
-        found.append((f"{line.name}: reduction", span, "1 - impulse with / without, all threats"))
+        found.append(
+            (f"{titled(line.name)}: reduction", span, "1 - impulse with / without, all threats")
+        )
     found.append(("cost of the layout", f"{study.cost:,.10g}", "bill of quantities"))
     if isfinite(study.grid_error):
         found.append(
@@ -344,7 +349,8 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
         share = _percent(neighbour.probability[BuildingDamage.MAJOR])
         where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "
         where += f"{_number(neighbour.impulse_pa_s)} Pa s; {blasts(sides[1][1])}"
-        found.append((f"{neighbour.building}, a house there: major damage", share, where))
+        name = titled(neighbour.building)
+        found.append((f"{name}, a house there: major damage", share, where))
     return found
 
 

@@ -27,6 +27,8 @@ STOREY_M = 3.5
 BAY_M = 3.0
 """Default width of a bay."""
 
+_ROUNDING: Final = 1e-9
+
 _FINER = 4  # refinement of the times of sharpened histories
 
 _CELLS_OF_HALF_A_PEAK: Final = 9.3
@@ -84,9 +86,21 @@ class Bay:
         return self.width_m * self.height_m
 
 
-def storeys_in(rise_m: float, storey_m: float) -> int:
-    """Return the number of storeys, at least 1; a remainder of half a storey or more is another."""
-    return max(1, floor(rise_m / storey_m + 0.5))
+def floors_m(rise_m: float, storey_m: float = STOREY_M, storeys: int | None = None) -> list[float]:
+    """Return the heights of the floors above the base, m, the ground floor's first.
+
+    The ground floor has the remaining height if the storeys do not fill the building.
+
+    Args:
+        rise_m: Height of the building above its base.
+        storey_m: Height of the other storeys.
+        storeys: Number of storeys, which then are equally high.
+    """
+    if storeys is not None:
+        storey_m = rise_m / storeys
+    count = max(1, floor(rise_m / storey_m + _ROUNDING))
+    ground_m = max(rise_m - storey_m * (count - 1), storey_m)
+    return [0.0] + [ground_m + storey_m * number for number in range(count - 1)]
 
 
 def divide(
@@ -98,21 +112,22 @@ def divide(
     bay_m: float = BAY_M,
     base_m: float = 0.0,
     lines: Sequence[WallLine] = (),
+    storeys: int | None = None,
 ) -> tuple[Bay, ...]:
     """Return the bays of a building, wall by wall, storey by storey.
 
-    A remaining height of at least half a storey is the uppermost storey; a smaller one is added to
-    the storey below. The bays of a wall have equal widths, as close as possible to `bay_m`.
+    The bays of a wall have equal widths, as close as possible to `bay_m`.
 
     Args:
         structure: Name of the structure.
         ground_m: Its outline on the ground.
         height_m: Height of its top above the ground.
         walls: The walls to divide, of west, east, south, north.
-        storey_m: Height of a storey.
+        storey_m: Height of a storey, see `floors_m`.
         bay_m: Intended width of a bay.
         base_m: Height of its base above the ground.
         lines: The walls of a polygon; without them it is a block with four walls.
+        storeys: Number of storeys of equal height, in the place of `storey_m`.
 
     Raises:
         BlastEnvError: If a size is not positive.
@@ -121,8 +136,8 @@ def divide(
     for name, value in (("height_m", rise_m), ("storey_m", storey_m), ("bay_m", bay_m)):
         if not value > 0.0:
             raise BlastEnvError(f"facade of {structure!r}: {name} is {value}, must be above 0")
-    storeys = storeys_in(rise_m, storey_m)
-    floors = [base_m + storey_m * storey for storey in range(storeys)] + [height_m]
+    levels_m = floors_m(rise_m, storey_m, storeys)
+    floors = [base_m + level_m for level_m in levels_m] + [height_m]
     bays: list[Bay] = []
     for wall in walls:
         before = 0
@@ -142,7 +157,7 @@ def divide(
                     line_number,
                     line,
                 )
-                for storey in range(storeys)
+                for storey in range(len(levels_m))
                 for number in range(count)
             ]
             before += count

@@ -116,6 +116,7 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
         facade.bay_m,
         structure.base_m,
         () if structure.footprint is None else structure.footprint.walls,
+        facade.storeys,
     )
     named = []
     for bay in bays:

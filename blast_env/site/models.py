@@ -115,7 +115,9 @@ _OPTIONAL: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Keys by section that the hashes leave out where they have their default values."""
 
-_NO_INFLUENCE: Final = {"name", "description", "simulation", "georeference", "components"}
+_NO_INFLUENCE: Final = {
+    *("name", "description", "import_notes", "simulation", "georeference", "components")
+}
 """Sections that the hash ignores; it has the parameters of `simulation` instead, and the components
 if the response of facades counts."""
 
@@ -124,6 +126,12 @@ _BUILT: Final = {
     *("height_m", "base_m", "carries", "outline_m", "courtyards_m"),
 }
 """Keys of a structure for its shape and place."""
+
+MOST_NOTES: Final = 100
+"""Most notes of an import in a scenario."""
+
+MOST_NOTE: Final = 1000
+"""Most characters of one of them."""
 
 Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
 """The sources of the charge."""
@@ -143,6 +151,7 @@ class Scenario(Section):
         schema_version: Version of the file format.
         name: Short name, as in `load_scenario("courtyard")`.
         description: Description for readers.
+        import_notes: Changes that an import made to a map or drawing, for readers.
         site: The simulated area.
         charge: Sources of the charge: one, or several with weights.
         structures: Structures, protected or not.
@@ -158,6 +167,10 @@ class Scenario(Section):
     schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
     name: Name
     description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
+    import_notes: Annotated[
+        tuple[Annotated[str, Field(max_length=MOST_NOTE), FOR_PEOPLE], ...],
+        Field(max_length=MOST_NOTES),
+    ] = ()
     site: Site
     charge: Sources
     structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
@@ -263,9 +276,9 @@ class Scenario(Section):
     def content_hash(self) -> str:
         """SHA-256 of all that affects results, without texts for readers.
 
-        It does not depend on name, description, reasons of areas, names of buildings, data for the
-        stability of barriers, georeference, order of keys, or the form (preset or overrides) of the
-        simulation parameters.
+        It does not depend on name, description, notes of an import, reasons of areas, names of
+        buildings, data for the stability of barriers, georeference, order of keys, or the form
+        (preset or overrides) of the simulation parameters.
         """
         content = self.model_dump(mode="json", exclude=_NO_INFLUENCE)
         for structure in content["structures"]:
@@ -273,6 +286,8 @@ class Scenario(Section):
             structure.pop("title")
             if not self.objective.is_response:
                 structure.pop("facade", None)
+            elif structure["facade"] and structure["facade"]["storeys"] is None:
+                del structure["facade"]["storeys"]
         if self.objective.is_response and self.components:
             words = {"title", "source"}
             content["components"] = {
@@ -435,6 +450,11 @@ class Scenario(Section):
     def building_names(self) -> dict[str, str]:
         """Name of each structure's building, by the structure's name."""
         return {each.name: each.building_name for each in self.structures}
+
+    def title_of(self, name: str) -> str:
+        """Return the title of a structure or building, else its name."""
+        parts = (each for each in self.structures if name in (each.name, each.building_name))
+        return next((each.title for each in parts if each.title), name)
 
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
         """Return the structures that remain with a layout."""

@@ -405,7 +405,8 @@ class FacadeSection(Section):
     """The components of a structure's walls.
 
     Attributes:
-        storey_m: Height of a storey.
+        storey_m: Height of a storey; the ground floor has the remaining height of the building.
+        storeys: Number of storeys of equal height, in the place of `storey_m`.
         bay_m: Width of a bay; bays of a wall are made equally wide.
         glazing: Name of the component of its windows; none unless given.
         wall: Name of the component of its walls; none unless given.
@@ -413,6 +414,7 @@ class FacadeSection(Section):
     """
 
     storey_m: Annotated[StrictFloat, Field(ge=2.0, le=20.0)] = STOREY_M
+    storeys: Annotated[StrictInt, Field(ge=1, le=200)] | None = None
     bay_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = BAY_M
     glazing: Name | None = None
     wall: Name | None = None

@@ -57,6 +57,19 @@ def measured() -> MeasuredBlast:
     return measure(GasBlast(scenario, LAYOUT), targets_of(scenario))
 
 
+def test_names_and_changes_of_the_map_are_in_the_report(study: Study) -> None:
+    document = study.scenario.model_dump(mode="json", exclude_none=True)
+    document["structures"][0]["title"] = "Дом культуры"
+    document["import_notes"] = ["left out: open lines: 1 (LINE 3F on the layer A)"]
+    titled = Scenario.from_document(document, "titled")
+    assert titled.content_hash == study.scenario.content_hash
+    page = report_html(replace(study, scenario=titled), [])
+    assert page.count('<td class="l">Дом культуры</td>') >= 4
+    assert '<td class="l">Дом культуры (<code>hut</code>)</td>' in page
+    assert '<td class="l">hut<' not in page
+    assert "<li>left out: open lines: 1 (LINE 3F on the layer A)</li>" in page
+
+
 def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> None:
     (threat,), (target,) = study.threats, study.targets
     result = blast_env.simulate(glazed_hut(), LAYOUT, engine="gas")

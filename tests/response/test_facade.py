@@ -25,10 +25,16 @@ def test_bays_cover_the_walls_once(height_m: float, storey_m: float, bay_m: floa
 
 
 def test_storeys_and_numbers_of_a_wall() -> None:
-    bays = divide("office", GROUND, 13.0, ("south",), 3.5, 3.0)
-    assert [bay.storey for bay in bays if bay.number == 1] == [1, 2, 3, 4]
-    assert bays[-1].top_m == 13.0
+    bays = divide("office", GROUND, 16.0, ("south",), 3.5, 3.0)
+    assert [bay.floor_m for bay in bays if bay.number == 1] == [0.0, 5.5, 9.0, 12.5]
+    assert bays[-1].top_m == 16.0
     assert [bay.left_m for bay in bays[:4]] == [10.0, 13.0, 16.0, 19.0]
+
+
+def test_storeys_by_number_are_equally_high() -> None:
+    bays = divide("office", GROUND, 16.0, ("south",), base_m=1.0, storeys=5)
+    assert [bay.floor_m for bay in bays if bay.number == 1] == [1.0, 4.0, 7.0, 10.0, 13.0]
+    assert divide("office", GROUND, 2.5, ("south",))[0].top_m == 2.5  # lower than a storey
 
 
 def test_every_component_of_the_catalogue_says_its_source_and_makes_a_system() -> None:

@@ -122,6 +122,7 @@ _OF_STRUCTURE: Final = (
         hint="barriers and buildings may stand on its top; it needs a height, and begins at 0",
     ),
 )
+_FILLINGS: Final = frozenset({"glazing", "wall"})
 _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
     "ModularObstacle": (
         *_CORNER,
@@ -136,6 +137,22 @@ _LAST_OF_STRUCTURE: Final = (
     FormField("assessed walls", "faces", "walls"),
     FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
     FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
+    FormField(
+        "storeys",
+        "storeys",
+        "integer",
+        optional=True,
+        inside="facade",
+        hint="of equal height; else as many of the height below as there is room for",
+    ),
+    FormField(
+        "height of a storey (m)",
+        "storey_m",
+        optional=True,
+        inside="facade",
+        hint="the ground floor has the remaining height of the building",
+    ),
+    FormField("width of a bay (m)", "bay_m", optional=True, inside="facade"),
 )
 
 
@@ -174,7 +191,8 @@ def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]
     table = {**(section.get(field.inside) or {}), field.key: value}
     if field.inside == "facade":
         table = {key: each for key, each in table.items() if each is not None}
-        return {field.inside: table if table.keys() & {"glazing", "wall"} else None}
+        is_empty = field.key in _FILLINGS and not table.keys() & _FILLINGS
+        return {field.inside: None if is_empty else table}
     if value is None:
         return {field.inside: None}
     return {field.inside: {"width_m": 3.0, "between": "left_right"} | table}

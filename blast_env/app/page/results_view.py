@@ -186,7 +186,7 @@ class ResultsView:
                 continue
             where = f"{session.folder.design_id}/{each.key}"
             damage = {
-                f"{_DAMAGE}{verdict.building}": f"/damage/{where}/"
+                f"{_DAMAGE}{session.scenario.title_of(verdict.building)}": f"/damage/{where}/"
                 + session.damage_picture(each, number)
                 for number, verdict in enumerate(session.verdicts_on(each, threat))
             }

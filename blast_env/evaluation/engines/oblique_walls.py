@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import WallLine
-from blast_env.response.facade import BAY_M, STOREY_M, storeys_in
+from blast_env.response.facade import BAY_M, STOREY_M, floors_m
 from blast_env.site.sections import AnyStructure
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -122,13 +122,14 @@ def _bays(
     """
     facade = structure.facade
     bay_m = BAY_M if facade is None else facade.bay_m
-    storey_m = STOREY_M if facade is None else facade.storey_m
     columns = max(1, round(wall.length_m / bay_m))
     along_m = wall.along_m(table.centre_m[own, :2])
     column = np.clip(along_m // (wall.length_m / columns), 0, columns - 1)
-    storey = np.floor((table.centre_m[own, 2] - structure.base_m) / storey_m)
+    above_m = table.centre_m[own, 2] - structure.base_m
+    rise_m = STOREY_M * np.ceil(above_m.max() / STOREY_M)
     if structure.height_m is not None:
         rise_m = structure.height_m - structure.base_m
-        storey = np.minimum(storey, storeys_in(rise_m, storey_m) - 1)
+    own_m = () if facade is None else (facade.storey_m, facade.storeys)
+    storey = np.searchsorted(floors_m(rise_m, *own_m), above_m, side="right")
     _, number = np.unique(columns * storey + column, return_inverse=True)
     return np.asarray(number.ravel())

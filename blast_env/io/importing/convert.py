@@ -27,7 +27,7 @@ from blast_env.provenance import package_version
 from blast_env.reading import read_apart
 from blast_env.site import Scenario, SimulationSection
 from blast_env.site.checks import charge_radius_m
-from blast_env.site.models import SCHEMA_VERSION
+from blast_env.site.models import MOST_NOTE, MOST_NOTES, SCHEMA_VERSION
 from blast_env.values import STEERING, path_of
 
 with import_extra("maps", "maps and drawings"):
@@ -112,7 +112,10 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
     document: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "name": options.name or plain_name(path.name.split(".")[0]) or "site",
-        "description": _description(path, site, buildings, options, ledger),
+        "description": _description(path, site, buildings, options),
+        "import_notes": [
+            STEERING.sub(" ", each) for each in ledger.notes_within(MOST_NOTE)[:MOST_NOTES]
+        ],
         "site": {"width_m": site.size_m[0], "height_m": site.size_m[1]},
         "charge": sources,
         "structures": [part for building in buildings for part in _structures(building, buildings)],
@@ -250,7 +253,6 @@ def _description(
     site: PlacedSite,
     buildings: tuple[FittedBuilding, ...],
     options: ImportOptions,
-    ledger: Ledger,
 ) -> str:
     """Return the description of the site: source, buildings, rotation and deviations."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:_HASH_DIGITS]
@@ -265,6 +267,4 @@ def _description(
         f"{farthest.deviation.outline_m:.2f} m of its outline ({farthest.name}). Charges of "
         f"{options.tnt_kg:g} kg TNT unless the file says another mass."
     )
-    if ledger.summary:
-        text += f" Changes to the map: {ledger.summary}."
     return text[:_MOST_DESCRIPTION]

@@ -13,6 +13,7 @@ with import_extra("maps", "maps and drawings"):
 
 _MOST_PLACES: Final = 5
 _MOST_CUT_LINES: Final = 12
+_MOST_NAMED: Final = 50
 _UNUSED: Final = "objects of no use to the site"
 
 
@@ -98,11 +99,15 @@ class Ledger:
         """All entries, by deed and kind."""
         return "".join(f"{line}\n" for line in self._lines(tuple(Deed), None))
 
-    @property
-    def summary(self) -> str:
-        """The sums of the changes to the site in one sentence; empty if there are none."""
-        sums = [f"{deed} {count}: {kind}" for (deed, kind), count in self.sums(*_SHOWN).items()]
-        return "; ".join(sums)
+    def notes_within(self, most: int) -> tuple[str, ...]:
+        """Return the notes with as many objects as `most` characters can name."""
+        lines = []
+        for kind, entries in self._grouped(_SHOWN).items():
+            count = min(len(entries), _MOST_NAMED)
+            while len(line := _line(kind, entries, count)) > most and count:
+                count -= 1
+            lines.append(shortened(line, most))
+        return tuple(lines)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -171,7 +176,12 @@ class Ledger:
         return groups
 
     def _lines(self, deeds: Sequence[Deed], most: int | None) -> Iterator[str]:
-        for (deed, kind), entries in self._grouped(deeds).items():
-            shown = [each.words for each in entries[:most]]
-            more = [f"and {len(entries) - len(shown)} more"] if len(entries) > len(shown) else []
-            yield f"{deed}: {kind}: {len(entries)} ({', '.join([*shown, *more])})"
+        for kind, entries in self._grouped(deeds).items():
+            yield _line(kind, entries, most)
+
+
+def _line(kind: tuple[Deed, str], entries: Sequence[LedgerEntry], most: int | None) -> str:
+    """Return a line on the entries of a kind with the first of its objects."""
+    shown = [each.words for each in entries[:most]]
+    more = [f"and {len(entries) - len(shown)} more"] if len(entries) > len(shown) else []
+    return f"{kind[0]}: {kind[1]}: {len(entries)} ({', '.join([*shown, *more])})"

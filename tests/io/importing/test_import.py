@@ -38,7 +38,9 @@ def imported(path: Path, **options: Any) -> ImportedSite:
 
 
 def comparable(scenario: Scenario) -> dict[str, Any]:
-    return scenario.model_dump(exclude={"name", "description", "georeference", "charge"})
+    return scenario.model_dump(
+        exclude={"name", "description", "import_notes", "georeference", "charge"}
+    )
 
 
 def ends_m(source: AnySource) -> tuple[PointM, PointM]:

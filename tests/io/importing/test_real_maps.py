@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import ezdxf
+import numpy as np
 import pytest
+import shapely
 from ezdxf import units
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,7 +16,7 @@ from hypothesis import strategies as st
 from blast_env.errors import BlastEnvError
 from blast_env.io.imported_site import imported_plan
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
-from blast_env.io.importing.ledger import Deed, LedgerEntry
+from blast_env.io.importing.ledger import Deed, Ledger, LedgerEntry
 from blast_env.plots.plan import site_features
 from blast_env.site import RectangleSource, Scenario
 from studies.real_files.__main__ import main
@@ -111,6 +113,7 @@ def test_relation_without_all_ways_is_left_out_by_name(missing: str, tmp_path: P
     site = imported(path, **HOUSE_1)
     (lost,) = entries(site, Deed.LEFT_OUT, "relations of which the extract does not have all ways")
     assert (lost.place, lost.name) == ("relation 5", "Court")
+    assert any("(relation 5 'Court')" in each for each in site.scenario.import_notes)
     assert "--protect is 'Court', which is left out: relation 5" in error_of(
         path, protect=("Court",)
     )
@@ -313,6 +316,7 @@ def test_names_of_the_map_stay_titles_and_become_latin_ids(
     (structure,) = site.scenario.structures
     assert (structure.name, structure.title) == (name, title)
     assert f"{name} ({title})" in error_of(path)
+    assert site.scenario.title_of(name) == title
     (label,) = (each.label for each in site_features(site.scenario) if each.name == name)
     assert label.startswith(title)
     assert site.scenario.content_hash == retitled(site.scenario).content_hash
@@ -368,6 +372,31 @@ def test_entities_on_layer_0_of_a_block_have_the_layer_of_the_insert(tmp_path: P
     site = imported(path, **DRAWN)
     assert [each.outline.area for each in site.buildings] == [24.0]
     assert len(entries(site, Deed.PASSED, "layer TREES")) == 1
+
+
+@pytest.mark.parametrize("stretch", [1.0, 2.0])
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+def test_blocks_in_stretched_and_turned_blocks_keep_layers_and_shapes(
+    stretch: float, turn_deg: float, tmp_path: Path
+) -> None:
+    """The content of such a block is skewed, as no insert can be."""
+    path, document = drawing(tmp_path)
+    inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
+    inner.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("0"))
+    inner.add_circle((20, 2), 3.0, dxfattribs=of_layer("0"))
+    turned = of_layer("HOUSES") | {"rotation": turn_deg}
+    outer.add_blockref("INNER", (0, 0), dxfattribs=turned)
+    placed = of_layer("OTHERS") | {"xscale": stretch, "rotation": 20.0}
+    document.modelspace().add_blockref("OUTER", (0, 0), dxfattribs=placed)
+    document.saveas(path)
+    site = imported(path, **DRAWN | {"charge_at": ((-15.0, -10.0),), "margin_m": 30.0})
+    areas = sorted(each.outline.area for each in site.buildings)
+    assert areas == pytest.approx([24.0 * stretch, 9.0 * np.pi * stretch], rel=0.02)
+    skewed = shapely.affinity.rotate(shapely.box(0, 0, 6, 4), turn_deg, origin=(0, 0))
+    skewed = shapely.affinity.scale(skewed, stretch, 1.0)
+    lengths = [each.outline.length for each in site.buildings if len(each.polygons[0].walls) == 4]
+    assert lengths == pytest.approx([skewed.length], rel=1e-3)
+    assert not entries(site, Deed.LEFT_OUT, "")
 
 
 @pytest.mark.parametrize("gap", [0.0006, 0.005, 0.2])
@@ -544,7 +573,18 @@ def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
         (13.0, 2.0),
     )
     assert "read: building: 2 (features[0], features[1])" in site.ledger.text
-    assert "guessed 1: heights not in the file" in site.scenario.description
+    (note,) = site.scenario.import_notes
+    assert note.startswith("guessed: heights not in the file")
+
+
+def test_notes_in_a_scenario_name_as_many_objects_as_there_is_room() -> None:
+    ledger = Ledger()
+    for number in range(2000):
+        ledger.add(Deed.GUESSED, "heights", f"way {number}", "Name" * 9)
+    (note,) = ledger.notes_within(1000)
+    assert note.startswith("guessed: heights: 2000 (way 0 'Name")
+    assert 900 < len(note) <= 1000
+    assert note.endswith(" more)")
 
 
 KINDS = st.sampled_from(
