@@ -30,7 +30,7 @@ class _Commands(LazyGroup):
             "Compare searches, rules and trained agents on the same held-out cases and seeds."
         ),
         "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
-        "propose": "Propose a layout for any site, with a catalogue in seconds without a blast.",
+        "propose": "Propose a layout for any site in seconds without a blast.",
         "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",
         "paper": "Recompute the paper's Tables 1 to 4 and Figure 5 from its own columns.",
         "import": "Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.",

@@ -11,8 +11,8 @@ from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from importlib import import_module
-from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Final, get_args, get_origin, get_type_hints
+from types import MappingProxyType, UnionType
+from typing import Annotated, Any, ClassVar, Final, Union, get_args, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -29,7 +29,7 @@ MARKUP: Final = "markdown"
 """Markup of the help texts: Rich's markup would read [row, column] as a style."""
 
 _UNITS: Final = re.compile(r"_(m|m2|deg)$")
-_COUNTS: Final = MappingProxyType({2: "two", 3: "three"})
+_COUNTS: Final = MappingProxyType({2: "two", 3: "three", 4: "four"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,8 @@ class Command:
     """Base class of all commands, and of the groups of options that several share.
 
     Each field is an `option` or an `argument` (`blast_env.option_fields`); one of the type
-    `tuple[TYPE, ...]` may be repeated. Help lists the options of a class before those of its bases.
+    `tuple[TYPE, ...]` may be repeated, and several numbers in a value have commas between them.
+    Help lists the options of a class before those of its bases.
     """
 
     def __call__(self) -> None:
@@ -91,10 +92,15 @@ class OptionField:
         return get_origin(self.hint) is tuple and get_args(self.hint)[1:] == (...,)
 
     @property
-    def numbers(self) -> int:
-        """Count of comma-separated numbers in each value of a repeated option; 0 for a text."""
-        item = get_args(self.hint)[0] if self.is_repeated else None
-        return len(get_args(item)) if get_origin(item) is tuple else 0
+    def numbers(self) -> tuple[int, ...]:
+        """Possible counts of comma-separated numbers in a value; empty for other values."""
+        kinds = _alternatives(get_args(self.hint)[0] if self.is_repeated else self.hint)
+        numbers = {int, float}
+        return tuple(
+            len(get_args(each))
+            for each in kinds
+            if get_origin(each) is tuple and set(get_args(each)) <= numbers
+        )
 
     @property
     def is_number(self) -> bool:
@@ -109,6 +115,8 @@ class OptionField:
             hint = list[str if self.numbers else get_args(hint)[0]]  # type: ignore[misc]
             default = default or None
             hint = hint if default else hint | None
+        elif self.numbers:
+            hint = str | None
         # For a flag that is on by default, Typer adds one that turns it off.
         names = () if default is True or text.is_argument else (self.flag,)
         kind = typer.Argument if text.is_argument else typer.Option
@@ -125,15 +133,15 @@ class OptionField:
             BlastEnvError: If a text does not consist of comma-separated numbers.
         """
         if not self.is_repeated:
-            return given
+            return self._numbers_of(given) if self.numbers and given is not None else given
         return tuple(self._numbers_of(each) if self.numbers else each for each in given or ())
 
     def _numbers_of(self, text: str) -> tuple[float, ...]:
         with suppress(ValueError):
             found = tuple(plain_number(self.flag, part) for part in text.split(","))
-            if len(found) == self.numbers:
+            if len(found) in self.numbers:
                 return found
-        count = _COUNTS.get(self.numbers, str(self.numbers))
+        count = " or ".join(_COUNTS[each] for each in self.numbers)
         form = self.text.settings.get("metavar", "numbers with commas")
         raise BlastEnvError(f"{self.flag} is {text!r}, must be {count} numbers as {form}")
 
@@ -141,6 +149,11 @@ class OptionField:
 def _leaves(kinds: Iterable[Any]) -> Iterator[Any]:
     for each in kinds:
         yield from _leaves(inner) if (inner := get_args(each)) else (each,)
+
+
+def _alternatives(hint: Any) -> tuple[Any, ...]:
+    """Return the types of a union, or the single type."""
+    return get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
 
 
 def options_of(kind: type[Command]) -> Iterator[OptionField]:

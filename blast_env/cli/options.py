@@ -17,6 +17,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
+from blast_env.site.sections import PointM
 
 CLUSTER_HELP: Final = (
     "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of "
@@ -58,6 +59,12 @@ UNTIL_HELP: Final = (
     "Loads that a blast of gas dynamics waits for. structures: those protected; walls: all; "
     "gauges; or a number of seconds."
 )
+CHARGE: Final = "X,Y[,KG]"
+"""The form of a charge in all commands."""
+
+GivenCharge = tuple[float, float] | tuple[float, float, float]
+"""Place of a charge, m, with its mass, kg TNT, unless the scenario's is meant."""
+
 TARGET_HELP: Final = "Required level of protection; else the scenario's, else {}."
 CVAR_HELP: Final = "Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
 
@@ -85,12 +92,33 @@ def wanted_level(
 class ChargeOptions(Command):
     """The place and the mass of the charge, if the user gives them."""
 
-    charge_m: tuple[float, float] | None = option(
-        None, "Place of the charge, m, instead of a drawn one.", metavar="X Y"
+    charge: GivenCharge | None = option(
+        None, "Place of the charge, m, and its mass, kg TNT, instead of drawn ones.", metavar=CHARGE
     )
     tnt_kg: float | None = option(
         None, "Mass of the charge, kg TNT, instead of the scenario's.", metavar="KG"
     )
+
+    @property
+    def place_m(self) -> PointM | None:
+        """The place of the charge, if the user gives one."""
+        return None if self.charge is None else self.charge[:2]
+
+    @property
+    def mass_kg(self) -> float | None:
+        """The mass of the charge, if the user gives one.
+
+        Raises:
+            BlastEnvError: If it is given twice.
+        """
+        if self.charge is None or len(self.charge) == 2:
+            return self.tnt_kg
+        if self.tnt_kg is not None:
+            raise BlastEnvError(
+                f"--charge has the mass {self.charge[2]:g} kg, and --tnt-kg is {self.tnt_kg:g}: "
+                "give one of them"
+            )
+        return self.charge[2]
 
     def fixed(self, scenario: Scenario, drawn: AnyCharge) -> AnyCharge:
         """Return a charge with the place and the mass that the user gives, if any.
@@ -100,11 +128,12 @@ class ChargeOptions(Command):
             drawn: The charge drawn without them; with a given place, it is in no vehicle.
 
         Raises:
+            BlastEnvError: If the mass is given twice.
             ScenarioError: If it is out of bounds, or not clear of a structure or the border.
         """
-        if self.charge_m is None and self.tnt_kg is None:
+        options = ResetOptions(charge_position_m=self.place_m, tnt_kg=self.mass_kg)
+        if not options.fix_charge:
             return drawn
-        options = ResetOptions(charge_position_m=self.charge_m, tnt_kg=self.tnt_kg)
         charge = options.charge(drawn)
         if not isinstance(charge, VehicleCharge):
             scenario.with_charge(charge)  # refuses a place that is not clear

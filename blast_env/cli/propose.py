@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import cycle, islice
 from math import nan
 from pathlib import Path
 from time import perf_counter
@@ -51,22 +50,19 @@ _NOTHING: Final = "no barrier"
 
 @dataclass(frozen=True, kw_only=True)
 class ProposeCommand(ChargeOptions, ProcessOptions):
-    """Propose a layout for any site, with a catalogue in seconds without a blast.
+    """Propose a layout for any site in seconds without a blast.
 
     The layout comes from packaged weights trained for the same scenario, if there are any; if not,
-    from the surrogate of gas dynamics, fitted to other sites. Both take seconds, and no blast. On a
-    site without a catalogue, outside the surrogate's range, the best rule proposes: one blast of
-    gas dynamics for each rule and threat, some minutes; the command prints the estimate first, and
-    --budget lowers it. Nothing is proposed if the expected reduction is below 3 %. Without
-    --charge, the layout is for all possible places of the charge.
+    from the surrogate of gas dynamics, fitted to other sites. Nothing is proposed if the expected
+    reduction is below 3 %. Without --charge, the layout is for all possible places of the charge.
     """
 
     scenario: str = argument(SCENARIO_HELP)
     verify: bool = option(False, "Compare it by gas dynamics with no barrier and the rules.")
     budget: int | None = option(
         None,
-        "Most blasts of gas dynamics, for --verify or for the best rule: limits the rules, then "
-        "the charges that are compared. The error of the cells takes one more for each layout.",
+        "Most blasts of gas dynamics for --verify: limits the rules, then the charges that are "
+        "compared. The error of the cells takes one more for each layout.",
         show_default="as many as are needed",
         min=2,
     )
@@ -87,20 +83,20 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         print_line(f"{scenario.name}: {_words(scenario, result)}, by {result.by}")
         if self.verify:
             self._verify(problem, result.layout)
-        if not (self.verify or problem.evaluator.blasts):
+        else:
             print_line("no blast was run")
         if self.out is not None:
             self._write(scenario, result.layout, chosen.source, self.out)
 
     def _charge(self, scenario: Scenario) -> Charge | None:
         """Return the charge at the user's place; `None` without one."""
-        if self.charge_m is None:
-            if self.tnt_kg is not None:
+        if self.place_m is None:
+            if self.mass_kg is not None:
                 raise BlastEnvError("--tnt-kg is given without --charge, the place of the charge")
             return None
         middle = expected_charge(scenario.charge)
-        tnt_kg = middle.tnt_kg if self.tnt_kg is None else self.tnt_kg
-        (x_m, y_m), charge = self.charge_m, Charge(self.charge_m, tnt_kg, middle.height_m)
+        tnt_kg = middle.tnt_kg if self.mass_kg is None else self.mass_kg
+        (x_m, y_m), charge = self.place_m, Charge(self.place_m, tnt_kg, middle.height_m)
         scenario.with_possible_charges((charge,))  # refuses one that is not clear, or out of bounds
         bounds = [source_bounds_m(source) for source in scenario.charge]
         if not any(
@@ -115,26 +111,15 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
     def _proposed(self, problem: LayoutProblem) -> tuple[Chosen, SearchResult]:
         """Return the proposer and its proposal; print the time of one without blasts."""
         chosen = chosen_for(problem)
-        if chosen.budget:
-            print_line(
-                "note: single modules are placed, of which the surrogate knows nothing; the best "
-                "rule is proposed"
-            )
-            budget = chosen.budget if self.budget is None else min(self.budget, chosen.budget)
-            print_line(problem.evaluator.engine.describe())
-            evaluator, turns = problem.evaluator, islice(cycle(problem.threats), budget)
-            print_cost((evaluator.engine, problem.scenario, each.charge) for each in turns)
-        elif self.budget is not None and not self.verify:
-            raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast here")
+        if self.budget is not None and not self.verify:
+            raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast")
         began_s = perf_counter()
         with progress_bar(f"proposal for {problem.scenario.name}") as progress:
 
             def report(state: Progress) -> None:
                 progress(state.share)
 
-            result = chosen.propose(problem, self.budget, report=report)
-        if chosen.budget:
-            return chosen, result
+            result = chosen.propose(problem, report=report)
         ms = MS_PER_S * (perf_counter() - began_s)
         words = "" if self.verify else " (--verify evaluates it)"
         return chosen, replace(result, by=f"{result.by}{words}, in {ms:,.0f} ms")

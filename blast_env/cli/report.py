@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from blast_env.app.cost import ReportCost
 from blast_env.cli.command import argument, option
-from blast_env.cli.options import SCENARIO_HELP, TARGET_HELP, CacheOptions, ProcessOptions
+from blast_env.cli.options import (
+    CHARGE,
+    SCENARIO_HELP,
+    TARGET_HELP,
+    CacheOptions,
+    GivenCharge,
+    ProcessOptions,
+)
 from blast_env.cli.output import (
     InterruptedCommandError,
     message_console,
@@ -41,11 +48,11 @@ class ReportCommand(ProcessOptions, CacheOptions):
     layout: Path = option(..., "JSON file of the layout.")
     out: Path = option(..., "The page to write: .html.", writes=(".html", ".htm"))
     pdf: Path | None = option(None, "The same as PDF: .pdf.", writes=(".pdf",))
-    charges: tuple[tuple[float, float, float], ...] = option(
+    charges: tuple[GivenCharge, ...] = option(
         (),
         "A threat, site metres and kg TNT; may be given again.",
         flag="--charge",
-        metavar="X,Y,KG",
+        metavar=CHARGE,
         show_default="of each charge source the worst of its places with the layout",
     )
     most_threats: int = option(2, "How many of those, 1 to 6.", flag="--threats")
@@ -109,7 +116,7 @@ class ReportCommand(ProcessOptions, CacheOptions):
         given: dict[str, Any] = {
             each.name: getattr(self, each.name) for each in fields(StudyOptions)
         }
-        given["charges"] = tuple(Charge((x_m, y_m), tnt_kg) for x_m, y_m, tnt_kg in self.charges)
+        given["charges"] = tuple(_charge(each, scenario) for each in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units
         given["cells"] = final_cells(scenario)
@@ -117,6 +124,23 @@ class ReportCommand(ProcessOptions, CacheOptions):
             given["cells"] = tuple(_cells(each) for each in self.cells)
         given["target"] = None if self.target is None else LevelOfProtection.named(self.target)
         return StudyOptions(**given)
+
+
+def _charge(given: GivenCharge, scenario: Scenario) -> Charge:
+    """Return the charge of an option.
+
+    Raises:
+        BlastEnvError: If it has no mass, and the scenario's sources have different ones.
+    """
+    masses_kg = sorted({source.tnt_kg for source in scenario.charge})
+    x_m, y_m, *own_kg = given
+    if not own_kg and len(masses_kg) > 1:
+        known = ", ".join(f"{each:g}" for each in masses_kg)
+        raise BlastEnvError(
+            f"--charge is {x_m:g},{y_m:g} without a mass, but the scenario has charges of {known} "
+            "kg: say X,Y,KG"
+        )
+    return Charge((x_m, y_m), (own_kg or masses_kg)[0])
 
 
 def _cells(text: str) -> Cells:

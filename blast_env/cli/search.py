@@ -193,7 +193,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
             # The known charge is always drawn by the seed of the search.
             charge = self.fixed(scenario, scenario.sample_charge(np.random.default_rng(self.seed)))
             return practice_visible(scenario, charge, realisations, self.seed, risk)
-        for flag, value in (("--charge", self.charge_m), ("--tnt-kg", self.tnt_kg)):
+        for flag, value in (("--charge", self.charge), ("--tnt-kg", self.tnt_kg)):
             if value is not None:
                 raise BlastEnvError(f"{flag} is for a visible threat: a hidden one is drawn")
         return practice_hidden(scenario, model.threats, realisations, self.seed, risk)

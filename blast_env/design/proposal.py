@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from blast_env.design.search.methods import BestRuleSearch
 from blast_env.design.search.problem import LayoutProblem, Proposer, Report, SearchResult
 from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.envs.episode import find_realisations
@@ -39,58 +38,42 @@ class Chosen:
     Attributes:
         proposer: The proposer.
         by: Description of its basis.
-        budget: Blasts that it needs at most.
         source: Identification of the weights, surrogate or rules, for the reproduction.
         is_guessed: Whether predictions of the surrogate select the layout.
     """
 
     proposer: Proposer
     by: str
-    budget: int
     source: Mapping[str, str]
     is_guessed: bool = False
 
     def propose(
         self,
         problem: LayoutProblem,
-        budget: int | None = None,
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
         """Return the layout, its predicted gain, and its source in `by`.
 
-        The layout is empty if the gain, by blasts or predictions, is below `LEAST_GAIN`. A layout
+        The layout is empty if the predicted gain is below `LEAST_GAIN`. A layout
         selected by predictions is compared with those of the rules: see `worth_its_pieces`. Trained
         weights were judged on their site by gas dynamics, so predictions never replace their
         layout by a rule's.
 
         Args:
             problem: The problem.
-            budget: Largest number of blasts, for proposers that need some.
             seed: Seed of all random draws.
             report: Called with the progress.
-
-        Raises:
-            KeyboardInterrupt: If it was interrupted: the best of some rules is not a proposal.
         """
-        blasts = self.budget if budget is None else min(budget, self.budget)
-        result = self.proposer.propose(problem, blasts, seed, report)
-        if result.interrupted:
-            raise KeyboardInterrupt
-        layout, by = result.layout, self.by
-        gain: float | None = None
-        rules = layouts_by_rule(problem.scenario, problem.told)
-        if self.budget:  # name the rule
-            by = f"{by}: {next(name for name, each in rules.items() if each == layout)}"
-            gain = problem.reduction(result.history[-1])
-        elif problem.scenario.zone.items:
-            guesses = _guesses(problem)
-            if self.is_guessed:
-                layout = worth_its_pieces(guesses, layout, rules.values())
-            else:
-                by = f"{by}; reduction predicted by the surrogate"
-            gain = reductions(*guesses.loads([layout, ()])).item()
-        if gain is not None and not gain >= LEAST_GAIN:  # NaN: nothing arrives
+        result = self.proposer.propose(problem, 0, seed, report)
+        layout, by, guesses = result.layout, self.by, _guesses(problem)
+        if self.is_guessed:
+            rules = layouts_by_rule(problem.scenario, problem.told)
+            layout = worth_its_pieces(guesses, layout, rules.values())
+        else:
+            by = f"{by}; reduction predicted by the surrogate"
+        gain = reductions(*guesses.loads([layout, ()])).item()
+        if not gain >= LEAST_GAIN:  # NaN: nothing arrives
             by = (
                 f"{by}: no layout has an expected reduction of {100.0 * LEAST_GAIN:g} %, "
                 f"the best one {100.0 * gain:.1f} %"
@@ -146,9 +129,8 @@ def chosen_for(problem: LayoutProblem) -> Chosen:
     """Return the proposer of the package for a case: the first applicable one of these.
 
     1. The bundled weights that were trained for the scenario.
-    2. The surrogate, which was fitted to generated sites, for a scenario with a catalogue. On
-       generated sites it is better than the weights trained for them.
-    3. The best rule by gas dynamics, with one blast per rule and threat.
+    2. The surrogate, which was fitted to generated sites. On generated sites it is better than the
+       weights trained for them. Single modules are to it a catalogue of one item.
     """
     scenario = problem.scenario
     # Imported here because torch is an extra, and torch and the surrogate take seconds to import.
@@ -161,16 +143,10 @@ def chosen_for(problem: LayoutProblem) -> Chosen:
     if found is not None and found[1].scenario not in FAMILIES:
         agent, record = found
         weights = {"weights": record.configuration.scenario_hash[:12]}
-        return Chosen(LearntSearch(agent=agent), f"the weights of {record.scenario}", 0, weights)
-    if scenario.zone.items:
-        surrogate = packaged_surrogate()
-        known = {"surrogate": surrogate.digest}
-        return Chosen(
-            search_by(surrogate), "the surrogate of gas dynamics", 0, known, is_guessed=True
-        )
-    blasts = len(layouts_by_rule(scenario, problem.told)) * len(problem.threats)
-    rules = {"method": BestRuleSearch.name}
-    return Chosen(BestRuleSearch(), "the best rule by gas dynamics", blasts, rules)
+        return Chosen(LearntSearch(agent=agent), f"the weights of {record.scenario}", weights)
+    surrogate = packaged_surrogate()
+    known = {"surrogate": surrogate.digest}
+    return Chosen(search_by(surrogate), "the surrogate of gas dynamics", known, is_guessed=True)
 
 
 @dataclass(frozen=True)
@@ -182,8 +158,8 @@ class PackageProposer:
     def propose(
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
-        """Return the layout, with its source in `by`; only the best rule needs blasts."""
-        found = chosen_for(problem).propose(problem, budget, seed, report)
+        """Return the layout, with its source in `by`; it spends no blasts."""
+        found = chosen_for(problem).propose(problem, seed, report)
         return replace(found, budget=budget)
 
 
@@ -196,8 +172,7 @@ def propose(
 ) -> SearchResult:
     """Return the layout that the package proposes for a site.
 
-    This takes seconds; for a scenario without a catalogue and without bundled weights it takes
-    minutes, for the blasts of all rules; see `chosen_for`.
+    This takes seconds, and no blast; see `chosen_for`.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.

@@ -120,7 +120,7 @@ def test_simulate_prints_json_that_can_be_read() -> None:
 
 
 def test_simulate_takes_charge_and_preset() -> None:
-    result = run("simulate", "courtyard", "--charge", "8", "15", "--preset", "ballistic")
+    result = run("simulate", "courtyard", "--charge", "8,15", "--preset", "ballistic")
     assert result.exit_code == 0
     assert "at (8.00, 15.00) m" in result.stdout
 
@@ -132,7 +132,7 @@ def test_simulate_takes_charge_and_preset() -> None:
         (("courtyard", "--preset", "balistic"), "did you mean 'ballistic'"),
         (("courtyard", "--engine", "pymonk"), "did you mean 'pymunk'"),
         (("courtyard", "--layout", "nowhere.json"), "nowhere.json"),
-        (("courtyard", "--charge", "29", "15"), "building"),
+        (("courtyard", "--charge", "29,15"), "building"),
         (("courtyard", "--stand-off", "20"), "needs one point charge"),
         (("free_field", "--excel", "table.txt"), "table.txt"),
         (("free_field", "--film", "film.avi"), "film.avi"),

@@ -144,7 +144,7 @@ def layout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-CHARGE = ("--charge", 5, 19, "--tnt-kg", 60)
+CHARGE = ("--charge", "5,19,60")
 
 
 def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path: Path) -> None:
@@ -163,11 +163,30 @@ def test_the_charge_is_named_alike_everywhere(site: Path, layout: Path, tmp_path
     assert {"--charge", "--tnt-kg"} <= words_of(run("search", "--help").stdout)
 
 
+def test_all_commands_take_a_charge_in_one_form() -> None:
+    forms = {
+        name: getattr(each, "metavar", None)
+        for name, command in commands().items()
+        for each in command.loaded.params
+        if "--charge" in each.opts
+    }
+    assert {"simulate", "evaluate", "search", "assess", "advise", "propose", "report"} <= {*forms}
+    assert {*forms.values()} == {"X,Y[,KG]"}
+
+
+def test_the_mass_of_a_charge_is_given_once(site: Path) -> None:
+    result = run("simulate", site, "--charge", "5,19,60", "--tnt-kg", 50, columns=150)
+    assert result.exit_code == 2
+    assert "--charge has the mass 60 kg, and --tnt-kg is 50: give one of them" in result.stderr
+    result = run("simulate", site, "--charge", "5,1_9", columns=150)
+    assert "--charge is '5,1_9', must be two or three numbers as X,Y[,KG]" in result.stderr
+
+
 def test_a_fixed_charge_has_one_blast_of_gas_dynamics(hut_file: Path, tmp_path: Path) -> None:
     wall = tmp_path / "wall.json"
     wall.write_text("[[1, 0], [2, 0]]")
     given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3, "--cell", 0.5)
-    shown = run("evaluate", *given, "--charge", 2, 3.5, "--tnt-kg", 4).stdout
+    shown = run("evaluate", *given, "--charge", "2,3.5", "--tnt-kg", 4).stdout
     assert "4 kg TNT at (2.00, 3.50) m" in shown
     assert "2 blasts run" in shown
 

@@ -32,8 +32,8 @@ def test_table_says_how_far_each_building_is_off(tmp_path: Path) -> None:
 
 def test_report_as_json_has_the_same(tmp_path: Path) -> None:
     out = tmp_path / "block.toml"
-    place = ("--centre", "7.5006", "54.80045", "--size", "40", "30", "--tnt-kg", "20")
-    options = ("--protect-near", "7.5006", "54.80045", "--zone-around", "5", "--zone-from", "none")
+    place = ("--centre", "7.5006,54.80045", "--size", "40,30", "--tnt-kg", "20")
+    options = ("--protect-near", "7.5006,54.80045", "--zone-around", "5", "--zone-from", "none")
     code, _, error = run(BLOCK, *place, *options, "--out", out)
     assert code == 2
     assert "--zone-from and --zone-around exclude each other" in error

@@ -65,7 +65,7 @@ def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_pa
 
 
 def test_the_layout_says_how_it_was_made(site: Path, tmp_path: Path) -> None:
-    options = ("--budget", 10, "--seed", 3, "--held-out", 2, "--charge", 5, 19)
+    options = ("--budget", 10, "--seed", 3, "--held-out", 2, "--charge", "5,19")
     result = search("--method", "random", "--scenario", site, *options, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     content = LayoutFile.load(tmp_path / "out" / "layout.json")
@@ -148,8 +148,8 @@ def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Pat
         ),
         (("--start-from", "nowhere.json"), "nowhere.json"),
         (("--threats", "4"), "threats is 4, must be 1 unless threat is 'hidden'"),
-        (("--threat", "hidden", "--charge", "5", "9"), "a hidden one is drawn"),
-        (("--charge", "28", "12"), "charge[0]"),
+        (("--threat", "hidden", "--charge", "5,9"), "a hidden one is drawn"),
+        (("--charge", "28,12"), "charge[0]"),
         (("--scenario", "free_field"), "has no build zone"),
         (("--budget", "0"), "greater than or equal to 1"),
         (("--out", "layout.json"), "layout.json: cannot be a folder"),

@@ -81,7 +81,7 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     assert (found.layout, found.gain) == ((), 0.0)
     save_scenario(wide_yard(), tmp_path / "yard.toml")
     files = ("--out", str(tmp_path / "none.json"))
-    options = ("--charge", *map(str, CHARGE.position_m), *files)
+    options = ("--charge", "{},{}".format(*CHARGE.position_m), *files)
     done = CliRunner().invoke(app, ["propose", str(tmp_path / "yard.toml"), *options])
     assert done.exit_code == 0, done.output
     words = " ".join(done.output.split())

@@ -78,10 +78,10 @@ def test_the_rule_is_among_those_that_a_proposal_is_chosen_from_and_held_against
 ) -> None:
     problem = problem_of(hut(), None)
     assert "from the corner" in layouts_by_rule(hut())
-    assert chosen_for(problem).budget == 5  # blasts: four rules, and this one
+    assert chosen_for(problem).is_guessed
     save_scenario(hut(), tmp_path / "hut.toml")
     shown = run("propose", tmp_path / "hut.toml", "--verify").stdout
-    assert "up to 5 blasts of gas: about " in shown
+    assert "blasts of gas: about " in shown
     verdict = shown.partition("judged by gas dynamics")[2]
     assert "from the corner" in verdict
     ruled = next(line for line in verdict.splitlines() if line.startswith("from the corner"))

@@ -255,7 +255,7 @@ SMALLER: Final[dict[str, str]] = {
     " --set evaluation_cases=2 --run out/hotel_ppo": _TRAIN,
     "blast-env league --budgets 50 --methods random,genetic --method own_optimiser:Descent"
     " --scenario courtyard --out out/own": f"{_LEAGUE} --methods random",
-    "blast-env search --method genetic --budget 200 --seed 0 --charge 5 12 --out out/search": (
+    "blast-env search --method genetic --budget 200 --seed 0 --charge 5,12 --out out/search": (
         "--budget 8 --held-out 1"
     ),
     "blast-env search --method nsga2 --threat hidden --threats 16 --budget 1000 --processes 2"

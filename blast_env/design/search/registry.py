@@ -103,7 +103,6 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
             "blast_env.design.surrogate.search:packaged_search",
             "search by the surrogate",
             ProposerKind.LEARNT,
-            (Need.CATALOGUE,),
         ),
         **_rules(_RULES, "wall near the charge", "wall in the middle", "wall near the building"),
         **_rules(

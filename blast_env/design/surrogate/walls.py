@@ -12,7 +12,7 @@ from blast_env.design.surrogate.relations import RELATIONS, relations
 from blast_env.design.surrogate.ways import SHARES, Ways
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.contract import structure_response
-from blast_env.geometry import Element, Measure, WallLine, standing
+from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
 from blast_env.particles.calibration import kingery_bulmash
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.site import AnyStructure, Scenario
@@ -286,17 +286,21 @@ class SurrogateSite:
     def barrier(self, layout: Sequence[Element]) -> FloatArray:
         """Return left, bottom, right, top and height of a layout's pieces, m (pieces, 5).
 
+        Modules side by side are one wall.
+
         Raises:
             LayoutError: If the catalogue has no such piece.
         """
         zone, air_m = self.scenario.zone, self.scenario.air_height_m
         terraces = [each for each in self.scenario.structures if each.carries]
+        boxes = [
+            (zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m)
+            for each in standing(layout)
+        ]
+        if not zone.items:
+            boxes = [(each, zone.height_m) for each in _in_lines([box for box, _ in boxes])]
         rows = []
-        for each in standing(layout):
-            rectangle_m, own_m = (
-                zone.element_rectangle_m(each),
-                zone.catalogue.variant(each).height_m,
-            )
+        for rectangle_m, own_m in boxes:
             top_m = ground_below_m(terraces, rectangle_m) + own_m if own_m else air_m
             rows.append([*rectangle_m, top_m])
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
@@ -336,6 +340,23 @@ class SurrogateSite:
             log_peak=np.log(peak),
             area_m2=points.area_m2,
         )
+
+
+def _in_lines(boxes: Sequence[Rectangle]) -> list[Rectangle]:
+    """Return boxes with those side by side as one, along x or along y: as few as possible."""
+    return min((_lines(boxes, along) for along in (0, 1)), key=len)
+
+
+def _lines(boxes: Sequence[Rectangle], along: int) -> list[Rectangle]:
+    """Return boxes of one size with those side by side along an axis as one."""
+    lines: list[Rectangle] = []
+    for box in sorted(boxes, key=lambda each: (each[1 - along], each[along])):
+        last = lines[-1] if lines else None
+        if last is not None and last[1 - along] == box[1 - along] and last[2 + along] == box[along]:
+            lines[-1] = Rectangle(*last[:2], *box[2:])
+        else:
+            lines.append(box)
+    return lines
 
 
 def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> float:

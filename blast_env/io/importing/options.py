@@ -49,12 +49,12 @@ class ImportOptions:
     """
 
     name: str | None = option(None, "Name of the scenario.")
-    origin: PlaceXY | None = option(None, f"The site's lower left corner. {_PLACE}", metavar="X Y")
-    centre: PlaceXY | None = option(None, "The site's middle, instead of --origin.", metavar="X Y")
+    origin: PlaceXY | None = option(None, f"The site's lower left corner. {_PLACE}", metavar="X,Y")
+    centre: PlaceXY | None = option(None, "The site's middle, instead of --origin.", metavar="X,Y")
     size_m: PlaceXY | None = option(
         None,
         "The site's extents, m.",
-        metavar="WIDTH HEIGHT",
+        metavar="WIDTH,HEIGHT",
         show_default="as much as everything in the file needs",
     )
     margin_m: float = option(10.0, "Ground around everything without --size, m.")
@@ -79,12 +79,12 @@ class ImportOptions:
     keep_outs_from: tuple[str, ...] = option((), "Areas to be kept empty, named in the same way.")
     protect: tuple[str, ...] = option((), "Name of a building whose load counts.")
     protect_near: PlaceXY | None = option(
-        None, "Protect the building nearest to this.", metavar="X Y"
+        None, "Protect the building nearest to this.", metavar="X,Y"
     )
     tnt_kg: float = option(100.0, "Mass of the charges, kg TNT.", metavar="KG")
     charge_at: tuple[PlaceXY, ...] = option((), "A further place of a charge.", metavar="X,Y")
     zone_m: tuple[float, float, float, float] | None = option(
-        None, "The build zone, site metres.", metavar="LEFT BOTTOM WIDTH HEIGHT"
+        None, "The build zone, site metres.", metavar="LEFT,BOTTOM,WIDTH,HEIGHT"
     )
     zone_around_m: float | None = option(None, "Width of a zone around the protected buildings, m.")
     stock: int = option(20, "Modules that there are to place.", min=1)

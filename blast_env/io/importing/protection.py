@@ -48,7 +48,7 @@ def protected_as_asked(
         chosen = {index for index, each in enumerate(buildings) if each.protected}
     if not chosen:
         raise BlastEnvError(
-            "no building is protected: say --protect NAME or --protect-near X Y; there are "
+            "no building is protected: say --protect NAME or --protect-near X,Y; there are "
             f"{_listed(buildings)}"
         )
     groups = {buildings[index].group for index in chosen}

@@ -144,7 +144,7 @@ def _asked(
         x_m, y_m = site.to_site(np.array([place]))[0]
         if not shapely.intersects(free, shapely.Point(x_m, y_m)):
             raise BlastEnvError(
-                f"--charge-at is {place[0]:.10g} {place[1]:.10g}, which is at ({x_m:.2f}, "
+                f"--charge-at is {place[0]:.10g},{place[1]:.10g}, which is at ({x_m:.2f}, "
                 f"{y_m:.2f}) m of the site: outside, in a building, or too near to one"
             )
         yield _point(float(x_m), float(y_m), options.tnt_kg)

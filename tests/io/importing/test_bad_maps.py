@@ -247,7 +247,7 @@ def test_choices_that_name_nothing(tmp_path: Path) -> None:
     path = written(tmp_path, outline(rectangle(0, 0, 6, 4), name="House"), PLACE)
     assert "--protect is 'Hous', but there are House" in error_of(path, protect=("Hous",))
     assert (
-        "no building is protected: say --protect NAME or --protect-near X Y; there are House"
+        "no building is protected: say --protect NAME or --protect-near X,Y; there are House"
         in (error_of(path))
     )
     assert "nothing on the site is chosen by --zone-from" in error_of(
@@ -258,7 +258,7 @@ def test_choices_that_name_nothing(tmp_path: Path) -> None:
     assert "no place for a charge on the site clear of buildings: say --charge-at" in error_of(
         lonely
     )
-    assert "--charge-at is 3 2, which is at (13.00, 12.00) m of the site" in error_of(
+    assert "--charge-at is 3,2, which is at (13.00, 12.00) m of the site" in error_of(
         lonely, charge_at=((3.0, 2.0),)
     )
     assert "the build zone is not on the site" in error_of(
