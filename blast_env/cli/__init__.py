@@ -17,6 +17,9 @@ class _Commands(LazyGroup):
         "calibrate": (
             "Run blasts at many distances, fit the three laws, and store one as a calibration."
         ),
+        "screen": (
+            "Screen a site before any blast: level of protection, and the stand-off that it needs."
+        ),
         "evaluate": "Compare layouts with no barrier, both exposed to the same threats.",
         "assess": "Assess the damage of buildings by charges: panes, panels, level of protection.",
         "advise": (

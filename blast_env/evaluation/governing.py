@@ -13,7 +13,12 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.contract import BlastLoads
 from blast_env.layout.build_scene import build_site
-from blast_env.particles.calibration.references import CURVES_SCALED_M, burst_of, kingery_bulmash
+from blast_env.particles.calibration.references import (
+    CURVES_SCALED_M,
+    burst_of,
+    kingery_bulmash,
+    oblique,
+)
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.scene import OUTWARDS, BlastSite, Charge, StructureOutline
 from blast_env.site.sight import in_sight
@@ -56,9 +61,8 @@ class Severity:
     def in_the_open(cls, scenario: Scenario, charge: Charge) -> "Severity":
         """Estimate the severity without a blast, by Kingery and Bulmash's impulse in the open.
 
-        On counted walls in sight of the charge it varies with the square of the cosine of the
-        angle of incidence, from the reflected impulse at normal incidence to the incident impulse
-        at grazing incidence. On other walls it is the incident impulse.
+        On counted walls in sight of the charge it varies with the angle of incidence (`oblique`).
+        On other walls it is the incident impulse.
         """
         site = build_site(scenario, (), 0, charge)
         protected = [each for each in site.structures if each.protected]
@@ -88,8 +92,7 @@ def _open_pa_s(site: BlastSite, structure: StructureOutline) -> float:
         kingery_bulmash(quantity, np.clip(away_m, low_m, high_m), charge.tnt_kg, burst)
         for quantity in ("reflected_impulse", "incident_impulse")
     )
-    met = incident + (reflected - incident) * facing**2
-    return float(np.where(seen, met, incident).mean())
+    return float(np.where(seen, oblique(reflected, incident, facing), incident).mean())
 
 
 def _points(site: BlastSite, structure: StructureOutline) -> tuple[FloatArray, FloatArray]:

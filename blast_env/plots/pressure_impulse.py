@@ -8,12 +8,11 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.style import number_on_axis, render_extra
-from blast_env.response.buildings import LevelOfProtection, level_of_protection
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
-from blast_env.response.facade import FacadeResponse, FilledBay, level_by_glass
-from blast_env.response.glass import GlazingCondition, Pane, glazing_responses
+from blast_env.response.damage import damage_number, level_of, under_triangle
+from blast_env.response.facade import FacadeResponse, FilledBay
 from blast_env.response.sdof import impulses
-from blast_env.response.walls import Panel, panel_responses
 from blast_env.units import PA_PER_KPA
 
 with render_extra():
@@ -29,7 +28,6 @@ _HALVINGS: Final = 8
 _MOST_PANELS: Final = 4
 _REACH: Final = 3.0
 _DECADES: Final = 100.0  # largest ratio of loads; smaller ones are outside the picture
-_STATIC_S: Final = 0.5  # longer loads have no further effect on stiffer components
 _PANEL_IN: Final = (4.9, 4.2)
 _INK: Final = ("#0072B2", "#000000")
 
@@ -168,19 +166,10 @@ def level_bounds(
             middle = np.sqrt(low * high)
             allows = np.array(
                 [
-                    _level(part, *load) >= level
+                    level_of(damage_number(under_triangle(part, *load))) >= level
                     for load in zip(peak_pa.tolist(), middle.tolist(), strict=True)
                 ]
             )
             low, high = np.where(allows, middle, low), np.where(allows, high, middle)
         found[level] = np.sqrt(low * high)
     return found
-
-
-def _level(part: Pane | Panel, peak_pa: float, impulse_pa_s: float) -> LevelOfProtection:
-    lasts_s = min(2.0 * impulse_pa_s / peak_pa, _STATIC_S)
-    time_s, history = np.array([0.0, lasts_s]), np.array([[peak_pa, 0.0]])
-    if isinstance(part, Panel):
-        return level_of_protection(panel_responses([part], time_s, history).levels[0])
-    panes = glazing_responses([part], time_s, history)
-    return level_by_glass(GlazingCondition(int(panes.condition[0])))

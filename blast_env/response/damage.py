@@ -8,12 +8,15 @@ new blast.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpened
+from blast_env.response.glass import GlazingResponses, Pane, glazing_responses
+from blast_env.response.walls import Panel, PanelResponses, panel_responses
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,33 @@ class TriangularLoads:
             BayDamage(bay.name, bay.structure, *areas, found[kind].damage)
             for kind, bay, areas in self._bays
         )
+
+
+_STATIC_S: Final = 0.5
+"""Longest triangular load; longer ones have no further effect."""
+
+
+def under_triangle(
+    part: Pane | Panel, peak_pa: float, impulse_pa_s: float
+) -> GlazingResponses | PanelResponses:
+    """Return the response of one pane or panel to a triangular load without a rise time.
+
+    Args:
+        part: The pane or panel.
+        peak_pa: Peak of the load.
+        impulse_pa_s: Impulse, which determines the duration.
+    """
+    lasts_s = min(2.0 * impulse_pa_s / peak_pa, _STATIC_S)
+    time_s, history_pa = np.array([0.0, lasts_s]), np.array([[peak_pa, 0.0]])
+    if isinstance(part, Panel):
+        return panel_responses([part], time_s, history_pa)
+    return glazing_responses([part], time_s, history_pa)
+
+
+def damage_number(found: GlazingResponses | PanelResponses) -> float:
+    """Return the damage of the first pane or panel as a number."""
+    numbers = found.damage if isinstance(found, PanelResponses) else found.hazard
+    return float(numbers[0])
 
 
 def _kind(bay: Alternatives) -> tuple[object, ...]:

@@ -94,6 +94,15 @@ class GlazingCondition(IntEnum):
         """GSA's name of the condition: 1, 2, 3a, 3b, 4 or 5."""
         return ("1", "2", "3a", "3b", "4", "5")[self.value - 1]
 
+    @property
+    def rating(self) -> str:
+        """Hazard rating of ISO 16933, A to F.
+
+        A did not break, B is retained, D within 1 m, E within 3 m, F is farther or hits the panel.
+        C, a partial tear, is not modelled: such a pane tears, and has D or worse.
+        """
+        return ("A", "B", "D", "E", "F", "F")[self.value - 1]
+
 
 class Interlayer(BaseModel):
     """Interlayer of laminated glass, which retains the fragments.

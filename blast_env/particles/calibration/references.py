@@ -215,6 +215,23 @@ def burst_of(height_m: float, charge_kg: float) -> Burst:
     return "hemispherical" if low else "spherical"
 
 
+def oblique(reflected: FloatArray, incident: FloatArray, cosine: FloatArray) -> FloatArray:
+    """Return a peak or an impulse on a wall by the angle of incidence, in the unit of the curves.
+
+    I_r cos^2 + I_i (1 + cos - 2 cos^2), from the incident value at grazing incidence to the
+    normally reflected one. This is the rule of the CONWEP loads in DYNA3D (Randers-Pehrson &
+    Bannister, ARL-TR-1310, 1997). A wall that faces away has the incident value.
+
+    Args:
+        reflected: The value at normal incidence.
+        incident: The value side-on.
+        cosine: Cosine of the angle between the wall's normal and the way to the charge.
+    """
+    facing = np.clip(cosine, 0.0, 1.0)
+    value: FloatArray = reflected * facing**2 + incident * (1.0 + facing - 2.0 * facing**2)
+    return value
+
+
 def largest_reflected_peak_pa(distance_m: FloatArray, charge_kg: float) -> FloatArray:
     """Return the reflected peak at normal incidence in the open, for a hemispherical burst, Pa.
 

@@ -1,0 +1,569 @@
+"""Screening: the response of facades and the stand-off they need, before any blast.
+
+Loads are Kingery and Bulmash's in the open, those of a hemispherical burst near the ground. A bay
+in sight of the charge has the peak and the impulse of its middle by the angle of incidence
+(`oblique`), one out of sight the side-on values of the same distance. The history is a triangle.
+
+Stand-offs are for normal incidence. They end at both limits of validity: nearer than
+1.7 m/kg^(1/3) walls may be breached, and the curves end at 40 m/kg^(1/3).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil, hypot
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray, IntArray
+from blast_env.errors import BlastEnvError
+from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
+from blast_env.geometry import Element
+from blast_env.layout.build_scene import build_site, worst_places
+from blast_env.particles.calibration.references import (
+    CURVES_SCALED_M,
+    Burst,
+    Quantity,
+    burst_of,
+    kingery_bulmash,
+    oblique,
+)
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Glazing, Wall, catalogue
+from blast_env.response.damage import damage_number, level_of, under_triangle
+from blast_env.response.facade import STOREY_M, FilledBay
+from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane
+from blast_env.response.requirements import Requirement
+from blast_env.response.walls import DamageLevel, Panel, PanelResponses, damage_level
+from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
+from blast_env.site.presets import NamedCharge
+from blast_env.site.scene import OUTWARDS, BlastSite, Charge
+from blast_env.site.sections import PointM
+from blast_env.site.sight import in_sight
+from blast_env.units import MODULE_SIDE_M
+
+LEFT_OUT: Final = (
+    "left out: shielding (a wall out of sight has the side-on load), echoes between walls, clearing"
+    " round edges, suction, and breaching nearer than 1.7 m/kg^(1/3)"
+)
+"""What screening does not know."""
+
+_APART_M: Final = 2.0
+_MOST_PLACES: Final = 300
+_POINTS: Final = 14  # of a table of damage, along each axis
+_DISTANCES: Final = 400  # of stand-offs, each 0.8 % farther than the last
+
+
+@dataclass(frozen=True)
+class ScreenedBay:
+    """A bay under one charge.
+
+    Attributes:
+        filled: The bay.
+        distance_m: Distance of its middle from the charge.
+        in_sight: Whether the charge sees its middle.
+        peak_pa: Peak of its load.
+        impulse_pa_s: Impulse of its load.
+        glazing: Response of its panes; `None` without.
+        wall_damage: Damage of its wall panel as a number; `None` without one.
+    """
+
+    filled: FilledBay
+    distance_m: float
+    in_sight: bool
+    peak_pa: float
+    impulse_pa_s: float
+    glazing: GlazingResponses | None
+    wall_damage: float | None
+
+    def damage(self, *, glass_only: bool = False) -> float:
+        """Return the damage of its worst part as a number."""
+        glass = 0.0 if self.glazing is None else damage_number(self.glazing)
+        return glass if glass_only else max(glass, self.wall_damage or 0.0)
+
+
+@dataclass(frozen=True)
+class Screened:
+    """The worst place of one threat.
+
+    Attributes:
+        name: Name of the threat.
+        charge: The charge at its worst place by damage.
+        places: Number of its places.
+        bays: The bays.
+    """
+
+    name: str
+    charge: Charge
+    places: int
+    bays: tuple[ScreenedBay, ...]
+
+    @property
+    def level(self) -> LevelOfProtection:
+        """Level of protection, that of the worst part."""
+        return level_of(max(each.damage() for each in self.bays))
+
+    @property
+    def nearest_m(self) -> float:
+        """Distance of the nearest bay's middle."""
+        return min(each.distance_m for each in self.bays)
+
+    @property
+    def broken_panes(self) -> float:
+        """Expected number of broken panes."""
+        return sum(
+            each.filled.panes * float(each.glazing.break_probability[0])
+            for each in self.bays
+            if each.glazing is not None
+        )
+
+    @property
+    def panes(self) -> int:
+        """Number of panes."""
+        return sum(each.filled.panes for each in self.bays)
+
+    @property
+    def condition(self) -> GlazingCondition | None:
+        """Performance condition of the worst pane; `None` without panes."""
+        found = [int(each.glazing.condition[0]) for each in self.bays if each.glazing is not None]
+        return GlazingCondition(max(found)) if found else None
+
+    @property
+    def wall_damage(self) -> DamageLevel | None:
+        """Damage of the worst wall panel; `None` without one."""
+        found = [each.wall_damage for each in self.bays if each.wall_damage is not None]
+        return damage_level(np.array([max(found)]))[0] if found else None
+
+    @property
+    def may_breach(self) -> bool:
+        """Whether a bay is so near that its wall may be breached."""
+        return bool(self.nearest_m < CHECKED_SCALED_DISTANCE[0] * np.cbrt(self.charge.tnt_kg))
+
+    def keeps(self, requirement: Requirement) -> bool:
+        """Return whether every bay keeps a requirement."""
+        worst = max(each.damage(glass_only=requirement.glass_only) for each in self.bays)
+        return (
+            level_of(worst) >= requirement.level
+            and max(each.peak_pa for each in self.bays) <= requirement.peak_pa
+            and max(each.impulse_pa_s for each in self.bays) <= requirement.impulse_pa_s
+        )
+
+
+@dataclass(frozen=True)
+class StandOff:
+    """The distances from which a component allows the levels of protection.
+
+    Attributes:
+        name: Name of the component.
+        component: The component.
+        distances_m: Distance by level; infinite beyond the end of the curves.
+        least_m: Least distance for which the response is valid; a distance equal to it may be less.
+    """
+
+    name: str
+    component: Glazing | Wall
+    distances_m: Mapping[LevelOfProtection, float]
+    least_m: float
+
+    def in_words(self, distance_m: float) -> str:
+        """Return a distance in words, m, with the limits of validity."""
+        if np.isinf(distance_m):
+            return f"> {self.most_m:.0f}"
+        return f"< {self.least_m:.0f}" if distance_m <= self.least_m else f"{distance_m:.0f}"
+
+    @property
+    def most_m(self) -> float:
+        """Distance of the end of the curves."""
+        return self.least_m * CURVES_SCALED_M[1] / CHECKED_SCALED_DISTANCE[0]
+
+
+@dataclass(frozen=True)
+class Screening:
+    """A site before any blast.
+
+    Attributes:
+        threats: The threats at their worst places.
+        components: The components of the site and the catalogue, by name.
+        present: Names of the components in the site's bays.
+        storey_m: The most frequent height of a storey, the span of walls.
+    """
+
+    threats: tuple[Screened, ...]
+    components: Mapping[str, Glazing | Wall]
+    present: frozenset[str]
+    storey_m: float
+
+    @cached_property
+    def stand_offs(self) -> Mapping[str, tuple[StandOff, ...]]:
+        """The stand-off of each component, by the name of the threat."""
+        return {
+            each.name: stand_offs(self.components, each.charge, self.storey_m)
+            for each in self.threats
+        }
+
+    def needed_m(self, threat: str, requirement: Requirement) -> float:
+        """Return the stand-off at which all components of the site keep a requirement.
+
+        Args:
+            threat: Name of the threat.
+            requirement: The requirement.
+        """
+        found = next(each for each in self.threats if each.name == threat)
+        own = [
+            each.distances_m[requirement.level]
+            for each in self.stand_offs[threat]
+            if requirement.level in each.distances_m
+            and each.name in self.present
+            and not (requirement.glass_only and isinstance(each.component, Wall))
+        ]
+        curves = _Curves(found.charge)
+        own += [
+            curves.reach_m(index, limit)
+            for index, limit in ((1, requirement.peak_pa), (2, requirement.impulse_pa_s))
+            if np.isfinite(limit)
+        ]
+        return max(own, default=0.0)
+
+
+def screen(
+    scenario: Scenario,
+    layout: Sequence[Element] = (),
+    threats: Iterable[NamedCharge] = (),
+) -> Screening:
+    """Return the response of a site's facades before any blast, and the stand-offs they need.
+
+    Args:
+        scenario: The scenario; some of its structures have facades.
+        layout: A legal layout: its measures and the vehicles it stops count. Its pieces cut lines
+            of sight, but do not shield.
+        threats: Charges that may go off at every place of the site's charges; the site's own
+            charges without any.
+
+    Raises:
+        BlastEnvError: If no structure has a facade, or two threats have the same name.
+    """
+    named = [*threats]
+    sources = _by_threat(scenario, named)
+    if len({each.name for each in named}) < len(named):
+        raise BlastEnvError("threats: two have the same name, must differ")
+    bays = scenario.bays_with(layout)
+    if not bays:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r}: no structure has a facade with bays: add"
+            " [structures.facade], or give --glazing or --wall"
+        )
+    facade = _Facade.of(scenario, layout, bays)
+    screened = []
+    known_places: dict[object, _Seen] = {}  # threats that differ in mass alone share them
+    for name, own in sources.items():
+        places = [*_places(scenario, own, layout)]
+        key = tuple((each.position_m, each.height_m) for each in places)
+        if key not in known_places:
+            known_places[key] = facade.seen_from(places)
+        screened.append(_screened(name, facade, places, known_places[key]))
+    named_bays = scenario.named_bays(layout)
+    storeys = [each.bay.height_m for each in bays]
+    return Screening(
+        tuple(screened),
+        {**catalogue(), **scenario.components},
+        frozenset(name for each in named_bays for name in (each.glazing, each.wall) if name),
+        max(set(storeys), key=storeys.count),
+    )
+
+
+def stand_offs(
+    components: Mapping[str, Glazing | Wall], charge: Charge, storey_m: float = STOREY_M
+) -> tuple[StandOff, ...]:
+    """Return the stand-off that each component needs for each level of protection.
+
+    Args:
+        components: The components.
+        charge: The charge, at any place.
+        storey_m: Height of a storey, the span of walls.
+    """
+    curves = _Curves(charge)
+    found = []
+    for name, component in components.items():
+        part = component.panel(storey_m) if isinstance(component, Wall) else component.pane
+        distances_m = {
+            level: curves.stand_off_m(part, level)
+            for level in sorted(LevelOfProtection, reverse=True)[:-1]
+        }
+        found.append(StandOff(name, component, distances_m, curves.least_m))
+    return tuple(found)
+
+
+def facades_for(scenario: Scenario, glazing: str | None, wall: str | None) -> Scenario:
+    """Return a scenario whose protected structures without a facade have one.
+
+    Args:
+        scenario: The scenario.
+        glazing: Name of the component of their windows.
+        wall: Name of the component of their walls.
+
+    Raises:
+        ScenarioError: If a structure has no height, or a component does not exist or fit.
+    """
+    facade = {key: name for key, name in (("glazing", glazing), ("wall", wall)) if name}
+    if not facade:
+        return scenario
+    document = scenario.model_dump(mode="json", exclude_none=True)
+    for structure in document["structures"]:
+        if structure["protected"] and "facade" not in structure:
+            structure["facade"] = facade
+    return Scenario.from_document(document, scenario.name)
+
+
+class _Curves:
+    """Kingery and Bulmash's loads of one charge in the open."""
+
+    def __init__(self, charge: Charge) -> None:
+        self._tnt_kg = charge.tnt_kg
+        self._burst: Burst = burst_of(charge.height_m, charge.tnt_kg)
+        scale = float(np.cbrt(charge.tnt_kg))
+        self._ends_m = CURVES_SCALED_M[0] * scale, CURVES_SCALED_M[1] * scale
+        self.least_m, self.most_m = CHECKED_SCALED_DISTANCE[0] * scale, self._ends_m[1]
+
+    def at(self, quantity: Quantity, distance_m: FloatArray) -> FloatArray:
+        """Return a load at distances, or that at the nearer end of the curve."""
+        inside_m = np.clip(distance_m, *self._ends_m)
+        return kingery_bulmash(quantity, inside_m, self._tnt_kg, self._burst)
+
+    @cached_property
+    def reflected(self) -> FloatArray:
+        """Distances, and the reflected peak and impulse there (3, distances)."""
+        distances_m = np.geomspace(self.least_m, self.most_m, _DISTANCES)
+        return np.stack([distances_m, *(self.at(each, distances_m) for each in _REFLECTED)])
+
+    def stand_off_m(self, part: Pane | Panel, level: LevelOfProtection) -> float:
+        """Return the least of the distances at which a part allows a level."""
+        distances_m, *loads = self.reflected
+
+        def keeps(index: int) -> bool:
+            found = under_triangle(part, *(float(each[index]) for each in loads))
+            return level_of(damage_number(found)) >= level
+
+        low, high = -1, _DISTANCES  # fails at the first, keeps at the second
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if keeps(middle) else (middle, high)
+        return np.inf if high == _DISTANCES else float(distances_m[high])
+
+    def reach_m(self, index: int, limit: float) -> float:
+        """Return the distance from which a row of `reflected` keeps a limit; may be infinite."""
+        kept = self.reflected[index] <= limit
+        return float(self.reflected[0][np.argmax(kept)]) if kept.any() else np.inf
+
+
+_REFLECTED: Final[tuple[Quantity, Quantity]] = ("reflected_overpressure", "reflected_impulse")
+_INCIDENT: Final[tuple[Quantity, Quantity]] = ("incident_overpressure", "incident_impulse")
+
+
+@dataclass(frozen=True, eq=False)
+class _Facade:
+    """The bays of a site in the open air.
+
+    Attributes:
+        bays: The bays.
+        middles_m: Their middles, before the modules of oblique walls (bays, 3).
+        outward: Their outward normals (bays, 3).
+        site: The site with a charge that does not count.
+    """
+
+    bays: tuple[FilledBay, ...]
+    middles_m: FloatArray
+    outward: FloatArray
+    site: BlastSite
+
+    @classmethod
+    def of(
+        cls, scenario: Scenario, layout: Sequence[Element], bays: Sequence[FilledBay]
+    ) -> "_Facade":
+        """Return the bays that no structure covers."""
+        boxes = {each.name: each.rectangle_m for each in scenario.structures}
+        middles, outward = [], []
+        for bay in (each.bay for each in bays):
+            along_m = 0.5 * (bay.left_m + bay.right_m)
+            if bay.line is not None:
+                (x_m, y_m), normal = bay.line.point_at(along_m), bay.line.normal
+            else:
+                left, bottom, right, top = boxes[bay.structure]
+                normal = OUTWARDS[bay.wall]
+                x_m, y_m = {
+                    "west": (left, along_m),
+                    "east": (right, along_m),
+                    "south": (along_m, bottom),
+                    "north": (along_m, top),
+                }[bay.wall]
+            middles.append((x_m, y_m, 0.5 * (bay.floor_m + bay.top_m)))
+            outward.append((*normal, 0.0))
+        normals = np.array(outward)
+        before_m = np.array(middles) + MODULE_SIDE_M * normals
+        site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
+        free = ~_covered(site, before_m)
+        kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
+        return cls(kept, before_m[free], normals[free], site)
+
+    @cached_property
+    def kinds(self) -> tuple[IntArray, list[list[Pane | Panel]]]:
+        """Number of the kind of each bay, and the parts of each: equal parts respond equally."""
+        known: dict[object, int] = {}
+        numbers, parts = [], []
+        for each in self.bays:
+            key = each.glazing, each.wall, round(each.bay.height_m, 6)
+            if key not in known:
+                known[key] = len(known)
+                own: list[Pane | Panel] = [] if each.glazing is None else [each.glazing.pane]
+                own += [] if each.wall is None else [each.wall.panel(each.bay.height_m)]
+                parts.append(own)
+            numbers.append(known[key])
+        return np.array(numbers), parts
+
+    def seen_from(self, places: Sequence[Charge]) -> "_Seen":
+        """Return how the bays lie to places."""
+        ways, seen = [], []
+        for each in places:
+            site = replace(self.site, charge=each)
+            ways.append(np.array([*each.position_m, each.height_m]) - self.middles_m)
+            seen.append(in_sight(site, self.middles_m, self.outward))
+        way_m = np.stack(ways)
+        away_m: FloatArray = np.linalg.norm(way_m, axis=2)
+        return _Seen(away_m, (way_m * self.outward).sum(axis=2) / away_m, np.stack(seen))
+
+
+class _Seen(NamedTuple):
+    """Distances, cosines of the angles of incidence, and sight (places, bays)."""
+
+    away_m: FloatArray
+    cosine: FloatArray
+    seen: BoolArray
+
+    def loads(self, charge: Charge) -> Iterator[FloatArray]:
+        """Yield the peak, Pa, and the impulse, Pa s, of a mass (places, bays)."""
+        curves = _Curves(charge)
+        for reflected, incident in zip(_REFLECTED, _INCIDENT, strict=True):
+            side_on = curves.at(incident, self.away_m)
+            met = oblique(curves.at(reflected, self.away_m), side_on, self.cosine)
+            yield np.where(self.seen, met, side_on)
+
+
+def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
+    """Return whether points lie inside a structure (n,)."""
+    covered = np.zeros(len(points_m), dtype=bool)
+    for block in (block for outline in site.structures for block in outline.blocks):
+        left, bottom, right, top = block.rectangle_m
+        high_m = np.inf if block.height_m is None else block.height_m
+        low, high = np.array([left, bottom, block.base_m]), np.array([right, top, high_m])
+        covered |= ((points_m > low) & (points_m < high)).all(axis=1)
+    return covered
+
+
+def _by_threat(
+    scenario: Scenario, named: Sequence[NamedCharge]
+) -> dict[str, tuple[AnySource, ...]]:
+    """Return the sources of each threat: all of the site's, or those of one mass and height."""
+    if named:
+        return {
+            each.name: tuple(
+                source.model_copy(update={"tnt_kg": each.tnt_kg}) for source in scenario.charge
+            )
+            for each in named
+        }
+    found: dict[str, tuple[AnySource, ...]] = {}
+    for source in scenario.charge:
+        high = f", {source.height_m:g} m high" if source.height_m else ""
+        name = f"{source.tnt_kg:g} kg{high}"
+        found[name] = (*found.get(name, ()), source)
+    return found
+
+
+def _places(
+    scenario: Scenario, sources: Sequence[AnySource], layout: Sequence[Element]
+) -> Iterator[Charge]:
+    """Yield the places of a threat, at most `_APART_M` apart if they are not too many."""
+    lengths_m = [hypot(*(b - a for a, b in zip(*_span(each), strict=True))) for each in sources]
+    apart_m = max(_APART_M, sum(lengths_m) / _MOST_PLACES)
+    for source, length_m in zip(sources, lengths_m, strict=True):
+        points: Iterable[PointM]
+        if isinstance(source, VehicleSource):
+            points = worst_places(scenario, source, layout).places_m
+        elif isinstance(source, RectangleSource):
+            points = _grid(source, apart_m)
+        else:
+            (x0, y0), (x1, y1) = _span(source)
+            shares = np.linspace(0.0, 1.0, ceil(length_m / apart_m) + 1)
+            points = [(x0 + share * (x1 - x0), y0 + share * (y1 - y0)) for share in shares]
+        yield from (Charge((float(x), float(y)), source.tnt_kg, source.height_m) for x, y in points)
+
+
+def _span(source: AnySource) -> tuple[PointM, PointM]:
+    if isinstance(source, VehicleSource | RectangleSource):
+        return (0.0, 0.0), (0.0, 0.0)
+    return source.segment_m
+
+
+def _grid(source: RectangleSource, apart_m: float) -> list[PointM]:
+    left, bottom, right, top = source.rectangle_m
+    x_m, y_m = (
+        np.linspace(low, high, min(ceil((high - low) / apart_m), 12) + 1)
+        for low, high in ((left, right), (bottom, top))
+    )
+    return [(x, y) for x in x_m.tolist() for y in y_m.tolist()]
+
+
+def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen) -> Screened:
+    """Return the place of a threat with the worst level, then the largest sum of damage."""
+    peaks, impulses = seen.loads(places[0])
+    numbers, parts = facade.kinds
+    damage = np.zeros(peaks.shape)
+    for kind, own in enumerate(parts):
+        which = numbers == kind
+        damage[:, which] = _tabulated(own, peaks[:, which], impulses[:, which])
+    order = [(int(each.max()), float(each.sum())) for each in damage]
+    worst = max(range(len(places)), key=lambda index: order[index])
+    bays = []
+    for index, filled in enumerate(facade.bays):
+        load = float(peaks[worst, index]), float(impulses[worst, index])
+        found = [under_triangle(each, *load) for each in parts[numbers[index]]]
+        glass = [each for each in found if isinstance(each, GlazingResponses)]
+        walls = [damage_number(each) for each in found if isinstance(each, PanelResponses)]
+        bays.append(
+            ScreenedBay(
+                filled,
+                float(seen.away_m[worst, index]),
+                bool(seen.seen[worst, index]),
+                *load,
+                glass[0] if glass else None,
+                walls[0] if walls else None,
+            )
+        )
+    return Screened(name, places[worst], len(places), tuple(bays))
+
+
+def _tabulated(
+    parts: Sequence[Pane | Panel], peak_pa: FloatArray, impulse_pa_s: FloatArray
+) -> FloatArray:
+    """Return the damage of the worst of some parts under many loads, by a table of it."""
+    shares, axes = [], []
+    for values in (peak_pa, impulse_pa_s):
+        low, high = np.log(values.min()), np.log(values.max()) + 1e-6
+        axes.append(np.exp(np.linspace(low, high, _POINTS)))
+        shares.append((np.log(values) - low) / (high - low) * (_POINTS - 1))
+    table = np.array(
+        [
+            [
+                max(damage_number(under_triangle(part, peak, impulse)) for part in parts)
+                for impulse in axes[1].tolist()
+            ]
+            for peak in axes[0].tolist()
+        ]
+    )
+    (row, column), (up, right) = (
+        [each.astype(np.int64) for each in shares],
+        [each % 1.0 for each in shares],
+    )
+    left = table[row, column] * (1.0 - up) + table[row + 1, column] * up
+    beside = table[row, column + 1] * (1.0 - up) + table[row + 1, column + 1] * up
+    found: FloatArray = left * (1.0 - right) + beside * right
+    return found

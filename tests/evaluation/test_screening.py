@@ -1,0 +1,133 @@
+"""Screening: loads by the curves, the response to them, and the stand-offs."""
+
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.screening import Screening, facades_for, screen, stand_offs
+from blast_env.particles.calibration.references import kingery_bulmash, oblique
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Glazing, catalogue
+from blast_env.response.damage import damage_number, level_of, under_triangle
+from blast_env.response.requirements import Requirement
+from blast_env.site import Scenario
+from blast_env.site.presets import NamedCharge, tnt_equivalent_kg
+from blast_env.site.scene import Charge
+from tests.gas_sites import hut, site_document
+
+
+def yard(**charge: object) -> Scenario:
+    """Return a building of one storey, 20 m from a charge, with a shed before its west wall."""
+    document = site_document(
+        site={"width_m": 60.0, "height_m": 40.0, "air_height_m": 12.0},
+        charge=[{"kind": "point", "position_m": [10.0, 20.0], "tnt_kg": 5.0} | charge],
+        structures=[
+            {
+                "kind": "polygon",
+                "name": "office",
+                "outline_m": [[30.0, 14.0], [42.0, 14.0], [42.0, 26.0], [30.0, 26.0]],
+                "height_m": 3.5,
+                "protected": True,
+                "facade": {"glazing": "window_annealed_6", "wall": "brick_215"},
+            }
+        ],
+        gauges=[],
+    )
+    del document["build_zone"]
+    return Scenario.from_document(document, "yard")
+
+
+@pytest.fixture(scope="module")
+def screened() -> Screening:
+    return screen(yard())
+
+
+def test_the_load_of_a_bay_in_sight_is_that_of_its_angle(screened: Screening) -> None:
+    west = next(each for each in screened.threats[0].bays if each.filled.bay.wall == "west")
+    assert west.in_sight
+    bay = west.filled.bay
+    middle_m = np.array([*bay.line.point_at(0.5 * bay.width_m), 1.75])  # type: ignore[union-attr]
+    way_m = np.array([10.0, 20.0, 0.0]) - middle_m - np.array([-0.5, 0.0, 0.0])
+    away_m = float(np.linalg.norm(way_m))
+    reflected, incident = (
+        kingery_bulmash(quantity, np.array(away_m), 5.0)
+        for quantity in ("reflected_impulse", "incident_impulse")
+    )
+    expected = oblique(reflected, incident, np.array(-way_m[0] / away_m))
+    assert west.impulse_pa_s == pytest.approx(float(expected), rel=1e-9)
+
+
+def test_a_bay_out_of_sight_has_the_side_on_load(screened: Screening) -> None:
+    east = next(each for each in screened.threats[0].bays if each.filled.bay.wall == "east")
+    assert not east.in_sight
+    side_on = kingery_bulmash("incident_overpressure", east.distance_m, 5.0)
+    assert east.peak_pa == pytest.approx(side_on, rel=1e-9)
+
+
+def test_the_rule_of_the_angle_goes_from_the_reflected_to_the_side_on_load() -> None:
+    cosines = np.array([1.0, 0.5, 0.0, -1.0])
+    assert oblique(np.full(4, 8.0), np.full(4, 3.0), cosines).tolist() == [8.0, 5.0, 3.0, 3.0]
+
+
+def test_the_nearest_place_of_a_line_is_the_worst() -> None:
+    line = {"kind": "segment", "start_m": [4.0, 4.0], "end_m": [24.0, 20.0]}
+    document = yard().model_dump(mode="json", exclude_none=True)
+    document["charge"] = [line | {"tnt_kg": 5.0}]
+    found = screen(Scenario.from_document(document, "yard")).threats[0]
+    assert found.charge.position_m == (24.0, 20.0)
+    assert found.places > 10
+
+
+def test_a_component_keeps_its_level_from_its_stand_off_on() -> None:
+    pane = catalogue()["window_annealed_6"]
+    (glass,) = stand_offs({"w": pane}, Charge((0.0, 0.0), 5.0))
+    needed_m = glass.distances_m[LevelOfProtection.LOW]
+    assert glass.least_m < needed_m < glass.most_m
+    assert isinstance(pane, Glazing)
+    levels = [
+        level_of(damage_number(under_triangle(pane.pane, *reflected(share * needed_m))))
+        for share in (0.97, 1.0)
+    ]
+    assert levels[0] < LevelOfProtection.LOW <= levels[1]
+
+
+def reflected(distance_m: float) -> tuple[float, float]:
+    """Return the normally reflected peak and impulse of 5 kg."""
+    peak_pa = kingery_bulmash("reflected_overpressure", distance_m, 5.0)
+    return peak_pa, kingery_bulmash("reflected_impulse", distance_m, 5.0)
+
+
+def test_a_limit_of_the_peak_needs_the_distance_of_the_curve(screened: Screening) -> None:
+    limit = Requirement.parsed("peak 10")
+    needed_m = screened.needed_m("5 kg", limit)
+    peak_pa = kingery_bulmash("reflected_overpressure", needed_m, 5.0)
+    assert 9_500.0 < peak_pa <= 10_000.0
+    assert not screened.threats[0].keeps(limit)
+
+
+def test_requirements_name_one_scale() -> None:
+    assert Requirement.parsed("gsa 3a").level is LevelOfProtection.LOW
+    assert Requirement.parsed("iso C").level is LevelOfProtection.MEDIUM
+    assert not Requirement.parsed("very low").glass_only
+    for wrong in ("gsa 4", "peak -1", "meduim"):
+        with pytest.raises(BlastEnvError):
+            Requirement.parsed(wrong)
+
+
+def test_masses_by_name_and_by_explosive() -> None:
+    assert NamedCharge.parsed("car").tnt_kg == 227.0
+    assert NamedCharge.parsed("truck=100,anfo").tnt_kg == pytest.approx(82.0)
+    assert tnt_equivalent_kg(1.0, "c4") == 1.37
+    for wrong in ("cart", "truck=0", "truck=1,semtex", "=3"):
+        with pytest.raises(BlastEnvError):
+            NamedCharge.parsed(wrong)
+
+
+def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
+    with pytest.raises(BlastEnvError, match="--glazing"):
+        screen(hut())
+    found = screen(facades_for(hut(), None, "brick_215"), (), [NamedCharge("car", 227.0)])
+    assert found.present == {"brick_215"}
+    assert found.threats[0].name == "car"
+    assert found.threats[0].condition is None
+    assert found.threats[0].may_breach
