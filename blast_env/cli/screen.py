@@ -30,7 +30,7 @@ from blast_env.site.presets import (
     EQUIVALENTS_SOURCE,
     PRESETS_SOURCE,
     TNT_EQUIVALENTS,
-    NamedCharge,
+    NamedMass,
 )
 
 _HEADERS: Final = (
@@ -77,7 +77,7 @@ class ScreenCommand(Command):
     def __call__(self) -> None:
         """Print the tables, and draw the picture."""
         scenario = facades_for(load_scenario(self.scenario), self.glazing, self.wall)
-        named = [NamedCharge.parsed(each) for each in self.mass]
+        named = [NamedMass.parsed(each) for each in self.mass]
         level = scenario.objective.level or LevelOfProtection.LOW
         required = [Requirement.parsed(each) for each in self.require]
         required = required or [Requirement.of_level(level)]

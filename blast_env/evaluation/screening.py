@@ -37,7 +37,7 @@ from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane
 from blast_env.response.requirements import Requirement
 from blast_env.response.walls import DamageLevel, Panel, PanelResponses, damage_level
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
-from blast_env.site.presets import NamedCharge
+from blast_env.site.presets import NamedMass
 from blast_env.site.scene import OUTWARDS, BlastSite, Charge
 from blast_env.site.sections import PointM
 from blast_env.site.sight import in_sight
@@ -229,7 +229,7 @@ class Screening:
 def screen(
     scenario: Scenario,
     layout: Sequence[Element] = (),
-    threats: Iterable[NamedCharge] = (),
+    threats: Iterable[NamedMass] = (),
 ) -> Screening:
     """Return the response of a site's facades before any blast, and the stand-offs they need.
 
@@ -459,9 +459,7 @@ def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:
     return covered
 
 
-def _by_threat(
-    scenario: Scenario, named: Sequence[NamedCharge]
-) -> dict[str, tuple[AnySource, ...]]:
+def _by_threat(scenario: Scenario, named: Sequence[NamedMass]) -> dict[str, tuple[AnySource, ...]]:
     """Return the sources of each threat: all of the site's, or those of one mass and height."""
     if named:
         return {

@@ -129,9 +129,10 @@ def _draw_rings(
     )
 
 
-def _pale(level: LevelOfProtection) -> tuple[float, ...]:
+def _pale(level: LevelOfProtection) -> tuple[float, float, float]:
     """Return the colour of a level, pale enough for what is drawn over it."""
-    return tuple(1.0 - _PALE * (1.0 - part) for part in to_rgb(LEVEL_COLOURS[level]))
+    red, green, blue = (1.0 - _PALE * (1.0 - part) for part in to_rgb(LEVEL_COLOURS[level]))
+    return red, green, blue
 
 
 def _patch(

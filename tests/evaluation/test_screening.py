@@ -11,7 +11,7 @@ from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import damage_number, level_of, under_triangle
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
-from blast_env.site.presets import NamedCharge, tnt_equivalent_kg
+from blast_env.site.presets import NamedMass, tnt_equivalent_kg
 from blast_env.site.scene import Charge
 from tests.gas_sites import hut, site_document
 
@@ -115,18 +115,18 @@ def test_requirements_name_one_scale() -> None:
 
 
 def test_masses_by_name_and_by_explosive() -> None:
-    assert NamedCharge.parsed("car").tnt_kg == 227.0
-    assert NamedCharge.parsed("truck=100,anfo").tnt_kg == pytest.approx(82.0)
+    assert NamedMass.parsed("car").tnt_kg == 227.0
+    assert NamedMass.parsed("truck=100,anfo").tnt_kg == pytest.approx(82.0)
     assert tnt_equivalent_kg(1.0, "c4") == 1.37
     for wrong in ("cart", "truck=0", "truck=1,semtex", "=3"):
         with pytest.raises(BlastEnvError):
-            NamedCharge.parsed(wrong)
+            NamedMass.parsed(wrong)
 
 
 def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
     with pytest.raises(BlastEnvError, match="--glazing"):
         screen(hut())
-    found = screen(facades_for(hut(), None, "brick_215"), (), [NamedCharge("car", 227.0)])
+    found = screen(facades_for(hut(), None, "brick_215"), (), [NamedMass("car", 227.0)])
     assert found.present == {"brick_215"}
     assert found.threats[0].name == "car"
     assert found.threats[0].condition is None
