@@ -24,7 +24,7 @@ from blast_env.app.work import (
     read_task,
     write_status,
 )
-from blast_env.design.proposal import chosen_for
+from blast_env.design.proposal import chosen_proposer
 from blast_env.design.search import LayoutProblem, Progress, find_proposer
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.evaluation.engines import JUDGE
@@ -119,7 +119,7 @@ def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[L
     case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
     problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
     report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
-    found = chosen_for(problem).propose(problem, report=report)
+    found = chosen_proposer().propose(problem, report=report)
     return found.layout, found.expectation if found.layout else found.by
 
 

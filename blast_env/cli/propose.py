@@ -1,4 +1,4 @@
-"""`blast-env propose`: a layout from the packaged weights, surrogate or rules."""
+"""`blast-env propose`: a layout from the surrogate."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ from blast_env.cli.output import (
     save_layout_picture,
     save_pictures,
 )
-from blast_env.design.proposal import Chosen, chosen_for, problem_of
+from blast_env.design.proposal import Chosen, chosen_proposer, problem_of
 from blast_env.design.rules import expected_charge
 from blast_env.design.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
 from blast_env.errors import BlastEnvError
@@ -52,9 +52,9 @@ _NOTHING: Final = "no barrier"
 class ProposeCommand(ChargeOptions, ProcessOptions):
     """Propose a layout for any site in seconds without a blast.
 
-    The layout comes from packaged weights trained for the same scenario, if there are any; if not,
-    from the surrogate of gas dynamics, fitted to other sites. Nothing is proposed if the expected
-    reduction is below 3 %. Without --charge, the layout is for all possible places of the charge.
+    The layout comes from the surrogate of gas dynamics, fitted to other sites. Nothing is proposed
+    if the expected reduction is below 3 %. Without --charge, the layout is for all possible places
+    of the charge.
     """
 
     scenario: str = argument(SCENARIO_HELP)
@@ -110,7 +110,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
 
     def _proposed(self, problem: LayoutProblem) -> tuple[Chosen, SearchResult]:
         """Return the proposer and its proposal; print the time of one without blasts."""
-        chosen = chosen_for(problem)
+        chosen = chosen_proposer()
         if self.budget is not None and not self.verify:
             raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast")
         began_s = perf_counter()

@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Final
 from blast_env.design.search.problem import LayoutProblem, Proposer, Report, SearchResult
 from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.envs.episode import find_realisations
-from blast_env.errors import import_extra
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.site.scene import Charge
-from blast_env.sites import FAMILIES
 from blast_env.statistics import reductions
 
 if TYPE_CHECKING:  # half a second to import
@@ -38,14 +36,12 @@ class Chosen:
     Attributes:
         proposer: The proposer.
         by: Description of its basis.
-        source: Identification of the weights, surrogate or rules, for the reproduction.
-        is_guessed: Whether predictions of the surrogate select the layout.
+        source: Identification of the surrogate, for the reproduction.
     """
 
     proposer: Proposer
     by: str
     source: Mapping[str, str]
-    is_guessed: bool = False
 
     def propose(
         self,
@@ -55,10 +51,8 @@ class Chosen:
     ) -> SearchResult:
         """Return the layout, its predicted gain, and its source in `by`.
 
-        The layout is empty if the predicted gain is below `LEAST_GAIN`. A layout
-        selected by predictions is compared with those of the rules: see `worth_its_pieces`. Trained
-        weights were judged on their site by gas dynamics, so predictions never replace their
-        layout by a rule's.
+        The layout is empty if the predicted gain is below `LEAST_GAIN`. It is compared with those
+        of the rules: see `worth_its_pieces`.
 
         Args:
             problem: The problem.
@@ -66,12 +60,9 @@ class Chosen:
             report: Called with the progress.
         """
         result = self.proposer.propose(problem, 0, seed, report)
-        layout, by, guesses = result.layout, self.by, _guesses(problem)
-        if self.is_guessed:
-            rules = layouts_by_rule(problem.scenario, problem.told)
-            layout = worth_its_pieces(guesses, layout, rules.values())
-        else:
-            by = f"{by}; reduction predicted by the surrogate"
+        by, guesses = self.by, _guesses(problem)
+        rules = layouts_by_rule(problem.scenario, problem.told)
+        layout = worth_its_pieces(guesses, result.layout, rules.values())
         gain = reductions(*guesses.loads([layout, ()])).item()
         if not gain >= LEAST_GAIN:  # NaN: nothing arrives
             by = (
@@ -125,33 +116,22 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
     return best
 
 
-def chosen_for(problem: LayoutProblem) -> Chosen:
-    """Return the proposer of the package for a case: the first applicable one of these.
+def chosen_proposer() -> Chosen:
+    """Return the proposer of the package: the surrogate, which was fitted to generated sites.
 
-    1. The bundled weights that were trained for the scenario.
-    2. The surrogate, which was fitted to generated sites. On generated sites it is better than the
-       weights trained for them. Single modules are to it a catalogue of one item.
+    Single modules are to it a catalogue of one item.
     """
-    scenario = problem.scenario
-    # Imported here because torch is an extra, and torch and the surrogate take seconds to import.
-    with import_extra("agents", "proposals by trained weights"):
-        from blast_agents.training.packaged import packaged_agent
+    # Imported here because the import takes half a second.
+    from blast_env.design.surrogate import packaged_surrogate, search_by
 
-        from blast_env.design.surrogate import LearntSearch, packaged_surrogate, search_by
-
-    found = packaged_agent(scenario, "hidden" if problem.told is None else "visible")
-    if found is not None and found[1].scenario not in FAMILIES:
-        agent, record = found
-        weights = {"weights": record.configuration.scenario_hash[:12]}
-        return Chosen(LearntSearch(agent=agent), f"the weights of {record.scenario}", weights)
     surrogate = packaged_surrogate()
     known = {"surrogate": surrogate.digest}
-    return Chosen(search_by(surrogate), "the surrogate of gas dynamics", known, is_guessed=True)
+    return Chosen(search_by(surrogate), "the surrogate of gas dynamics", known)
 
 
 @dataclass(frozen=True)
 class PackageProposer:
-    """Proposes the package's best layout for a site; see `chosen_for`."""
+    """Proposes the package's best layout for a site; see `chosen_proposer`."""
 
     name: str = "package"
 
@@ -159,7 +139,7 @@ class PackageProposer:
         self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         """Return the layout, with its source in `by`; it spends no blasts."""
-        found = chosen_for(problem).propose(problem, seed, report)
+        found = chosen_proposer().propose(problem, seed, report)
         return replace(found, budget=budget)
 
 
@@ -172,7 +152,7 @@ def propose(
 ) -> SearchResult:
     """Return the layout that the package proposes for a site.
 
-    This takes seconds, and no blast; see `chosen_for`.
+    This takes seconds, and no blast; see `chosen_proposer`.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
@@ -185,10 +165,9 @@ def propose(
 
     Raises:
         BlastEnvError: If the scenario has no build zone or no protected structure.
-        MissingExtraError: If the extra `agents` is not installed.
     """
     problem = problem_of(scenario, charge, processes)
-    return chosen_for(problem).propose(problem, report=report)
+    return chosen_proposer().propose(problem, report=report)
 
 
 def search(

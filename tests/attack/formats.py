@@ -9,12 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 import torch
-from blast_agents.league.report import PAGE
 from blast_agents.league.store import ResultStore
 from blast_agents.training import load_hyperparameters
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
-from blast_agents.training.packaged import Record, records
 from blast_agents.training.run_folder import (
     RolloutRow,
     RunConfiguration,
@@ -40,7 +38,6 @@ from blast_env.particles.parquet import read_parquet
 from blast_env.report.study import front_layouts
 from blast_env.site import Scenario, load_scenario, save_scenario
 from blast_env.site.scene import Charge
-from studies.pack_agent import league_result
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
 from tests.io.importing.maps import Places, charge, outline, rectangle, written
 from tests.site.documents import full_document
@@ -151,22 +148,6 @@ def _checkpoint(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, read), True)
 
 
-def _packaged(folder: Path) -> Format:
-    record = Record(
-        configuration=_run_configuration(),
-        scenario="small",
-        command="blast-env train",
-        versions={"torch": "2"},
-        steps=100,
-        blasts=10,
-        seconds=1.5,
-    )
-    sample = json.dumps(record.model_dump(mode="json"), indent=2).encode()
-    (folder / "weights").mkdir()
-    path = folder / "weights" / "a.json"
-    return Format((sample,), _from_file(path, lambda path: list(records(path.parent))))
-
-
 def _setting(_: Path) -> Format:
     samples = tuple(f"{key}={value}".encode() for key, value in SMALL.items())
     samples += (b"learning_rate=lin_3e-4", b"env_wrapper=[]", b"gamma=0.5", b"target_kl=null")
@@ -193,18 +174,6 @@ def _front(folder: Path) -> Format:
     scenario = small_scenario()
     path = folder / "front.csv"
     return Format((sample,), _from_file(path, lambda path: front_layouts(path, scenario)))
-
-
-def _summary(folder: Path) -> Format:
-    (folder / PAGE).write_text("Engine event, blast-env 0.1.0: `blast-env league`\n")
-    rows = ("agent (run),,0,False,4,0.25,0.1,0.4", "wall,,0,True,4,0.2,0.1,0.3")
-    header = "entry,method,budget,is_rule,cases,reduction,reduction_low,reduction_high"
-    sample = "\n".join((header, *rows, "")).encode()
-
-    def read(path: Path) -> Any:
-        return league_result(path.parent, "track", "run")
-
-    return Format((sample,), _from_file(folder / "track_summary.csv", read))
 
 
 def _loads(folder: Path) -> Format:
@@ -345,11 +314,9 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "run: versions.json": _versions,
         "run: rollouts.csv": _rollouts,
         "run: checkpoint.pt": _checkpoint,
-        "packaged weights' record": _packaged,
         "--set": _setting,
         "runs of a study": _runs,
         "front.csv": _front,
-        "league summary": _summary,
         "cache entry": _loads,
         "league result": _result,
         "GeoJSON": _geojson,

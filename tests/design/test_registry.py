@@ -13,7 +13,6 @@ from blast_env.app import offers
 from blast_env.cli import app
 from blast_env.cli.evaluate import EvaluateCommand
 from blast_env.cli.search import SearchCommand
-from blast_env.design.proposal import chosen_for, problem_of
 from blast_env.design.search import ProposerKind, layouts_by_rule, registry
 from blast_env.design.search.registry import ProposerRow
 from blast_env.design.surrogate import LearntSearch
@@ -76,9 +75,7 @@ def test_the_library_has_them_and_their_budget() -> None:
 def test_the_rule_is_among_those_that_a_proposal_is_chosen_from_and_held_against(
     tmp_path: Path,
 ) -> None:
-    problem = problem_of(hut(), None)
     assert "from the corner" in layouts_by_rule(hut())
-    assert chosen_for(problem).is_guessed
     save_scenario(hut(), tmp_path / "hut.toml")
     shown = run("propose", tmp_path / "hut.toml", "--verify").stdout
     assert "blasts of gas: about " in shown

@@ -347,9 +347,6 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m studies.other_codes pyclaw --python PYTHON": (
         "needs clawpack; tests/studies/test_other_codes.py"
     ),
-    "python -m studies.pack_agent RUN NAME --league out/league --track known_NAME": (
-        "writes into the package; tests/agents has it"
-    ),
     "python -m studies.blast_again docs/data/close_site_blasts.parquet --layouts 4": (
         "200 sites; tests/studies/test_blast_again.py"
     ),
