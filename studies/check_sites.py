@@ -5,12 +5,11 @@ dynamics for sites with heights and catalogues. With rejected sites included, al
 draws are measured, so that wrong rejections show.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import ceil, inf
 from pathlib import Path
-from time import process_time
 from typing import Annotated, Final
 
 import numpy as np
@@ -24,19 +23,18 @@ from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout
-from blast_env.design.search import LayoutProblem, find_proposer, layouts_by_rule
+from blast_env.design.search import LayoutProblem, layouts_by_rule
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.engines.contract import Engine, find_engine
 from blast_env.geometry import Layout
-from blast_env.layout import Placement, usable_cells
+from blast_env.layout import Placement
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import INK, STANDING, Feature, Kinds, site_features, without
 from blast_env.plots.site_plan import draw_plan, legend_of, write_legend
 from blast_env.plots.style import count_of, unit_interval
 from blast_env.runner import run_all
-from blast_env.site import Scenario, ScenarioError, SegmentSource
-from blast_env.site.zone import distance_m, source_bounds_m
+from blast_env.site import Scenario, ScenarioError
 from blast_env.sites import (
     FAMILIES,
     SITES,
@@ -46,7 +44,6 @@ from blast_env.sites import (
     Visibility,
     VisibilityCriterion,
     draw_site,
-    generate_site,
     visibility_layout,
 )
 from blast_env.sites.criterion import cut_share_of
@@ -64,12 +61,6 @@ share `LEAST_REDUCTION`, no layout exceeds `MOST_REDUCTION`, and random layouts 
 former by `LEAST_ADVANTAGE` on average."""
 
 
-LEAST_OVER_RULES: Final = 0.03
-"""Lead in reduction of a searched layout over every rule that makes a search worthwhile."""
-
-
-_SEARCH: Final = "population_annealing"
-
 QUANTILES: Final = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 
@@ -86,8 +77,6 @@ class MeasuredSite:
         reduction: Reduction of the load by each of them, a share (1 + random,).
         rules: Reduction by the layout of each rule, a share, by name.
         has_vehicle: Whether a vehicle brings the charge.
-        name: Name of the site.
-        found: Reduction by the best layout of a search, a share; `None` without a search.
     """
 
     accepted: bool
@@ -97,8 +86,6 @@ class MeasuredSite:
     reduction: FloatArray
     rules: Mapping[str, float] = field(default_factory=dict)
     has_vehicle: bool = False
-    name: str = ""
-    found: float | None = None
 
     @property
     def made(self) -> float:
@@ -126,7 +113,6 @@ def measured(
     threats: int,
     engine: str | Engine,
     criterion: SiteCriterion | None = None,
-    search: int = 0,
 ) -> MeasuredSite:
     """Measure a site with blasts of charges drawn from its threat.
 
@@ -136,7 +122,6 @@ def measured(
         threats: Number of charges, or seeds of particles, per layout.
         engine: Runs the blasts.
         criterion: Accepts or rejects the site; `VisibilityCriterion` by default.
-        search: Blasts of a search for the best layout; 0 for no search.
     """
     rng = np.random.default_rng(0)
     lines = Visibility.of(site)
@@ -149,10 +134,6 @@ def measured(
     reduction = {
         layout: 1.0 - problem.load(layout) / bare for layout in (*layouts, *ruled.values())
     }
-    found = None
-    if search:
-        best = find_proposer(_SEARCH).propose(problem, search).layout
-        found = max(1.0 - problem.load(best) / bare, *reduction.values())
     return MeasuredSite(
         accepted=(criterion or VisibilityCriterion()).objection(site) is None,
         shares=SiteMeasures.of(site),
@@ -161,8 +142,6 @@ def measured(
         reduction=np.array([reduction[layout] for layout in layouts]),
         rules={name: reduction[layout] for name, layout in ruled.items()},
         has_vehicle=bool(site.vehicles),
-        name=site.name,
-        found=found,
     )
 
 
@@ -190,16 +169,13 @@ def drawn_sites(seed: int, ranges: AnyRanges) -> Iterator[Scenario]:
 
 
 def main(
-    sites: Annotated[int, typer.Option(min=2, help="Seeds, from 0 on.")] = 200,
-    blasted: Annotated[int, typer.Option(min=2, help="Of these, measured with blasts.")] = 40,
+    sites: Annotated[int, typer.Option(min=2, help="Seeds, from 0 on.")] = 40,
     random_layouts: Annotated[int, typer.Option(min=2)] = 50,
     threats: Annotated[int, typer.Option(min=1, help="Charges and seeds a layout.")] = 4,
     processes: int = 2,
     cluster: ClusterAddress = None,
     family: Annotated[str, typer.Option(help="sites, item_sites or large_sites.")] = SITES,
     engine: Annotated[str | None, typer.Option(show_default="event, or gas with items")] = None,
-    cells: Annotated[str | None, typer.Option(help="Of gas: uniform, coarse or fine.")] = None,
-    search: Annotated[int, typer.Option(min=0, help="Blasts of a search, a site.")] = 0,
     rejected: Annotated[
         bool, typer.Option(help="Measure what the criterion rejected on the way, too.")
     ] = True,
@@ -212,15 +188,12 @@ def main(
         if family not in FAMILIES:
             raise UnknownNameError("family", family, FAMILIES)
         ranges = replace(FAMILIES[family], preset=preset, calibration=calibration)
-        run_by = find_engine(engine or ("event" if family == SITES else "gas"), cells=cells)
-        seconds = [cpu_time_s(seed, ranges) for seed in range(sites)]
-        generated = [generate_site(seed, ranges) for seed in range(sites)]
+        run_by = find_engine(engine or ("event" if family == SITES else "gas"))
         of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
-        print_properties(generated)
-        print_time(seconds, sum(map(len, of_seeds)))
         if picture is not None:
-            print_line(f"wrote {save_figure(contact_sheet(generated[:12]), picture)}")
-        asked = of_seeds[:blasted] if rejected else [each[-1:] for each in of_seeds[:blasted]]
+            first = [each[-1] for each in of_seeds[:12]]
+            print_line(f"wrote {save_figure(contact_sheet(first), picture)}")
+        asked = of_seeds if rejected else [each[-1:] for each in of_seeds]
         drawn = [site for of_seed in asked for site in of_seed]
         measure = partial(
             measured,
@@ -228,45 +201,12 @@ def main(
             threats=threats,
             engine=run_by,
             criterion=criterion_of(ranges),
-            search=search,
         )
         with progress_bar("blasts") as progress:
             results = run_all(measure, drawn, processes, progress=progress)
         print_measured([each for each in results if each.accepted])
         print_rules([each for each in results if each.accepted and each.rules])
-        if search:
-            print_searched([each for each in results if each.accepted])
         print_agreement(results)
-
-
-def cpu_time_s(seed: int, ranges: AnyRanges) -> float:
-    """Return the processor time of generating the site of a seed."""
-    start_s = process_time()
-    generate_site(seed, ranges)
-    return process_time() - start_s
-
-
-def print_properties(sites: Sequence[Scenario]) -> None:
-    """Print the quantiles of the properties of sites."""
-    print_row("property", "least", "10 %", "median", "90 %", "largest")
-    print_line("|---" * 6 + "|")
-    for name, value_of in PROPERTIES.items():
-        values = np.array([value_of(site) for site in sites])
-        values = values[np.isfinite(values)]
-        if not len(values):
-            continue
-        print_row(name, *(f"{value:.4g}" for value in np.quantile(values, QUANTILES)))
-    for name, holds_for in CONDITIONS.items():
-        print_line(f"{name}: {sum(map(holds_for, sites))} of {len(sites)} sites")
-
-
-def print_time(seconds: Sequence[float], drawn: int) -> None:
-    """Print the time to generate a site."""
-    ms = 1e3 * np.array(seconds)
-    print_line(
-        f"processor time a site: mean {ms.mean():.1f} ms, median {np.median(ms):.1f} ms,"
-        f" at most {ms.max():.1f} ms; {drawn} sites drawn for {len(ms)} accepted"
-    )
 
 
 def print_measured(results: Sequence[MeasuredSite]) -> None:
@@ -317,22 +257,6 @@ def print_rules(results: Sequence[MeasuredSite]) -> None:
             )
 
 
-def print_searched(results: Sequence[MeasuredSite]) -> None:
-    """Print the lead of the best layout found over the best rule, one row per site."""
-    print_row(
-        "site", "best rule", "takes off (%)", "best found (%)", "points more", "worth searching"
-    )
-    print_line("|---" * 6 + "|")
-    for each in results:
-        if each.found is None or not each.rules:
-            continue
-        name = max(each.rules, key=each.rules.__getitem__)
-        more = each.found - each.rules[name]
-        worth = each.found > LEAST_REDUCTION and more >= LEAST_OVER_RULES
-        percent = (f"{100.0 * share:.1f}" for share in (each.rules[name], each.found, more))
-        print_row(each.name, name, *percent, "yes" if worth else "no")
-
-
 def print_agreement(results: Sequence[MeasuredSite]) -> None:
     """Print the agreement between lines of sight and blasts."""
     cut = np.array([each.cut for each in results])
@@ -358,57 +282,6 @@ def print_agreement(results: Sequence[MeasuredSite]) -> None:
 def print_row(*cells: str) -> None:
     """Print a row of a Markdown table."""
     print_line(f"| {' | '.join(cells)} |")
-
-
-def stand_off_m(site: Scenario) -> float:
-    """Return the least distance from the charge to the protected building."""
-    return distance_m(site.charge[0], site.structures[0].rectangle_m)
-
-
-def is_threatened_along_x(site: Scenario) -> bool:
-    """Return whether the road or parking area lies to the left or right of the building."""
-    threat, building = source_bounds_m(site.charge[0]), site.structures[0].rectangle_m
-    return threat.right < building.left or threat.left > building.right
-
-
-def facade_and_depth_m(site: Scenario) -> tuple[float, float]:
-    """Return the sides of the protected building: first the one that faces the threat."""
-    left, bottom, right, top = site.structures[0].rectangle_m
-    sides = (top - bottom, right - left)
-    return sides if is_threatened_along_x(site) else (sides[1], sides[0])
-
-
-PROPERTIES: Final[Mapping[str, Callable[[Scenario], float]]] = {
-    "charge (kg TNT)": lambda site: site.charge[0].tnt_kg,
-    "least distance of the charge (m)": stand_off_m,
-    "facade (m)": lambda site: facade_and_depth_m(site)[0],
-    "depth of the building (m)": lambda site: facade_and_depth_m(site)[1],
-    "usable cells": lambda site: int(usable_cells(site).sum()),
-    "modules in stock": lambda site: site.zone.stock,
-    "keep-outs": lambda site: len(site.zone.keep_outs),
-    "clearance (m)": lambda site: site.zone.clearance_m,
-    "height of the building (m)": lambda site: site.structures[0].height_m or np.nan,
-    "kinds of items in stock": lambda site: sum(item.stock > 0 for item in site.zone.items),
-    "budget": lambda site: site.zone.budget or np.nan,
-}
-
-
-CONDITIONS: Final[Mapping[str, Callable[[Scenario], bool]]] = {
-    "threat on the left or right": is_threatened_along_x,
-    "road, not parking area": lambda site: isinstance(site.charge[0], SegmentSource),
-    "neighbouring building": lambda site: len(site.structures) > 1,
-    "building looks at the threat with its longer side": lambda site: (
-        facade_and_depth_m(site)[0] > facade_and_depth_m(site)[1]
-    ),
-    "access way": lambda site: site.zone.access_way is not None,
-    "duct": lambda site: bool(site.zone.cost_areas),
-    "vehicle": lambda site: bool(site.vehicles),
-    "second protected building": lambda site: sum(each.protected for each in site.structures) > 1,
-    "gate in the access way": lambda site: (
-        site.zone.access_way is not None and site.zone.access_way.gate is not None
-    ),
-    "the worst charges count": lambda site: site.objective.charges != "mean",
-}
 
 
 _COLUMNS: Final = 4

@@ -1,6 +1,6 @@
 """Checks of the response of buildings: the tables of docs/engineers/response.md.
 
-`python -m studies.response tables` prints those without a blast; the other commands run blasts.
+`python -m studies.response tables` prints those without a blast, `cells` the others.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,6 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.evaluation.consequences import side_on_impulse_pa_s, side_on_peak_pa
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.response.components import Glazing, catalogue
-from blast_env.response.damage import level_of
 from blast_env.response.facade import (
     Bay,
     FacadeResponse,
@@ -228,8 +227,6 @@ def beam_rows() -> Iterator[Row]:
 OPEN_KG: Final = 30.0
 OPEN_M: Final = 22.0
 PERIODS_S: Final = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
-FRONT_KG: Final = 100.0
-FRONT_M: Final = 30.0
 
 
 def open_wall(stand_off_m: float, width_m: float, height_m: float, tnt_kg: float) -> Scenario:
@@ -275,32 +272,14 @@ def filled_with(bays: list[Bay], name: str) -> list[FilledBay]:
     return [FilledBay(bay, wall=component) for bay in bays]
 
 
-def curve_histories(
+def reflected_peaks_pa(
     bays: list[Bay], stand_off_m: float, tnt_kg: float, middle_m: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return triangular histories with Kingery and Bulmash's reflected peak and impulse, per bay.
-
-    The distance is that of the bay's middle, and the incidence is normal. The negative phase and
-    the clearing at the edges of the wall are neglected.
-    """
-    distance_m = np.array(
-        [
-            np.sqrt(
-                stand_off_m**2
-                + (0.5 * (bay.left_m + bay.right_m) - middle_m) ** 2
-                + (0.5 * (bay.floor_m + bay.top_m)) ** 2
-            )
-            for bay in bays
-        ]
-    )
-    peak, impulse = (
-        kingery_bulmash(quantity, distance_m, tnt_kg, "hemispherical")
-        for quantity in ("reflected_overpressure", "reflected_impulse")
-    )
-    lasts_s = 2.0 * np.asarray(impulse) / np.asarray(peak)
-    time_s = np.unique(np.concatenate([[0.0], lasts_s, [2.0 * lasts_s.max()]]))
-    falls = np.maximum(1.0 - time_s[np.newaxis, :] / lasts_s[:, np.newaxis], 0.0)
-    return time_s, np.asarray(peak)[:, np.newaxis] * falls
+) -> FloatArray:
+    """Return Kingery and Bulmash's reflected peak at the middle of each bay (bays,)."""
+    across_m = np.array([0.5 * (bay.left_m + bay.right_m) - middle_m for bay in bays])
+    up_m = np.array([0.5 * (bay.floor_m + bay.top_m) for bay in bays])
+    distance_m = np.sqrt(stand_off_m**2 + across_m**2 + up_m**2)
+    return np.asarray(kingery_bulmash("reflected_overpressure", distance_m, tnt_kg))
 
 
 def period_rows(found: dict[float, FacadeResponse]) -> Iterator[Row]:
@@ -384,61 +363,13 @@ def cells(
                 found[cell_m] = facade_on(site, cell_m)
                 progress(number / len(sides_m))
         bays = [each.bay for each in found[sides_m[0]].bays]
-        _, curves = curve_histories(bays, OPEN_M, OPEN_KG, 7.0)
+        reference_pa = reflected_peaks_pa(bays, OPEN_M, OPEN_KG, 7.0)
         headers = ("cells", "peak over the curve", "allowed for", "impulse over the finest")
-        print_line(markdown_table(headers, peak_rows(found, curves.max(axis=1))))
+        print_line(markdown_table(headers, peak_rows(found, reference_pa)))
         words = [f"{each:g} m" for each in sides_m]
         print_line("\n" + markdown_table(("period", *words), period_rows(found)))
         levels = markdown_table(("component", *words), component_rows(found, OPEN_KG))
         print_line("\nlevel of protection, in brackets if sharper peaks make it worse\n\n" + levels)
-
-
-@app.command()
-def curves(
-    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.25,
-) -> None:
-    """Print the agreement of gas and Kingery and Bulmash's curves on the bays of an open wall."""
-    with user_errors():
-        site = open_wall(FRONT_M, 30.0, 17.5, FRONT_KG)
-        facade = facade_on(site, cell)
-        bays = [each.bay for each in facade.bays]
-        histories = facade.time_s, facade.pressure_pa
-        sharper = sharpened(*histories, peak_factor(cell, FRONT_KG))
-        by_curves = curve_histories(bays, FRONT_M, FRONT_KG, 19.0)
-        rows = []
-        for name in catalogue():
-            filled = filled_with(bays, name)
-            gas, sharp, curve = (
-                _levels(respond(filled, *each)) for each in (histories, sharper, by_curves)
-            )
-            helped = _levels_helped_by_suction(filled, *histories)
-            shares = ((helped == curve), (gas == curve), (np.minimum(gas, sharp) <= curve))
-            rows.append((name, *(f"{share.mean():.0%}" for share in shares)))
-        headers = (
-            *("component", "same level, if suction helped", "same level"),
-            "same or worse, with sharp peaks",
-        )
-        print_line(f"{len(bays)} bays, cells of {cell:g} m")
-        print_line(markdown_table(headers, rows))
-
-
-def _levels(facade: FacadeResponse) -> FloatArray:
-    found = facade.glass_levels or facade.wall_levels
-    return np.array([float(found[index]) for index in range(len(facade.bays))])
-
-
-def _levels_helped_by_suction(
-    bays: list[FilledBay], time_s: FloatArray, pressure_pa: FloatArray
-) -> FloatArray:
-    """Return the levels under unchanged histories, even where suction improves them."""
-    panes = [each.glazing.pane for each in bays if each.glazing is not None]
-    panels = [each.wall.panel(each.bay.height_m) for each in bays if each.wall is not None]
-    damage = (
-        glazing_responses(panes, time_s, pressure_pa).hazard
-        if panes
-        else panel_responses(panels, time_s, pressure_pa).damage
-    )
-    return np.array([float(level_of(each)) for each in damage.tolist()])
 
 
 if __name__ == "__main__":

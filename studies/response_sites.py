@@ -1,24 +1,20 @@
-"""Sites with a response objective: their selection criterion, and impulse compared with response.
+"""Sites with a response objective: their selection criterion, and pictures.
 
 python -m studies.response_sites criterion
 python -m studies.response_sites criterion --real-size --cells fine --rule-cells coarse
-python -m studies.response_sites compare
 python -m studies.response_sites pictures
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
 from blast_env.bundled import REAL_SIZE
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.design.search import LayoutProblem, find_proposer
-from blast_env.design.search.advice import MeasureKind, advise
 from blast_env.design.search.registry import layouts_by_rule
-from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
+from blast_env.evaluation import BlastEvaluator, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines.contract import Engine, find_engine
@@ -41,7 +37,6 @@ from blast_env.plots.style import render_extra, unit_interval
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from, worst
 from blast_env.site import AnyCharge, Scenario, load_scenario
-from blast_env.site.models import SCHEMA_VERSION
 from blast_env.tables import markdown_table
 
 with render_extra():
@@ -49,14 +44,10 @@ with render_extra():
     from matplotlib.figure import Figure
 
 SITES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
-OLDER: Final = ("visitor_entrance", "control_room", "school_and_clinic")
 PICTURES: Final = Path("docs/pictures")
 FOUND: Final = Path(__file__).parent.parent / "docs" / "data" / "best_found"
 
 _DRAWS: Final = 16
-_SEARCH: Final = "population_annealing"
-_FACADE: Final = {"glazing": "window_laminated_12", "wall": "concrete_150"}
-"""Facade of the older sites: strong enough for a small charge behind the right barrier."""
 
 _WIDTH_IN: Final = 13.5
 _PLAN_SHARE: Final = 0.55
@@ -141,83 +132,6 @@ def reaches(
     return all(consequences(scenario, layout, [each], engine).passes(target) for each in charges)
 
 
-@dataclass(frozen=True)
-class Rival:
-    """A site with two layouts: the best for impulse, and the best for the response.
-
-    Attributes:
-        scenario: The site.
-        by_impulse: The layout with the largest reduction of impulse.
-        by_response: The cheapest layout that reaches the level, or the one nearest to it.
-    """
-
-    scenario: Scenario
-    by_impulse: Layout
-    by_response: Layout
-
-    @classmethod
-    def of(cls, name: str, budget: int, tnt_kg: float) -> "Rival":
-        """Return the rival layouts of a bundled site.
-
-        Args:
-            name: Name of the site; older ones are given a facade.
-            budget: Blasts of a search.
-            tnt_kg: Charge of the older sites, kg.
-        """
-        older = name in OLDER
-        scenario = glazed(name, tnt_kg) if older else load_scenario(name)
-        zone = scenario.zone.model_dump(mode="json", exclude={"stock"}, exclude_none=True)
-        zone["hardening"] = []  # no measure changes an impulse
-        bare = _changed(scenario, objective={}, build_zone=zone)
-        problem = LayoutProblem(BlastEvaluator(bare, "gas"), Case(bare, _threats(bare)))
-        by_impulse = find_proposer(_SEARCH).propose(problem, budget).layout
-        if not older:
-            return cls(scenario, by_impulse, load_layout(FOUND / f"{name}.json", scenario))
-        problem = LayoutProblem(BlastEvaluator(scenario, "gas"), Case(scenario, _threats(scenario)))
-        return cls(scenario, by_impulse, advise(problem, MeasureKind.SHIELD, budget).layout)
-
-    def rows(self) -> Iterator[Row]:
-        """Yield one row per layout: cost, reduction of impulse, worst damage and level."""
-        scenario, threats = self.scenario, _threats(self.scenario)
-        evaluator = BlastEvaluator(scenario, "gas")
-        bare_pa_s = _impulse_pa_s(evaluator, (), threats)
-        for by, layout in (
-            ("-", ()),
-            ("impulse", self.by_impulse),
-            ("response", self.by_response),
-        ):
-            loads = [evaluator.loads(layout, each) for each in threats]
-            level = min(each.level for each in loads)
-            taken_off = 1.0 - _impulse_pa_s(evaluator, layout, threats) / bare_pa_s
-            yield (
-                f"`{scenario.name}`",
-                by,
-                layout_words(layout),
-                f"{Placement(scenario, layout).cost:g}",
-                f"{100.0 * taken_off:.1f} %",
-                f"{max(load.worst_damage or 0.0 for each in loads for load in each.protected):.2f}",
-                f"{level.label}{'' if level < _target(scenario) else ', passes'}",
-            )
-
-
-@app.command()
-def compare(
-    sites: SomeSites = None,
-    budget: Annotated[int, typer.Option(min=4, help="Blasts of a search.")] = 60,
-    tnt_kg: Annotated[float, typer.Option(help="Charge of the older sites, kg.")] = 10.0,
-) -> None:
-    """Print impulse and response of the layouts that are best for either."""
-    headers = ("site", "best by", "layout", "cost", "impulse off", "worst damage", "level")
-    with user_errors():
-        rows: list[Row] = []
-        every = sites or [*SITES, *OLDER]
-        with progress_bar("searches") as progress:
-            for number, name in enumerate(every, start=1):
-                rows += Rival.of(name, budget, tnt_kg).rows()
-                progress(number / len(every))
-        print_line(markdown_table(headers, rows))
-
-
 @app.command()
 def pictures(
     sites: SomeSites = None,
@@ -289,25 +203,6 @@ def _draw_damages(axes: Axes, damages: Mapping[str, float], target: LevelOfProte
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def glazed(name: str, tnt_kg: float) -> Scenario:
-    """Return an older site with a facade on its protected buildings and charges of `tnt_kg`."""
-    scenario = load_scenario(name)
-    document = scenario.model_dump(mode="json", exclude_none=True)
-    for structure in document["structures"]:
-        if structure["protected"]:
-            structure["facade"] = _FACADE
-    charges = [each | {"tnt_kg": tnt_kg} for each in document["charge"]]
-    objective = {"kind": "response", "target": "medium"}
-    changes = {"structures": document["structures"], "charge": charges, "objective": objective}
-    return _changed(scenario, **changes)
-
-
-def _changed(scenario: Scenario, **sections: Any) -> Scenario:
-    document = scenario.model_dump(mode="json", exclude_none=True)
-    changed = document | {"schema_version": SCHEMA_VERSION} | sections
-    return Scenario.from_document(changed, scenario.name)
-
-
 def site_charges(scenario: Scenario) -> list[AnyCharge]:
     """Return every charge under which a site is judged."""
     return [each.charge for each in _threats(scenario)]
@@ -321,10 +216,6 @@ def _target(scenario: Scenario) -> LevelOfProtection:
     target = scenario.objective.level
     assert target is not None
     return target
-
-
-def _impulse_pa_s(evaluator: BlastEvaluator, layout: Layout, threats: tuple[Threat, ...]) -> float:
-    return sum(evaluator.loads(layout, each).protected_impulse_pa_s for each in threats)
 
 
 if __name__ == "__main__":

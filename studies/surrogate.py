@@ -1,21 +1,18 @@
 """The surrogate of gas dynamics: training blasts, the fit, and a check for exploitation."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shlex import join
 from statistics import fmean, median
-from time import perf_counter, process_time
+from time import perf_counter
 from typing import Annotated, Final
 
 import numpy as np
 import pandas as pd
 import torch
 import typer
-from blast_agents.league import find_tracks
-from blast_agents.league.trained import TrainedRun, check_runs
-from blast_agents.training import load_agent
 
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
@@ -35,7 +32,7 @@ from blast_env.provenance import command, versions
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import HELD_OUT_SITES
-from blast_env.statistics import Estimate, mean_estimate, reductions
+from blast_env.statistics import reductions
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S
 from studies.blast_table import COLUMNS, scenario_of, site_name
@@ -333,132 +330,10 @@ def judge(
     print_line(markdown_table(headers, rows))
 
 
-@app.command()
-def compare(
-    surrogates: Annotated[list[Path], typer.Argument(help="What `fit` wrote; the first leads.")],
-    run: Annotated[
-        list[Path] | None, typer.Option(help="Run folders of agents: alone, and their draws.")
-    ] = None,
-    cases: Annotated[int, typer.Option(min=2, help="Sites of the league's item_sites.")] = 48,
-    threats: Annotated[int, typer.Option(min=1, help="Held-out threats of each.")] = 2,
-    changes: Annotated[
-        list[int] | None, typer.Option(min=0, help="Layouts that each looks at; else 300.")
-    ] = None,
-    rules: Annotated[
-        bool, typer.Option("--rules", help="Judge every rule as well; the best of each case.")
-    ] = False,
-    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
-    processes: Processes = 2,
-) -> None:
-    """Compare the proposals of surrogates and agents on unseen sites by gas dynamics, paired.
-
-    Proposals use no blasts. The best rule of a case is chosen afterwards, by the same blasts that
-    judge it.
-    """
-    with user_errors():
-        searches = dict(_searches(surrogates, run or (), changes or (300,)))
-        (track,) = find_tracks("item_sites", cases, threats, noisy=False)
-        check_runs([TrainedRun.load(each) for each in run or ()], [track])
-        found: list[Compared] = []
-        with progress_bar(track.title) as progress:
-            for case in track.cases:
-                evaluator = BlastEvaluator(case.scenario, "gas", cache=cache)
-                found.append(compared([*searches.values()], evaluator, case, rules, processes))
-                progress(len(found) / len(track.cases))
-    first, *_ = searches
-    leader = 100.0 * np.array([each.reductions[0] for each in found])
-    rows = []
-    for number, name in enumerate(searches):
-        own = 100.0 * np.array([each.reductions[number] for each in found])
-        rows.append(
-            (
-                name,
-                _interval(mean_estimate(own)),
-                _mean_promise(each.promised[number] for each in found),
-                f"{own.min():.1f} %",
-                f"{median(each.ms[number] for each in found):.0f}",
-                _interval(mean_estimate(leader - own)) if number else "",
-            )
-        )
-    if rules:
-        best = 100.0 * np.array([each.rule for each in found])
-        lead = _interval(mean_estimate(leader - best))
-        own_best = _interval(mean_estimate(best))
-        rows.append(("best rule of each case", own_best, "", f"{best.min():.1f} %", "", lead))
-    headers = ("proposed by", "reduction", "it promised", "worst case", "ms", f"{first}, less this")
-    print_line(markdown_table(headers, rows))
-
-
-def _searches(
-    surrogates: Sequence[Path], runs: Sequence[Path], changes: Sequence[int]
-) -> Iterator[tuple[str, LearntSearch]]:
-    """Yield the searches with their names."""
-    loaded = [(path.stem, load_surrogate(path)) for path in surrogates]
-    for stem, surrogate in loaded:
-        for most in changes:
-            yield f"{stem}, {most:,} changes", LearntSearch(surrogate, changes=most)
-    for run in runs:
-        agent, (_, leader) = load_agent(run), loaded[0]
-        yield f"agent {run.name}", LearntSearch(agent=agent)
-        yield f"agent {run.name}, ranked draws", LearntSearch(leader, agent)
-
-
-@dataclass(frozen=True)
-class Compared:
-    """Results of gas dynamics on one case, as shares of the load without a barrier.
-
-    Attributes:
-        reductions: Reduction by each proposal.
-        promised: Prediction of the surrogate for it; `None` for an agent without a surrogate.
-        ms: Processor time of each proposal.
-        rule: Reduction by the best rule; 0 if rules are not judged.
-    """
-
-    reductions: Sequence[float]
-    promised: Sequence[float | None]
-    ms: Sequence[float]
-    rule: float
-
-
-def compared(
-    searches: Sequence[LearntSearch],
-    evaluator: BlastEvaluator,
-    case: Case,
-    rules: bool,
-    processes: int,
-) -> Compared:
-    """Judge the proposals for a case, and every rule if `rules`."""
-    layouts, ms = [], []
-    for search in searches:
-        began_s = process_time()
-        layouts.append(search.at_once(case.scenario))
-        ms.append(MS_PER_S * (process_time() - began_s))
-    ways = [*layouts_by_rule(case.scenario).values()] if rules else []
-    gains = reductions_of(evaluator, case, [*layouts, *ways], processes)
-    return Compared(
-        reductions=gains[: len(layouts)],
-        promised=[
-            None if search.surrogate is None else promise(search.surrogate, layout, case)
-            for search, layout in zip(searches, layouts, strict=True)
-        ],
-        ms=ms,
-        rule=max(gains[len(layouts) :], default=0.0),
-    )
-
-
 def promise(surrogate: Surrogate, layout: Layout, case: Case) -> float:
     """Return the share by which a layout lowers the case's load, as a surrogate predicts it."""
     bare, guessed = Guesses.of(surrogate, case).loads([(), layout])
     return float(1.0 - guessed / bare)
-
-
-def _mean_promise(shares: Iterable[float | None]) -> str:
-    known = [each for each in shares if each is not None]
-    return f"{100.0 * fmean(known):.1f} %" if known else ""
-
-
-def _interval(estimate: Estimate) -> str:
-    return f"{estimate.value:.1f} % ({estimate.low:.1f} to {estimate.high:.1f})"
 
 
 def reductions_of(

@@ -274,7 +274,7 @@ def total(terms: Mapping[str, float]) -> float:
 
 
 VISIBLE_REALISATIONS: Final = 2
-"""Default number of blasts for a visible charge (`studies.noise reward`)."""
+"""Default number of blasts for a visible charge."""
 
 HIDDEN_THREATS: Final = 16
 """Default number of charges for a hidden threat, one blast each."""

@@ -210,8 +210,7 @@ class Reward(Protocol):
 
 
 DEPOSIT: Final = 2.0
-"""Deposit as a multiple of the load without a barrier: more than the load with any layout, as
-measured by `python -m studies.noise deposit`."""
+"""Deposit as a multiple of the load without a barrier: more than the load with any layout."""
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ first obstacle, or the place of a possible one. Then density, momentum, energy a
 mapped onto the grid, and the solver continues, with fuel burning at the same time constant.
 
 One run, for 1 kg in free air, serves all charges: lengths and times, including the time constant of
-afterburning, scale with the cube root of the mass (Hopkinson-Cranz). `python -m studies.gas source`
-gives the evidence for the values of `TNT`.
+afterburning, scale with the cube root of the mass (Hopkinson-Cranz).
 """
 
 from dataclasses import dataclass
@@ -87,11 +86,11 @@ Kingery and Bulmash's curves for charges on the ground and in free air, within 0
 impulses.
 
 Sources with the right reflected impulse have too little incident impulse close to the charge;
-those with the right incident impulse have too much reflected impulse (`python -m studies.gas
-source`). This one matches the reflected impulse. Its ratios to the curves for 20, 100 and 1000 kg
-with cells of 0.5 m, 0.25 m for 20 kg, (`python -m studies.gas kingery-bulmash`) are: reflected
-impulse 0.94 to 1.06 at Z = 1.7 to 8.7 m/kg^(1/3), incident impulse 0.89 to 0.94 at 2.7 to 8.6, but
-0.88 at 2.1 and 0.84 at 1.7; arrival 0.96 to 1.03. Peaks are 0.39 to 0.83: they need finer cells.
+those with the right incident impulse have too much reflected impulse. This one matches the
+reflected impulse. Its ratios to the curves for 20, 100 and 1000 kg with cells of 0.5 m, 0.25 m for
+20 kg, (`python -m studies.gas kingery-bulmash`) are: reflected impulse 0.94 to 1.06 at Z = 1.7 to
+8.7 m/kg^(1/3), incident impulse 0.89 to 0.94 at 2.7 to 8.6, but 0.88 at 2.1 and 0.84 at 1.7;
+arrival 0.96 to 1.03. Peaks are 0.39 to 0.83: they need finer cells.
 """
 
 

@@ -289,7 +289,7 @@ PRESETS: Final[Mapping[str, SimulationParameters]] = MappingProxyType(
     {
         # Sparse air, as the paper's figures suggest: balls fly almost freely between collisions.
         # v0, N, the radii, C_e and the 10 % and 30 % rules are the paper's or set beforehand;
-        # air spacing, air mass and elasticity are from `python -m studies.ballistic search`, and
+        # air spacing, air mass and elasticity are from a search on seeds 0 to 15, and
         # match the paper's UFC column and the shape of its simulated impulse-distance curve.
         "ballistic": SimulationParameters(),
         # Balls of 0.2 m radius: coarse, and fast enough for training.

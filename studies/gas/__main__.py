@@ -1,10 +1,9 @@
-"""Tables and figures of docs/engineers/gas.md on the checks of the gas engine."""
+"""Tables of docs/engineers/gas.md on the checks of the gas engine."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import combinations
 from math import cbrt, isnan
-from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
@@ -14,35 +13,24 @@ from blast_env.arrays import FloatArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout, wall_near_building, wall_near_charge
-from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.speed import street
-from blast_env.files import make_folder
+from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import draw_charge
 from blast_env.particles.run import EndReason
-from blast_env.plots.figures import save_figure
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.scene import Charge
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
-from studies.gas.cells import CellLoads, cell_loads, difference
+from studies.gas.cells import CellLoads, cell_loads, difference, engine_with
 from studies.gas.corners import EXPERIMENT, REGIONS, ExperimentalBand, corner_waves
 from studies.gas.definition import LONG_RUNS, LongRun, both_loads
 from studies.gas.ending import Ending, ending, layouts, sites
-from studies.gas.growing import OFF_COLUMNS, cell_choice, engine_with
 from studies.gas.judgement import Judgement
 from studies.gas.judgement import judge as judgement
-from studies.gas.loads import (
-    impulse_until,
-    load_from_radius,
-    with_heights,
-    yard,
-)
+from studies.gas.loads import yard
 from studies.gas.oblique import oblique_loads
-from studies.gas.reference import extrapolated_peak, free_field, order_found, wide_wall
-from studies.gas.refinement import refined_blast
-from studies.gas.sources import source_ratios, trade_off_figure
+from studies.gas.reference import free_field, wide_wall
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
 """Side of the cells in comparisons with Kingery and Bulmash, by the mass of the charge in kg."""
@@ -61,31 +49,6 @@ def _numbers(text: str) -> list[float]:
         return [float(part) for part in text.split(",") if part]
     except ValueError as error:
         raise typer.BadParameter(f"{text!r}: {error}") from error
-
-
-@app.command()
-def source(cell: Cell = 0.5, out: Path = Path("out/gas_source.png")) -> None:
-    """Print and draw possible sources for the charge against Kingery and Bulmash.
-
-    The charge is 100 kg on the ground. No source matches both incident and reflected impulses.
-    """
-    with user_errors():
-        make_folder(out.parent)
-        with progress_bar("sources") as progress:
-            found = source_ratios(cell_m=cell, progress=progress)
-        rows = [
-            (
-                each.name,
-                ", ".join(f"{wall.z_m_kg:.2f}" for wall in each.reflected),
-                ", ".join(f"{wall.impulse:.3f}" for wall in each.reflected),
-                ", ".join(f"{wave.impulse:.3f}" for wave in each.incident),
-                ", ".join(f"{wall.arrival:.3f}" for wall in each.reflected),
-            )
-            for each in found
-        ]
-        headers = ("source", "Z (m/kg^(1/3))", "reflected", "incident", "arrival at the wall")
-        print_line(markdown_table(headers, rows))
-        print_line(f"wrote {save_figure(trade_off_figure(found, cell), out)}")
 
 
 @app.command()
@@ -124,113 +87,6 @@ def kingery_bulmash(
         if of_sizes:
             columns = ("cell (m)", "cells per kg^(1/3)", "reflected impulse", "reflected peak")
             print_line("\n" + markdown_table(columns, of_sizes))
-
-
-@app.command()
-def peaks(
-    distances: Annotated[
-        str, typer.Option(help="m/kg^(1/3), separated by commas.")
-    ] = "1.7,2.7,4.3,5.4",
-    sizes: Annotated[
-        str, typer.Option(help="m, three, each half of the one before.")
-    ] = "1,0.5,0.25",
-) -> None:
-    """Print reflected peaks of 100 kg over the curve, by the size of cells, and extrapolated.
-
-    From the two smallest sizes, with a fixed order; the order found from all three stands beside
-    it.
-    """
-    rows = []
-    with user_errors():
-        for scaled in _numbers(distances):
-            found = [
-                wide_wall(PEAK_CHARGE_KG, scaled * cbrt(PEAK_CHARGE_KG), cell_m)
-                for cell_m in _numbers(sizes)
-            ]
-            values = [each.peak for each in found]
-            shown = (*values, order_found(values), extrapolated_peak(*values[-2:]))
-            rows.append((f"{found[-1].z_m_kg:.2f}", *(f"{value:.2f}" for value in shown)))
-    columns = ("Z (m/kg^(1/3))", *(f"{cell_m:g} m" for cell_m in _numbers(sizes)))
-    print_line(markdown_table((*columns, "order found", "extrapolated"), rows))
-
-
-@app.command()
-def air_height(
-    scenario: str = "courtyard",
-    heights_m: Annotated[
-        str, typer.Option("--heights", help="m, separated by commas.")
-    ] = "9,12,18,24",
-    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.2,
-    all_layouts: Annotated[bool, typer.Option(help="Also the wall near the charge.")] = False,
-    cell: Cell = 0.5,
-) -> None:
-    """Print how loads depend on the height of the air, above which cells grow.
-
-    Structures have real heights. Loads are compared with those at the last height of the air.
-    """
-    rows, wanted = [], _numbers(heights_m)
-    with user_errors():
-        loaded, engine = load_scenario(scenario), GasEngine(cell_m=cell)
-        for name, layout in _rule_layouts(loaded).items():
-            if name == "wall near the charge" and not all_layouts:
-                continue
-            sites = [with_heights(loaded, air_m=air_m) for air_m in wanted]
-            loads = [impulse_until(GasBlast(site, layout, engine=engine), until) for site in sites]
-            rows.append((name, *_against_last(loads)))
-    print_line(markdown_table(("layout", *(f"{m:g} m" for m in wanted)), rows))
-
-
-@app.command()
-def handover(
-    scenario: str = "courtyard",
-    radii_m: Annotated[
-        str, typer.Option("--radii", help="m, separated by commas.")
-    ] = "1.5,3,4,6,8,12,16,22",
-    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.09,
-    cell: Cell = 0.5,
-) -> None:
-    """Print how loads depend on the radius of the front at which the grid takes over.
-
-    Without a barrier, with real heights. The radius is the same for all layouts of a scenario.
-    """
-    with user_errors():
-        blast = GasBlast(with_heights(load_scenario(scenario)), engine=GasEngine(cell_m=cell))
-        own_m = blast.engine.start_on(blast.site).handover_radius_m
-        rows = [
-            (f"{radius_m:g}", f"{load_from_radius(blast, radius_m, until):.1f}")
-            for radius_m in _numbers(radii_m)
-        ]
-    print_line(markdown_table(("radius (m)", f"impulse (Pa s) at {until:g} s"), rows))
-    print_line(f"the engine's own radius is {own_m:.3g} m")
-
-
-@app.command()
-def settling(
-    scenario: str = "school_and_clinic",
-    times_s: Annotated[
-        str, typer.Option("--times", help="s, of 100 kg, separated by commas.")
-    ] = "0.02,0.04,0.06,0.09,inf",
-    until: Annotated[float, typer.Option(help="When loads are looked at, s.")] = 0.18,
-    cell: Cell = 0.5,
-) -> None:
-    """Print how loads depend on the time at which the products settle.
-
-    By default they never settle in the last column. A settled gas has a bound on its temperature,
-    which lengthens the time step.
-    """
-    with user_errors():
-        loaded, wanted = load_scenario(scenario), _numbers(times_s)
-        engines = [GasEngine(cell_m=cell, settled_s=time_s) for time_s in wanted]
-        rows = []
-        for name, layout in _rule_layouts(loaded).items():
-            blasts = [GasBlast(loaded, layout, engine=engine) for engine in engines]
-            rows.append((name, *_against_last([impulse_until(each, until) for each in blasts])))
-    print_line(markdown_table(("layout", *(f"{1e3 * time_s:g} ms" for time_s in wanted)), rows))
-
-
-def _against_last(loads: list[float]) -> list[str]:
-    """Return loads in Pa s as text, with their relative differences from the last one."""
-    return [f"{load:.1f} ({100.0 * (load / loads[-1] - 1.0):+.2f} %)" for load in loads]
 
 
 def _rule_layouts(scenario: Scenario) -> dict[str, Layout]:
@@ -377,75 +233,10 @@ def oblique(
 
 
 @app.command()
-def refinement(
-    scenario: str = "car_park",
-    thresholds: Annotated[
-        str, typer.Option(help="Jump of the pressure over the lower of two neighbours.")
-    ] = "0.02,0.05,0.1,0.2",
-    every: Annotated[float, typer.Option(help="When blocks are counted, s.")] = 0.01,
-) -> None:
-    """Print the cost of perfect refinement in blocks of 4 x 4 x 4 cells, without overhead.
-
-    Blocks at protected walls are always refined once the blast has reached them.
-    """
-    with user_errors():
-        blast = refined_blast(load_scenario(scenario), _numbers(thresholds), every)
-    headers = ("cells", "threshold", "blocks refined (%)", "million updates", "CPU s")
-
-    def row(cells: str, threshold: str, share: str, times: float) -> tuple[str, ...]:
-        updates, cpu_s = 1e-6 * times * blast.updates, times * blast.cpu_s
-        return cells, threshold, share, f"{updates:,.0f}", f"{cpu_s:.1f}"
-
-    rows = [row("0.5 m, as run", "", "", 1.0), row("0.25 m", "", "", 16.0)]
-    for each in blast.found:
-        shown = f"{each.threshold:g}", f"{100.0 * each.share:.0f}"
-        rows += [row("0.5, 1 m", *shown, each.coarse), row("0.25, 1 m", *shown, each.fine)]
-    print_line(markdown_table(headers, rows))
-
-
-@app.command()
-def growing(
-    scenario: Annotated[str, typer.Option(help="In the place of a street with 500 kg.")] = "",
-    length: Annotated[float, typer.Option(min=20.0, help="Of the street, m.")] = 100.0,
-    choices: Annotated[str, typer.Option(help="Sides in m, `coarse` and `fine`.")] = (
-        "0.5,coarse,fine,0.25"
-    ),
-    until: Annotated[float | None, typer.Option(help="When blasts end, s.")] = None,
-) -> None:
-    """Print the errors and costs of growing cells, relative to the last choice."""
-    with user_errors():
-        site = load_scenario(scenario) if scenario else street(length)
-        charge = draw_charge(site, 0)
-        layouts = {"no barrier": (), "wall near the building": wall_near_building(site, charge)}
-        engines = [engine_with(choice, until) for choice in choices.split(",")]
-        found = {
-            name: [cell_choice(site, layout, engine) for engine in engines]
-            for name, layout in layouts.items()
-        }
-        rows = []
-        for name, of_layout in found.items():
-            for each, bare in zip(of_layout, found["no barrier"], strict=True):
-                ways = [each.off_percent(of_layout[-1], column) for column in OFF_COLUMNS]
-                rows.append(
-                    (
-                        *(each.cells, name, f"{each.cpu_s:.0f}", f"{1e-6 * each.updates:.0f}"),
-                        *(f"{each.impulse_pa_s:.1f}",),
-                        f"{100.0 * (1.0 - each.impulse_pa_s / bare.impulse_pa_s):.2f}",
-                        *(f"{mean:.1f}, {most:.1f}" for mean, most in ways),
-                    )
-                )
-        headers = ("cells", "layout", "CPU s", "million updates", "impulse (Pa s)")
-        off = ("impulse of walls off by (%): mean, most", "peak of walls")
-        print_line(markdown_table((*headers, "taken off (%)", *off), rows))
-
-
-@app.command()
 def cells(
     scenario: Annotated[
         str, typer.Option(help=f"{YARD!r} is a small site for small cells.")
     ] = YARD,
-    endless: Annotated[bool, typer.Option(help="Everything as high as the air.")] = False,
-    charges: Annotated[int, typer.Option(min=1, help="Charges, those of seeds from 0.")] = 1,
     random_layouts: Annotated[int, typer.Option(min=0)] = 2,
     sizes: Annotated[
         str, typer.Option(help="Sides in m, `coarse` and `fine`, from coarse to fine; all layouts.")
@@ -453,27 +244,15 @@ def cells(
     finest: Annotated[
         float | None, typer.Option(help="m, for none and the first three layouts only.")
     ] = None,
-    until: Annotated[
-        float | None, typer.Option(help="When loads are looked at, s; at the end of the runs.")
-    ] = None,
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
     """Print the effect of cell size on loads, reductions and the order of layouts."""
     with user_errors(), running_on(cluster):
-        site = _cells_site(scenario, endless)
-        for seed in range(charges):
-            charge = draw_charge(site, seed)
-            run = partial(cell_loads, site, charge=charge, until_s=until, processes=processes)
-            _print_cells(site, charge, random_layouts, (sizes.split(","), finest), run)
-
-
-def _cells_site(scenario: str, endless: bool) -> Scenario:
-    if scenario == YARD:
-        return yard()
-    loaded = load_scenario(scenario)
-    has_heights = any(each.height_m is not None for each in loaded.structures)
-    return loaded if endless or has_heights else with_heights(loaded)
+        site = yard() if scenario == YARD else load_scenario(scenario)
+        charge = draw_charge(site, 0)
+        run = partial(cell_loads, site, charge=charge, processes=processes)
+        _print_cells(site, charge, random_layouts, (sizes.split(","), finest), run)
 
 
 def _print_cells(
@@ -483,12 +262,8 @@ def _print_cells(
     sizes: tuple[list[str], float | None],
     run: Callable[..., CellLoads],
 ) -> None:
-    rules: dict[str, Callable[[Scenario, Charge], Layout]] = {
-        "wall near the charge": wall_near_charge,
-        "wall near the building": wall_near_building,
-    }
-    layouts = {name: rule(site, charge) for name, rule in rules.items()}
-    layouts |= _random_layouts(site, random_layouts)
+    layouts = _rule_layouts(site) | _random_layouts(site, random_layouts)
+    del layouts["no barrier"]
     all_sizes, finest = sizes
     jobs = [(size, list(layouts.values())) for size in all_sizes]
     if finest is not None:
@@ -532,31 +307,25 @@ def _reduction(reductions: list[float], number: int) -> str:
 @app.command()
 def corners(
     sizes: Annotated[str, typer.Option(help="Sides of cells, m.")] = "0.5,0.25",
-    heights: Annotated[
-        str, typer.Option(help="Heights of the block, m; empty: as high as wide.")
-    ] = "",
 ) -> None:
     """Print the impulse behind one and two corners of a block, over the free field's."""
     rows = []
     with user_errors():
-        wanted: list[float | None] = [*_numbers(heights)] or [None]
-        for height_m in wanted:
-            for cell_m in _numbers(sizes):
-                waves = corner_waves(cell_m, height_m)
-                for region in REGIONS:
-                    gauges, band = waves.gauges_of(region), EXPERIMENT.get(region)
-                    rows.append(
-                        (
-                            f"{waves.height_m:g}",
-                            f"{cell_m:g}",
-                            region.replace("_", " "),
-                            "-" if band is None else f"{band.value:.2f} ± {band.tolerance:.2f}",
-                            "-" if band is None else _within(gauges, band),
-                            f"{waves.mean(region):.2f}",
-                            f"{gauges.min():.2f} to {gauges.max():.2f}",
-                        )
+        for cell_m in _numbers(sizes):
+            waves = corner_waves(cell_m)
+            for region in REGIONS:
+                gauges, band = waves.gauges_of(region), EXPERIMENT.get(region)
+                rows.append(
+                    (
+                        f"{cell_m:g}",
+                        region.replace("_", " "),
+                        "-" if band is None else f"{band.value:.2f} ± {band.tolerance:.2f}",
+                        "-" if band is None else _within(gauges, band),
+                        f"{waves.mean(region):.2f}",
+                        f"{gauges.min():.2f} to {gauges.max():.2f}",
                     )
-    headers = ("block (m high)", "cell (m)", "gauges", "experiments", "within", "impulse")
+                )
+    headers = ("cell (m)", "gauges", "experiments", "within", "impulse")
     print_line(markdown_table((*headers, "gauge by gauge"), rows))
 
 
@@ -572,9 +341,6 @@ def judge(
     random_layouts: Annotated[int, typer.Option(min=1)] = 58,
     charges: Annotated[int, typer.Option(min=1)] = 3,
     seeds: Annotated[int, typer.Option(min=1)] = 4,
-    store: Annotated[
-        Path | None, typer.Option(help="Folder from which a study that was broken off goes on.")
-    ] = None,
     processes: Processes = 2,
     cluster: ClusterAddress = None,
 ) -> None:
@@ -589,24 +355,20 @@ def judge(
         layouts = [rule(chosen, drawn[0]) for rule in (wall_near_charge, wall_near_building)]
         layouts += [random_layout(chosen, rng) for _ in range(random_layouts)]
         with progress_bar(f"gas blasts in {chosen.name}") as progress:
-            found = judgement(chosen, layouts, drawn, seeds, processes, progress, store=store)
+            found = judgement(chosen, layouts, drawn, seeds, processes, progress)
     headers = ("preset", "mean (gas)", "overstated", "rank correlation", "by charge", "regret")
     rows = [(preset, *_judgement_row(each)) for preset, each in found.items()]
-    print_line(markdown_table((*headers, "best factor", "error with it", "without"), rows))
+    print_line(markdown_table(headers, rows))
 
 
 def _judgement_row(found: Judgement) -> tuple[str, ...]:
     particle, gas = found.means
-    error, spread = found.errors
     return (
         f"{100.0 * particle:.1f} % ({100.0 * gas:.1f} %)",
         f"{found.overstatement:.1f} times",
         f"{found.all_pairs:.2f}",
         ", ".join(f"{each:.2f}" for each in found.rank_correlations),
         f"{100.0 * found.regret.value:.1f} points",
-        f"{found.factor:.2f}",
-        f"{100.0 * error:.1f} points",
-        f"{100.0 * spread:.1f} points",
     )
 
 

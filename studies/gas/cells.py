@@ -10,6 +10,7 @@ from scipy.stats import spearmanr
 
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.gas.settings import CELLS
 from blast_env.geometry import Layout
 from blast_env.runner import run_all
 from blast_env.site import Scenario
@@ -92,6 +93,11 @@ def _load(
     else:
         impulse = impulse_until(blast, until_s)
     return impulse, process_time() - start
+
+
+def engine_with(choice: str) -> GasEngine:
+    """Return the engine with a named choice of cells, or with cells of one side in m."""
+    return GasEngine.with_cells(choice if choice in CELLS else float(choice))
 
 
 def difference(coarse: CellLoads, fine: CellLoads) -> CellDifference:

@@ -10,10 +10,10 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.speed import street
 from blast_env.gas.grid import GasGrid
-from blast_env.gas.settings import CELLS
 from blast_env.gas.solver import Gas, Recorder
 from blast_env.geometry import Layout
 from blast_env.site import Scenario, load_scenario
+from studies.gas.cells import engine_with
 
 STREET: Final = "street of 100 m, 500 kg"
 
@@ -40,7 +40,7 @@ class LongRun:
     @property
     def engine(self) -> GasEngine:
         """The engine, which ends a run when its loads are known."""
-        return GasEngine.with_cells(self.cells if self.cells in CELLS else float(self.cells))
+        return engine_with(self.cells)
 
 
 LONG_RUNS: Final = (

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
@@ -62,20 +61,6 @@ class Judgement:
         return particle / gas
 
     @property
-    def factor(self) -> float:
-        """Least-squares factor from the particle model's reductions to those of gas dynamics."""
-        return float((self.particle * self.gas).sum() / (self.particle**2).sum())
-
-    @property
-    def errors(self) -> tuple[float, float]:
-        """Root mean squares: gas minus `factor` times particles, and gas minus its mean.
-
-        The second is the error of an estimate that ignores the layout.
-        """
-        left = self.gas - self.factor * self.particle
-        return float(np.sqrt((left**2).mean())), float(self.gas.std())
-
-    @property
     def regret(self) -> Estimate:
         """Loss of gas reduction by the particle model's choice, against the best of the layouts.
 
@@ -93,8 +78,6 @@ def judge(
     seeds: int = 4,
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
-    presets: Mapping[str, str] = PRESETS,
-    store: Path | None = None,
 ) -> dict[str, Judgement]:
     """Return the reductions by gas dynamics and by each preset of the particle model.
 
@@ -106,15 +89,13 @@ def judge(
         processes: Number of worker processes.
         progress: Called with the finished share of the gas blasts; those of the particle model
             follow.
-        presets: Presets by name, each with its calibration.
-        store: Folder for the gas blasts, from which an interrupted study continues.
     """
     drawn = SeedRange.JUDGEMENT.seeds(0, seeds)
-    evaluator = BlastEvaluator(scenario, "gas", cache=store)
+    evaluator = BlastEvaluator(scenario, "gas")
     gas = _impulses(evaluator, layouts, charges, drawn[:1], processes, progress)
     of_gas = reductions(gas[1:], _bare(gas))
     found = {}
-    for preset, calibration in presets.items():
+    for preset, calibration in PRESETS.items():
         evaluator = BlastEvaluator(_with_preset(scenario, preset, calibration), "event")
         particle = _impulses(evaluator, layouts, charges, drawn, processes, None)
         found[preset] = Judgement(reductions(particle[1:], _bare(particle)), of_gas)

@@ -1,15 +1,11 @@
 """Loads on the protected structures, for the studies of the gas engine.
 
-They depend on the end of the run and on the radius at which the grid takes over. Sites have real
-heights, or are a small yard.
+Sites have real heights, or are a small yard.
 """
 
 from typing import Any, Final
 
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasBlast, GasResult
-from blast_env.gas.solver import GasSolver
-from blast_env.gas.source import set_charge
 from blast_env.site import Scenario
 
 
@@ -90,22 +86,3 @@ def yard() -> Scenario:
         "simulation": {"preset": "ballistic"},
     }
     return Scenario.from_document(document, "yard")
-
-
-def load_from_radius(blast: GasBlast, radius_m: float, until_s: float) -> float:
-    """Return the mean impulse on the protected buildings, Pa s, with a given handover radius.
-
-    Args:
-        blast: The blast.
-        radius_m: Radius of the front at which the grid takes over, without solids within it.
-        until_s: Time at which the load is read.
-
-    Raises:
-        BlastEnvError: If the radius is within the charge, or cells are not uniform.
-    """
-    run = blast.engine.start_on(blast.site)
-    if not isinstance(run.solver, GasSolver):
-        raise BlastEnvError(f"cells are {blast.engine.cells!r}, must be 'uniform' here")
-    set_charge(run.solver, run.charge, radius_m)
-    run.solver.advance(until_s)
-    return protected_impulse_pa_s(GasResult(blast, run))

@@ -17,7 +17,7 @@ from blast_env.gas.faces import exposed_faces
 from blast_env.gas.grid import FaceKind, GasGrid
 from blast_env.gas.probes import FaceLoads, Gauges
 from blast_env.gas.solver import GasSolver
-from blast_env.gas.source import TNT, Explosive, GasCharge, set_charge
+from blast_env.gas.source import TNT, GasCharge, set_charge
 from blast_env.particles.calibration.references import Quantity, kingery_bulmash
 
 Wave = Literal["reflected", "incident"]
@@ -46,9 +46,7 @@ class Ratio:
     peak: float
 
 
-def wide_wall(
-    charge_kg: float, distance_m: float, cell_m: float, explosive: Explosive = TNT
-) -> Ratio:
+def wide_wall(charge_kg: float, distance_m: float, cell_m: float) -> Ratio:
     """Return the normally reflected load at the point of a rigid wall nearest to a ground charge.
 
     The model is half of the scene, beside a mirror through the charge; the distance is rounded up
@@ -67,7 +65,7 @@ def wide_wall(
     faces = exposed_faces(grid, solid)
     nearest = int(np.hypot(*faces.centres_m(grid)[:, 1:].T).argmin())
     loads = FaceLoads(len(faces))
-    charge = GasCharge(charge_kg, (0.0, 0.0, 0.0), explosive)
+    charge = GasCharge(charge_kg, (0.0, 0.0, 0.0), TNT)
     solver = GasSolver(grid, faces=faces, recorders=[loads], with_fuel=True, burning=charge.burning)
     set_charge(solver, charge)
     while solver.time_s < latest_s:
@@ -84,15 +82,13 @@ def wide_wall(
     )
 
 
-def free_field(
-    charge_kg: float, z_m_kg: Sequence[float], cell_m: float, explosive: Explosive = TNT
-) -> list[Ratio]:
+def free_field(charge_kg: float, z_m_kg: Sequence[float], cell_m: float) -> list[Ratio]:
     """Return the incident wave along the ground, at the centres of cells beside the axis.
 
     The model is a quarter of the scene, between mirrors through the charge.
     """
     unit = cbrt(charge_kg)
-    gauges = free_field_gauges(charge_kg, [z * unit for z in z_m_kg], cell_m, explosive)
+    gauges = free_field_gauges(charge_kg, [z * unit for z in z_m_kg], cell_m)
     return [
         _over_reference(
             "incident",
@@ -106,9 +102,7 @@ def free_field(
     ]
 
 
-def free_field_gauges(
-    charge_kg: float, distances_m: Sequence[float], cell_m: float, explosive: Explosive = TNT
-) -> Gauges:
+def free_field_gauges(charge_kg: float, distances_m: Sequence[float], cell_m: float) -> Gauges:
     """Return gauges along the ground, in the cells at given distances, after the wave has passed.
 
     The mirror beside them represents a wall without thickness, parallel to the flow.
@@ -118,7 +112,7 @@ def free_field_gauges(
     solid = np.zeros((along, wide, wide), dtype=np.bool_)
     grid = GasGrid(cell_m, solid, x_low=FaceKind.MIRROR, y_low=FaceKind.MIRROR)
     gauges = Gauges(grid, [(int(distance_m / cell_m), 0, 0) for distance_m in distances_m])
-    charge = GasCharge(charge_kg, (0.0, 0.0, 0.0), explosive)
+    charge = GasCharge(charge_kg, (0.0, 0.0, 0.0), TNT)
     solver = GasSolver(grid, recorders=[gauges], with_fuel=True, burning=charge.burning)
     set_charge(solver, charge, _FREE_FIELD_START * unit)
     latest_s = _LATEST * _phase_end_s(farthest_m, charge_kg)
@@ -127,27 +121,6 @@ def free_field_gauges(
         if is_known(gauges.impulse_pa_s, gauges.net_impulse_pa_s).all():
             break
     return gauges
-
-
-ORDER: Final = 0.8
-"""Order of convergence with which peaks are extrapolated, fixed beforehand."""
-
-
-def extrapolated_peak(coarse: float, fine: float) -> float:
-    """Return the peak on cells of no size, from two sizes of which one is half of the other.
-
-    Richardson's extrapolation with the fixed `ORDER`.
-    """
-    return fine + (fine - coarse) / float(2.0**ORDER - 1.0)
-
-
-def order_found(peaks: Sequence[float]) -> float:
-    """Return the order of convergence of peaks on three sizes of cells.
-
-    Each size is half of the one before. NaN where the peaks do not approach a limit.
-    """
-    first, second = np.diff(peaks)
-    return float(np.log2(first / second)) if first * second > 0.0 else float("nan")
 
 
 def _phase_end_s(distance_m: float, charge_kg: float) -> float:

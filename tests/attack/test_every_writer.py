@@ -59,14 +59,11 @@ _ELSEWHERE: Final = {
     "blast_env/particles/workbook.py: table.to_excel": "to the file of `write_atomically`",
     "blast_env/cluster.py: connect": "to a cluster",
     "blast_env/benchmark/data/gas_blasts.py: bare.rename": "the columns of a table",
-    "studies/other_codes/pyclaw_worker.py": "runs without this package, in a scratch folder",
     "agents/blast_agents/training/train.py: configure": "TensorBoard's; train tells its errors",
     "agents/blast_agents/training/self_labelling.py: configure": "likewise",
     "agents/blast_agents/training/recorder.py: self.logger.dump": "likewise",
     "agents/blast_agents/training/self_labelling.py: self.logger.dump": "likewise",
     "agents/blast_agents/training/run_folder.py: os.replace": "makes the folder a run's",
-    "studies/scale.py: sqlite3.connect": "a store that is measured, in a scratch folder",
-    "studies/scale.py: TemporaryDirectory": "for a measurement",
     "studies/benchmark/methods.py: TemporaryDirectory": "SMAC's own files, which nobody reads",
 }
 """What does not write through `blast_env.files`, and why it need not."""

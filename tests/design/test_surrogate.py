@@ -7,14 +7,12 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from blast_agents.league.trained import TrainedRun
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -724,35 +722,6 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     for each in rows_of:
         assert 0.0 < float(each[2]) < 0.2  # near what it was fitted to, and never quite right
         assert float(each[4]) > 0.5
-
-
-def test_surrogates_and_agents_are_compared_case_by_case_on_the_same_blasts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    names = [str(tmp_path / f"{name}.json") for name in ("one", "same", "other")]
-    for name, seed in zip(names, (0, 0, 1), strict=True):
-        by_hand(seed).save(Path(name))
-    track = SimpleNamespace(cases=(case(1), case(2)), title="a yard")
-    monkeypatch.setattr(studies.surrogate, "find_tracks", lambda *_, **__: (track,))
-    monkeypatch.setattr(studies.surrogate, "load_agent", lambda _: Drawing())
-    monkeypatch.setattr(studies.surrogate, "check_runs", lambda *_: None)
-    monkeypatch.setattr(TrainedRun, "load", lambda _: Drawing())
-    options = ["compare", *names, "--changes", "0", "--run", "drawing", "--processes", "1"]
-    done = CliRunner().invoke(studies.surrogate.app, options, catch_exceptions=False)
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in done.output.splitlines()]
-    one, same, other, alone, ranked = rows[-5:]
-    assert [each[0] for each in rows[-5:]] == [
-        *(f"{each}, 0 changes" for each in ("one", "same", "other")),
-        "agent drawing",
-        "agent drawing, ranked draws",
-    ]
-    assert same[1:4] == one[1:4]
-    assert same[5] == "0.0 % (0.0 to 0.0)"
-    lead, behind, gap = (float(each.split("%")[0]) for each in (one[1], other[1], other[5]))
-    assert gap == pytest.approx(lead - behind, abs=0.11)
-    assert lead > 0.0  # a wall before the building takes load off
-    assert alone[1:3] == ["0.0 % (0.0 to 0.0)", ""]  # it proposes nothing
-    assert float(ranked[1].split("%")[0]) > 0.0  # and draws walls
 
 
 def test_scenarios_of_the_table_are_found_by_their_names() -> None:

@@ -88,7 +88,7 @@ def test_impulse_and_arrival_agree_with_kingery_bulmash(blast_on_ground: Spheric
         impulse = np.trapezoid(np.maximum(over_pa[:end], 0.0), time_s[:end])
         expected_s = kingery_bulmash("arrival_time", z, 1.0)
         assert time_s[arrival] == pytest.approx(expected_s, rel=0.05)
-        # See `python -m studies.gas source`: closer to the curve here is farther from it on a wall.
+        # Closer to the curve here is farther from it on a wall.
         low = 0.82 if z < 2.0 else 0.87 if z < 2.5 else 0.9
         assert low < impulse / kingery_bulmash("incident_impulse", z, 1.0) < 1.1
 

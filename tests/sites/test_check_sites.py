@@ -1,7 +1,5 @@
 """The script that measures sites with blasts."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,13 +7,7 @@ from blast_env.design.rules import random_layout
 from blast_env.layout import Placement
 from blast_env.site import Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
-from studies.check_sites import (
-    MeasuredSite,
-    drawn_sites,
-    facade_and_depth_m,
-    measured,
-    print_searched,
-)
+from studies.check_sites import MeasuredSite, drawn_sites, measured
 from tests.sites.cases import yard
 
 
@@ -49,36 +41,9 @@ def test_random_layouts_use_all_that_can_be_placed(sites: tuple[Scenario, ...]) 
         assert Placement.of(site, random_layout(site, rng)).is_full
 
 
-def test_the_facade_is_the_side_that_the_charge_looks_at() -> None:
-    assert facade_and_depth_m(yard()) == (4.0, 2.0)
-
-
 def test_measuring_puts_the_visibility_layout_first() -> None:
     found = measured(yard(stock=5), random_layouts=2, threats=1, engine="pymunk")
     assert found.cut.shape == found.reduction.shape == (3,)
     assert found.cut[0] == pytest.approx(found.shares.layout_share)
     assert found.reduction[0] > found.reduction[1:].max()
     assert found.unprotected_pa_s > 0.0
-
-
-def test_a_search_is_worth_it_where_no_rule_is_near(capsys: pytest.CaptureFixture[str]) -> None:
-    """Above 15 % in all, and 3 points more than the best rule."""
-    site = replace(result([0.1, 0.0, 0.0]), rules={"near_the_charge": 0.20, "other": 0.05})
-    shares = {"far": 0.24, "near": 0.22}
-    print_searched([replace(site, name=name, found=found) for name, found in shares.items()])
-    low = replace(site, name="low", found=0.14, rules={"other": 0.05})
-    print_searched([low, replace(low, name="unsearched", found=None)])
-    printed = [line for line in capsys.readouterr().out.splitlines() if line[2:5] in "far nea low"]
-    assert printed == [
-        "| far | near_the_charge | 20.0 | 24.0 | 4.0 | yes |",
-        "| near | near_the_charge | 20.0 | 22.0 | 2.0 | no |",
-        "| low | other | 5.0 | 14.0 | 9.0 | no |",
-    ]
-
-
-def test_what_was_searched_is_no_worse_than_what_was_tried() -> None:
-    found = measured(yard(stock=3), random_layouts=2, threats=1, engine="event", search=6).found
-    tried = measured(yard(stock=3), random_layouts=2, threats=1, engine="event")
-    assert tried.found is None
-    assert found is not None
-    assert found >= tried.reduction.max()

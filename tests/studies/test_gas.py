@@ -7,7 +7,6 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.gas.source import TNT
 from blast_env.layout.build_scene import draw_charge
 from blast_env.particles.run import EndReason
 from blast_env.site import Scenario, load_scenario
@@ -16,14 +15,7 @@ from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending, sites
 from studies.gas.loads import impulse_until, protected_impulse_pa_s, with_heights, yard
 from studies.gas.oblique import oblique_loads
-from studies.gas.reference import (
-    ORDER,
-    extrapolated_peak,
-    free_field,
-    order_found,
-    wide_wall,
-)
-from studies.gas.sources import CHOSEN, source_ratios, trade_off_figure
+from studies.gas.reference import free_field, wide_wall
 from tests.gas_sites import glazed_hut, hut
 
 WALL = tuple((row, 4) for row in range(4, 12))
@@ -43,17 +35,6 @@ def test_waves_are_held_against_the_curves() -> None:
     assert wave.impulse == pytest.approx(1.0, abs=0.10)
     assert (wall.arrival, wave.arrival) == pytest.approx((1.0, 1.0), abs=0.05)
     assert max(wall.peak, wave.peak) < 0.7
-
-
-def test_sources_are_drawn() -> None:
-    shares: list[float] = []
-    found = source_ratios({CHOSEN: TNT}, [2.7], 1.0, shares.append)
-    assert shares == [1.0]
-    assert [each.name for each in found] == [CHOSEN]
-    assert found[0].reflected == [wide_wall(100.0, 2.7 * cbrt(100.0), 1.0)]
-    (axes,) = trade_off_figure(found, 1.0).axes
-    (line,) = axes.get_lines()
-    assert np.asarray(line.get_xdata()).tolist() == [found[0].reflected[0].impulse]
 
 
 def test_heights_are_given_to_everything() -> None:
@@ -166,11 +147,3 @@ def test_the_first_wave_is_weaker_behind_corners() -> None:
 def test_a_block_below_a_module_is_named() -> None:
     with pytest.raises(BlastEnvError, match=r"height_m is 0\.2, must be at least 0\.5"):
         corner_waves(0.5, 0.2)
-
-
-def test_peaks_that_converge_with_the_fixed_order_are_extrapolated_to_their_limit() -> None:
-    limit, error = 10.0, 4.0
-    peaks = [limit - error * cell_m**ORDER for cell_m in (1.0, 0.5, 0.25)]
-    assert extrapolated_peak(*peaks[1:]) == pytest.approx(limit)
-    assert order_found(peaks) == pytest.approx(ORDER)
-    assert np.isnan(order_found([1.0, 2.0, 1.5]))

@@ -11,7 +11,7 @@ from blast_env.layout import Placement, load_layout
 from blast_env.response.walls import DamageLevel
 from blast_env.site import load_scenario
 from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_response
-from studies.response_sites import FOUND, OLDER, SITES, glazed, reaches, site_charges
+from studies.response_sites import FOUND, SITES, reaches, site_charges
 
 
 @pytest.mark.parametrize("name", [*SITES, *sorted(REAL_SIZE)])
@@ -31,17 +31,6 @@ def test_the_guard_post_fails_empty_and_passes_with_what_was_found() -> None:
     assert len(charges) == 2
     assert not reaches(scenario, (), charges, engine)
     assert reaches(scenario, found, charges, engine)
-
-
-@pytest.mark.parametrize("name", OLDER)
-def test_an_older_site_gets_a_facade_and_a_charge_and_stays_as_it_is_otherwise(name: str) -> None:
-    bare, changed = load_scenario(name), glazed(name, 10.0)
-    assert changed.bays
-    assert {each.tnt_kg for each in changed.charge} == {10.0}
-    assert changed.build_zone == bare.build_zone
-    assert [each.rectangle_m for each in changed.structures] == [
-        each.rectangle_m for each in bare.structures
-    ]
 
 
 @pytest.mark.parametrize("steel_depth_m", BEAM_STEEL_DEPTHS_M)

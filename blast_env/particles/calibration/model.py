@@ -114,8 +114,8 @@ class Calibration(CalibrationSection):
         ball_radius_m: Radius of an air ball, by which the facade collects beyond either end.
         simulated: The sum over the collisions that the law converts.
         tnt_kg: TNT-equivalent mass of the simulated charge.
-        tnt_range_kg: Range of masses in which the law holds with Hopkinson-Cranz scaling
-            (`python -m studies.hopkinson_cranz`); `None` for `tnt_kg` only.
+        tnt_range_kg: Range of masses in which the law holds with Hopkinson-Cranz scaling;
+            `None` for `tnt_kg` only.
         distances_m: Distances, ascending; the first and last are the range of validity.
         seeds: Seeds at every distance.
         i_sim: Mean simulated impulse at each distance.

@@ -1,1 +1,0 @@
-"""Comparisons of the gas engine with other codes on the same scene."""
