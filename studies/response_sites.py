@@ -1,26 +1,17 @@
-"""Sites with a response objective: their selection criterion, and pictures.
+"""Pictures of the sites with a response objective: `python -m studies.response_sites`."""
 
-python -m studies.response_sites criterion
-python -m studies.response_sites criterion --real-size --cells fine --rule-cells coarse
-python -m studies.response_sites pictures
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
-from blast_env.bundled import REAL_SIZE
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.output import print_line, user_errors
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.evaluation import BlastEvaluator, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
-from blast_env.evaluation.consequences import consequences
-from blast_env.evaluation.engines.contract import Engine, find_engine
 from blast_env.files import make_folder
-from blast_env.gas.settings import UNIFORM
-from blast_env.geometry import Layout, layout_words
+from blast_env.geometry import layout_words
 from blast_env.layout import Placement, load_layout
 from blast_env.layout.build_scene import charge_against
 from blast_env.plots.facade import LEVEL_COLOURS
@@ -36,8 +27,7 @@ from blast_env.plots.site_plan import (
 from blast_env.plots.style import render_extra, unit_interval
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from, worst
-from blast_env.site import AnyCharge, Scenario, load_scenario
-from blast_env.tables import markdown_table
+from blast_env.site import Scenario, load_scenario
 
 with render_extra():
     from matplotlib.axes import Axes
@@ -53,83 +43,9 @@ _WIDTH_IN: Final = 13.5
 _PLAN_SHARE: Final = 0.55
 _ROW_IN: Final = 0.36
 
-Row = tuple[str, ...]
 SomeSites = Annotated[list[str] | None, typer.Argument(help="All of them unless given.")]
 
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
-
-
-@app.command()
-def criterion(
-    sites: SomeSites = None,
-    cell: Annotated[float, typer.Option(help="Side of the smallest cells, m.")] = 0.25,
-    cells: Annotated[str, typer.Option(help="uniform, coarse or fine.")] = UNIFORM,
-    rule_cells: Annotated[
-        str | None,
-        typer.Option(help="Those of the empty site and the rules, from 0.5 m, if others."),
-    ] = None,
-    real_size: Annotated[
-        bool, typer.Option("--real-size", help="The sites of 90 to 120 m, unless some are given.")
-    ] = False,
-) -> None:
-    """Print whether the empty site and every rule fail, and the layout of a search passes."""
-    headers = ("site", "charge", "wanted", "no layout", "rules that pass", "found", "cost")
-    with user_errors():
-        rows = []
-        judge = find_engine("gas", cell, cells=cells)
-        first = judge if rule_cells is None else find_engine("gas", cells=rule_cells)
-        with progress_bar("criterion") as progress:
-            every = sites or (sorted(REAL_SIZE) if real_size else SITES)
-            for number, name in enumerate(every, start=1):
-                rows.append(criterion_row(load_scenario(name), judge, first))
-                progress(number / len(every))
-        print_line(f"found: {judge.words}; empty site and rules: {first.words}")
-        print_line(markdown_table((*headers, "level", "with sharp peaks"), rows))
-
-
-def criterion_row(scenario: Scenario, judge: Engine, first: Engine) -> Row:
-    """Return the criterion's row for a site; the last four cells describe the layout found.
-
-    Args:
-        scenario: The site.
-        judge: Engine for the layout found.
-        first: Engine for the empty site and the rules.
-    """
-    target, charges = _target(scenario), site_charges(scenario)
-    rules = layouts_by_rule(scenario)
-    passing = [name for name, each in rules.items() if reaches(scenario, each, charges, first)]
-    found = load_layout(FOUND / f"{scenario.name}.json", scenario)
-    bare = consequences(scenario, (), charges, first)
-    judged = consequences(scenario, found, charges, judge)
-    return (
-        f"`{scenario.name}`",
-        _charge_words(scenario, charges),
-        target.label,
-        min(bare.level_on_cells(each) for each in bare.buildings).label,
-        ", ".join(passing) or f"none of {len(rules)}",
-        layout_words(found),
-        f"{Placement(scenario, found).cost:g} of {scenario.zone.budget:g}",
-        min(judged.level_on_cells(each) for each in judged.buildings).label,
-        "passes" if judged.passes(target) else "fails",
-    )
-
-
-def _charge_words(scenario: Scenario, charges: Sequence[AnyCharge]) -> str:
-    """Return the range of the charges' masses and their least distance to a protected building."""
-    met = [charge_against(scenario, (), each) for each in charges]
-    masses_kg = [each.tnt_kg for each in met]
-    protected = [each.rectangle_m for each in scenario.structures if each.protected]
-    near_m = min(each.distance_to(charge.position_m) for each in protected for charge in met)
-    ends = dict.fromkeys((f"{min(masses_kg):g}", f"{max(masses_kg):g}"))
-    return f"{' to '.join(ends)} kg, {near_m:.0f} m"
-
-
-def reaches(
-    scenario: Scenario, layout: Layout, charges: Sequence[AnyCharge], engine: Engine
-) -> bool:
-    """Return whether a layout reaches the target under all charges; stop at the first failure."""
-    target = _target(scenario)
-    return all(consequences(scenario, layout, [each], engine).passes(target) for each in charges)
 
 
 @app.command()
@@ -201,11 +117,6 @@ def _draw_damages(axes: Axes, damages: Mapping[str, float], target: LevelOfProte
     axes.set_xlim(0.0, fails_from(LevelOfProtection.BELOW_STANDARDS))
     axes.set_xlabel(f"worst damage, cells of 0.5 m; {target.label} is left of the dashed line")
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def site_charges(scenario: Scenario) -> list[AnyCharge]:
-    """Return every charge under which a site is judged."""
-    return [each.charge for each in _threats(scenario)]
 
 
 def _threats(scenario: Scenario) -> tuple[Threat, ...]:

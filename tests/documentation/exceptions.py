@@ -70,7 +70,7 @@ GIVEN: Final = (
     Given(("docs/howto/report.md",), "layout.json", "wall/layout.json", _SITE),
     Given(("docs/engineers/gas.md",), "my_site.toml", "scenarios/courtyard.toml"),
     Given(
-        ("docs/howto/app.md", "docs/tutorials/2_train_an_agent.md", "docs/researchers/league.md"),
+        ("docs/howto/app.md", "docs/researchers/league.md"),
         "runs/courtyard",
         "agent",
         _AGENT,
@@ -156,8 +156,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
-    "python -m studies.response_sites criterion": "guard_post --cell 0.5",
-    "python -m studies.response_sites pictures": "clinic_front",
+    "python -m studies.response_sites": "clinic_front",
     "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
     "python -m studies.gas corners": "--sizes 0.5",
     "python -m studies.gas judge --random-layouts 18 --charges 2": (
@@ -243,9 +242,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env calibrate --name collisional_kb --preset collisional --reference reflected_impulse"
     " --distances 8,10,12.5,16,20,25,32,40 --seeds 32 --engine event"
     " --simulated transferred_impulse --tnt-range 20,1000": "--seeds 2 --distances 8,16,32",
-    "blast-env calibrate --name mine --reference reflected_impulse --distances 8,12,20,40"
-    " --seeds 16 --out out/mine": "--seeds 2",
-    "blast-env league --run runs/courtyard --out out/league": _LEAGUE,
     "blast-env calibrate --name ballistic_ufc --reference paper_ufc --seeds 32": "--seeds 2",
 }
 """Options that are appended to studies and trainings of minutes to hours."""

@@ -6,12 +6,15 @@ And the test of a beam that the response is held against.
 import pytest
 
 from blast_env.bundled import REAL_SIZE
+from blast_env.evaluation import draw_threats
+from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines import find_engine
 from blast_env.layout import Placement, load_layout
 from blast_env.response.walls import DamageLevel
 from blast_env.site import load_scenario
 from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_response
-from studies.response_sites import FOUND, SITES, reaches, site_charges
+from studies.response_sites import FOUND, SITES
 
 
 @pytest.mark.parametrize("name", [*SITES, *sorted(REAL_SIZE)])
@@ -26,11 +29,12 @@ def test_what_was_found_is_for_the_site_as_it_is_and_within_its_budget(name: str
 
 def test_the_guard_post_fails_empty_and_passes_with_what_was_found() -> None:
     scenario, engine = load_scenario("guard_post"), find_engine("gas", 0.5)
-    found = load_layout(FOUND / "guard_post.json", scenario)
-    charges = site_charges(scenario)
+    found, target = load_layout(FOUND / "guard_post.json", scenario), scenario.objective.level
+    charges = [each.charge for each in one_of_each_charge(draw_threats(scenario, range(16)))]
     assert len(charges) == 2
-    assert not reaches(scenario, (), charges, engine)
-    assert reaches(scenario, found, charges, engine)
+    assert target is not None
+    assert not consequences(scenario, (), charges, engine).passes(target)
+    assert consequences(scenario, found, charges, engine).passes(target)
 
 
 @pytest.mark.parametrize("steel_depth_m", BEAM_STEEL_DEPTHS_M)
