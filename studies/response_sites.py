@@ -45,11 +45,8 @@ _ROW_IN: Final = 0.36
 
 SomeSites = Annotated[list[str] | None, typer.Argument(help="All of them unless given.")]
 
-app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
-
-@app.command()
-def pictures(
+def main(
     sites: SomeSites = None,
     folder: Annotated[Path, typer.Option(help="Folder for the pictures.")] = PICTURES,
 ) -> None:
@@ -130,4 +127,4 @@ def _target(scenario: Scenario) -> LevelOfProtection:
 
 
 if __name__ == "__main__":
-    app()
+    typer.run(main)
