@@ -13,6 +13,7 @@ from blast_env.app import offers
 from blast_env.cli import app
 from blast_env.cli.evaluate import EvaluateCommand
 from blast_env.cli.search import SearchCommand
+from blast_env.design.proposal import problem_of
 from blast_env.design.search import ProposerKind, layouts_by_rule, registry
 from blast_env.design.search.registry import ProposerRow
 from blast_env.design.surrogate import LearntSearch
