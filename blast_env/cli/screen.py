@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from blast_env.cli.command import Command, argument, option
 from blast_env.cli.options import CELLS_HELP, FINAL_CELL_HELP, FINAL_CELLS, SCENARIO_HELP
@@ -18,11 +17,18 @@ from blast_env.cli.targets import PICTURES
 from blast_env.evaluation.consequences import Consequences, consequences
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.grid_error import final_engine
-from blast_env.evaluation.screening import LEFT_OUT, Screened, Screening, facades_for, screen
+from blast_env.evaluation.screening import (
+    LEFT_OUT,
+    STAND_OFF_HEADERS,
+    THREAT_HEADERS,
+    Screened,
+    Screening,
+    facades_for,
+    screen,
+)
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.components import Wall
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.presets import (
@@ -32,13 +38,6 @@ from blast_env.site.presets import (
     TNT_EQUIVALENTS,
     NamedMass,
 )
-
-_HEADERS: Final = (
-    *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs (m)"),
-    *("level", "panes broken", "pane (GSA, ISO)", "panel", "verdict"),
-)
-_LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
-_NAMES: Final = ("high, GSA 1, ISO A", "medium, 2, B", "low, 3a, D", "very low, 3b, E")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,23 +125,9 @@ def _print_threats(
     required: Sequence[Requirement],
     beside: dict[str, Consequences],
 ) -> None:
-    table = ResultTable(title, _HEADERS, text_columns=2)
+    table = ResultTable(title, THREAT_HEADERS, text_columns=2)
     for each in found.threats:
-        kept = all(each.keeps(requirement) for requirement in required)
-        needed_m = max(found.needed_m(each.name, requirement) for requirement in required)
-        x_m, y_m = each.charge.position_m
-        table.add_row(
-            each.name,
-            f"({x_m:.1f}, {y_m:.1f})",
-            f"{each.charge.tnt_kg:g}",
-            f"{each.nearest_m:.1f}",
-            found.stand_offs[each.name][0].in_words(needed_m),
-            each.level.label,
-            f"{each.broken_panes:.1f} of {each.panes}",
-            "-" if each.condition is None else f"{each.condition.label}, {each.condition.rating}",
-            "-" if each.wall_damage is None else each.wall_damage.name.lower(),
-            ("passes" if kept else "fails") + (" (may be breached)" if each.may_breach else ""),
-        )
+        table.add_row(*found.threat_row(each, required))
         if each.name in beside:
             table.add_row("  by gas", *[""] * 4, *_gas_row(beside[each.name]))
     result_console().print(table)
@@ -165,10 +150,7 @@ def _print_stand_offs(found: Screening, threat: Screened) -> None:
         f"stand-off (m) from which a component allows a level, {threat.name},"
         f" {threat.charge.tnt_kg:g} kg TNT (* on this site)"
     )
-    table = ResultTable(title, ("component", *_NAMES))
-    for each in found.stand_offs[threat.name]:
-        mark = " *" if each.name in found.present else ""
-        kind = "wall" if isinstance(each.component, Wall) else "glass"
-        cells = (each.in_words(each.distances_m[level]) for level in _LEVELS)
-        table.add_row(f"{kind}: {each.name}{mark}", *cells)
+    table = ResultTable(title, STAND_OFF_HEADERS)
+    for row in found.stand_off_rows(threat):
+        table.add_row(*row)
     result_console().print(table)

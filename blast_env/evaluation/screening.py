@@ -49,6 +49,18 @@ LEFT_OUT: Final = (
 )
 """What screening does not know."""
 
+THREAT_HEADERS: Final = (
+    *("threat", "worst place (m)", "kg TNT", "nearest bay (m)", "needs (m)"),
+    *("level", "panes broken", "pane (GSA, ISO)", "panel", "verdict"),
+)
+"""Headers of `Screening.threat_row`."""
+
+STAND_OFF_HEADERS: Final = (
+    *("component", "high, GSA 1, ISO A", "medium, 2, B", "low, 3a, D", "very low, 3b, E"),
+)
+"""Headers of `Screening.stand_off_rows`."""
+
+_LEVELS: Final = tuple(sorted(LevelOfProtection, reverse=True)[:-1])
 _APART_M: Final = 2.0
 _MOST_PLACES: Final = 300
 _POINTS: Final = 14  # of a table of damage, along each axis
@@ -202,6 +214,33 @@ class Screening:
             for each in self.threats
         }
 
+    def threat_row(self, threat: Screened, required: Sequence[Requirement]) -> tuple[str, ...]:
+        """Return the row of a threat under some requirements; see `THREAT_HEADERS`."""
+        kept = all(threat.keeps(each) for each in required)
+        needed_m = max(self.needed_m(threat.name, each) for each in required)
+        x_m, y_m = threat.charge.position_m
+        pane, panel = threat.condition, threat.wall_damage
+        return (
+            threat.name,
+            f"({x_m:.1f}, {y_m:.1f})",
+            f"{threat.charge.tnt_kg:g}",
+            f"{threat.nearest_m:.1f}",
+            self.stand_offs[threat.name][0].in_words(needed_m),
+            threat.level.label,
+            f"{threat.broken_panes:.1f} of {threat.panes}",
+            "-" if pane is None else f"{pane.label}, {pane.rating}",
+            "-" if panel is None else panel.name.lower(),
+            ("passes" if kept else "fails") + (" (may be breached)" if threat.may_breach else ""),
+        )
+
+    def stand_off_rows(self, threat: Screened) -> Iterator[tuple[str, ...]]:
+        """Yield the rows of the components under a threat; see `STAND_OFF_HEADERS`."""
+        for each in self.stand_offs[threat.name]:
+            kind = "wall" if isinstance(each.component, Wall) else "glass"
+            mark = " *" if each.name in self.present else ""
+            cells = (each.in_words(each.distances_m[level]) for level in _LEVELS)
+            yield f"{kind}: {each.name}{mark}", *cells
+
     def needed_m(self, threat: str, requirement: Requirement) -> float:
         """Return the stand-off at which all components of the site keep a requirement.
 
@@ -286,10 +325,7 @@ def stand_offs(
     found = []
     for name, component in components.items():
         part = component.panel(storey_m) if isinstance(component, Wall) else component.pane
-        distances_m = {
-            level: curves.stand_off_m(part, level)
-            for level in sorted(LevelOfProtection, reverse=True)[:-1]
-        }
+        distances_m = {level: curves.stand_off_m(part, level) for level in _LEVELS}
         found.append(StandOff(name, component, distances_m, curves.least_m))
     return tuple(found)
 

@@ -9,11 +9,13 @@ from blast_env.app.editor import Editor
 from blast_env.app.page.files_menu import FilesMenu
 from blast_env.app.page.plan_view import PlanPanel, SolidView
 from blast_env.app.page.results_view import ResultsView
+from blast_env.app.page.screening_view import ScreeningView
 from blast_env.app.page.site_panel import SitePanel
 from blast_env.app.page.work_panel import WorkPanel
 from blast_env.app.session import Session
 
 _PERIOD_S = 0.15
+_SCREENING = "Screening"
 
 
 class DesignPage:
@@ -34,6 +36,7 @@ class DesignPage:
                 with ui.tabs().props("dense no-caps align=left inline-label") as self._tabs:
                     ui.tab("Plan", icon="map")
                     ui.tab("3-D", icon="view_in_ar")
+                    ui.tab(_SCREENING, icon="radar")
                     ui.tab("Results", icon="leaderboard")
                 with ui.tab_panels(self._tabs, value=session.view, animated=False).classes(
                     "w-full grow"
@@ -43,6 +46,8 @@ class DesignPage:
                         self._plan = PlanPanel(self.editor, self.refresh, self._commands())
                     with ui.tab_panel("3-D").classes("p-0"):
                         self._solid = SolidView(self.editor)
+                    with ui.tab_panel(_SCREENING).classes("p-0"):
+                        self._screening = ScreeningView(session)
                     with ui.tab_panel("Results").classes("p-0"):
                         self._results = ResultsView(session)
             self._tabs.on_value_change(lambda event: self._keep_view(event.value))
@@ -57,6 +62,7 @@ class DesignPage:
 
     def _keep_view(self, view: str) -> None:
         self.session.view = view
+        self._screening.show(view == _SCREENING)
 
     def refresh(self) -> None:
         """Show the current design in all parts of the page."""
@@ -65,6 +71,7 @@ class DesignPage:
         self._solid.refresh()
         self._work.refresh()
         self._results.refresh()
+        self._screening.show(self.session.view == _SCREENING)
         history = self.session.history
         self._undo.set_enabled(bool(history.past))
         self._redo.set_enabled(bool(history.future))
