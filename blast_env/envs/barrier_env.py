@@ -38,7 +38,7 @@ from blast_env.envs.strategies import (
     scenario_source,
 )
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.evaluation.engines import Engine, find_engine
+from blast_env.evaluation.engines import Engine, default_engine, find_engine
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
 from blast_env.evaluation.store import BlastCache
 from blast_env.geometry import Element
@@ -130,7 +130,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         invalid_action: str = "nearest",
         illegal_action_cost: float = 0.001,
         illegal_action_limit: int = 100,
-        engine: str | Engine = "event",
+        engine: str | Engine | None = None,
         cell_m: float | None = None,
         cache: str | Path | BlastCache | None = None,
         render_mode: str | None = None,
@@ -157,11 +157,11 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             illegal_action_cost: Cost of an illegal action without effect, in the unit of the
                 reward; 0.001 psi s are 6.9 Pa s.
             illegal_action_limit: Number of illegal actions without effect that ends the episode.
-            engine: Name of an engine, or an engine. `"event"` and `"pymunk"` run the particle
-                model: for studying it, for cheap tests of learning methods, for a first look.
-                `"gas"` is the basis for decisions: no calibration, one realisation per charge, a
-                second or more per blast; `impulse_sim` is NaN there. `"surrogate"` approximates
-                gas dynamics.
+            engine: Name of an engine, or an engine; by default `"event"`, and `"gas"` for sites
+                that state heights. `"event"` and `"pymunk"` run the particle model: for studying
+                it, for cheap tests of learning methods, for a first look. `"gas"` is the basis for
+                decisions: no calibration, one realisation per charge, a second or more per blast;
+                `impulse_sim` is NaN there. `"surrogate"` approximates gas dynamics.
             cell_m: Side of the cells of gas dynamics; default 0.5 m.
             cache: Store of blasts beside the memory of the environment: a folder, which other
                 processes and later runs may use too, or a `BlastCache`.
@@ -173,7 +173,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         Raises:
             BlastEnvError: If an argument is invalid; the message names it and its bounds.
         """
-        found = find_engine(engine, cell_m)
+        source = scenario_source(scenario)
+        representative = source.representative
+        found = find_engine(engine or default_engine(representative, particles="event"), cell_m)
         if render_mode is not None:
             check_names("render mode", [render_mode], self.metadata["render_modes"])
         self.render_mode = render_mode
@@ -185,7 +187,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             whole_number("illegal_action_limit", illegal_action_limit, 1, 1_000_000),
         )
         self.task = Task(
-            source=scenario_source(scenario),
+            source=source,
             threat_model=find_threat_model(threat, threats),
             realisations=find_realisations(realisations, threat, found),
             risk=find_risk(risk, cvar_level),
@@ -193,7 +195,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             actions=strategy("action", action, ACTIONS),
             evaluators=Evaluators(found, cache),
         )
-        representative = self.task.source.representative
         self.task.evaluators.of(representative)  # an unsuitable engine fails here, not later
         numbered = NumberedActions.of(self.task.actions, representative.zone.catalogue)
         self.action_space = spaces.Discrete(numbered.finish + 1)

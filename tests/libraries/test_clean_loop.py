@@ -18,11 +18,8 @@ _GAMMA, _LAMBDA, _CLIP = 1.0, 0.95, 0.2
 # One of each kind: `tests/envs/test_barrier_checks.py` has all ids.
 KINDS = (
     "BlastBarrier-v0",
-    "BlastBarrierIncremental-v0",
     "BlastBarrierGas-v0",
     "BlastBarrierItemSites-v0",
-    "BlastBarrier/HotelForecourt-v0",
-    "BlastBarrier/SchoolWing-v0",
 )
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from gymnasium import wrappers
 
-from tests.libraries.ids import IDS, OTHERS, arguments
+from tests.libraries.ids import IDS, arguments
 
 pytestmark = pytest.mark.slow
 _STEPS = 2
 
 
-@pytest.mark.parametrize("name", sorted({*IDS} - OTHERS))
+@pytest.mark.parametrize("name", IDS)
 def test_the_usual_wrappers(name: str) -> None:
     """One around the other, as training code has them; a limit of steps ends the episode."""
     env: gym.Env[Any, Any] = gym.make(name, max_episode_steps=_STEPS, **arguments(name))

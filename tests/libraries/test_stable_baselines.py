@@ -13,7 +13,7 @@ from blast_env.design.surrogate import SurrogateEngine
 from blast_env.site import Scenario
 from tests.catalogue_sites import ITEMS
 from tests.design.test_surrogate import by_hand
-from tests.libraries.ids import BARRIER_IDS, IDS, OTHERS, arguments
+from tests.libraries.ids import BARRIER_IDS, IDS, arguments
 from tests.office_park import office_park
 
 pytestmark = pytest.mark.slow
@@ -28,7 +28,7 @@ _SMALL: dict[str, Any] = {
 _POLICY = {"net_arch": [8]}
 
 
-@pytest.mark.parametrize("name", sorted({*IDS} - OTHERS))
+@pytest.mark.parametrize("name", IDS)
 def test_ppo(name: str) -> None:
     env = gym.make(name, **arguments(name))
     planes = isinstance(env.observation_space, gym.spaces.Dict)
@@ -38,7 +38,7 @@ def test_ppo(name: str) -> None:
     assert model.num_timesteps == _STEPS
 
 
-@pytest.mark.parametrize("name", sorted({*BARRIER_IDS} - OTHERS))
+@pytest.mark.parametrize("name", BARRIER_IDS)
 def test_cnn_policy_takes_every_image_and_finds_its_channels(name: str) -> None:
     env = gym.make(name, **arguments(name))
     model = PPO("CnnPolicy", env, policy_kwargs=_POLICY, **_SMALL).learn(_STEPS)
@@ -53,14 +53,14 @@ def test_cnn_policy_takes_every_image_and_finds_its_channels(name: str) -> None:
     assert (learnt_on[0] == observation.transpose(2, 0, 1)).all()
 
 
-@pytest.mark.parametrize("name", sorted({*BARRIER_IDS} - OTHERS))
+@pytest.mark.parametrize("name", BARRIER_IDS)
 def test_a_network_of_ones_own_gets_the_planes_in_their_order(name: str) -> None:
     env = gym.make(name, **arguments(name), observation="grid")
     model = PPO("MlpPolicy", env, policy_kwargs=_POLICY, **_SMALL)
     assert model.observation_space == env.observation_space
 
 
-@pytest.mark.parametrize("name", sorted({*BARRIER_IDS} - OTHERS))
+@pytest.mark.parametrize("name", BARRIER_IDS)
 def test_maskable_ppo_gives_illegal_actions_no_probability(name: str) -> None:
     env = gym.make(name, **arguments(name))
     model = MaskablePPO("MlpPolicy", env, policy_kwargs=_POLICY, **_SMALL).learn(_STEPS)

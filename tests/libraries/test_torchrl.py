@@ -6,12 +6,12 @@ It is imported by the tests themselves: it takes seconds, in each process that l
 import pytest
 import torch
 
-from tests.libraries.ids import IDS, OTHERS, arguments
+from tests.libraries.ids import IDS, arguments
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", sorted({*IDS} - OTHERS))
+@pytest.mark.parametrize("name", IDS)
 def test_every_id_is_made_and_keeps_its_specs(name: str) -> None:
     from torchrl.envs import GymEnv, check_env_specs
 

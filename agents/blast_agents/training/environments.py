@@ -14,14 +14,12 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration
-from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE, barrier_id
 from blast_env.envs.observations import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.store import BlastCache, LoadsCache
 from blast_env.runner import workers_told
-from blast_env.site import bundled_scenarios
 from blast_env.sites import FAMILIES
 from blast_env.values import checked_seed, whole_number
 
@@ -81,8 +79,6 @@ def environment_id(scenario: str) -> str:
     """Return the section of the hyperparameters for a scenario's name or path."""
     if scenario in FAMILIES:
         return SITES_ID
-    if scenario in bundled_scenarios() and scenario not in WITHOUT_BUILD_ZONE | FOR_GAS:
-        return barrier_id(scenario)
     return DEFAULT_SECTION
 
 

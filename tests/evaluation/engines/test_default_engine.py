@@ -6,9 +6,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import blast_env
-from blast_env.bundled import bundled_scenarios
 from blast_env.cli import app
-from blast_env.envs import FOR_GAS, WITHOUT_BUILD_ZONE
 from blast_env.evaluation.engines import default_engine
 from blast_env.site import load_scenario, save_scenario
 from tests.gas_sites import WALL, glazed_hut, hut
@@ -33,12 +31,6 @@ def test_heights_take_gas_and_the_papers_sites_particles() -> None:
     assert default_engine(load_scenario("courtyard"), particles="event") == "event"
     assert default_engine(load_scenario("courtyard"), hut()) == "gas"
     assert default_engine() == "pymunk"
-
-
-def test_environments_of_bundled_sites_take_the_engine_of_their_site() -> None:
-    with_zone = [name for name in bundled_scenarios() if name not in WITHOUT_BUILD_ZONE]
-    by_gas = {name for name in with_zone if default_engine(load_scenario(name)) == "gas"}
-    assert by_gas == FOR_GAS & set(with_zone)
 
 
 def test_a_site_with_heights_is_simulated_by_gas_and_says_so_first(site: Path) -> None:
