@@ -9,11 +9,11 @@ import pytest
 
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import CalibrationError
-from blast_env.calibration import model as stored_module
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
 from blast_env.geometry import Cell
+from blast_env.particles.calibration import model as stored_module
 from blast_env.particles.run import BlastRun
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.scene import Scene

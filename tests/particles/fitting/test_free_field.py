@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from blast_env.fitting import free_field as study_module
 from scipy import stats
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import free_field as study_module
 from blast_env.evaluation.free_field import (
     FreeFieldRun,
     FreeFieldStudy,
