@@ -279,7 +279,7 @@ CODE_OF_THE_BUILD: Final = {
 
 CODE_NOT_RUN: Final = {
     ("docs/researchers/benchmark.md", 3): "needs Optuna, which the project does not have",
-    ("docs/researchers/libraries.md", 7): (
+    ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
 }
