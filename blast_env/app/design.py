@@ -19,7 +19,7 @@ MOST_STEPS: Final = 100
 
 @dataclass(frozen=True)
 class Design:
-    """A site and its layouts, all of them legal.
+    """A site and its layouts, all of them legal but for the budget.
 
     Attributes:
         scenario: The site.
@@ -43,7 +43,7 @@ class Design:
         if not 0 <= self.active < len(SLOTS):
             raise BlastEnvError(f"active is {self.active}, must be 0 to {len(SLOTS) - 1}")
         for layout in self.layouts:
-            Placement.of(self.scenario, layout)
+            Placement.of(self.scenario.without_budget, layout)
 
     @property
     def layout(self) -> Layout:
@@ -58,7 +58,7 @@ class Design:
         """
         number = self.active if slot is None else slot
         layouts = [*self.layouts]
-        layouts[number] = Placement.of(self.scenario, layout).layout
+        layouts[number] = Placement.of(self.scenario.without_budget, layout).layout
         return replace(self, layouts=tuple(layouts))
 
     def with_scenario(self, scenario: Scenario) -> tuple["Design", tuple[str, ...]]:

@@ -87,6 +87,8 @@ class Editor:
         cursor: The cell of the keyboard; `None` before its first use.
         ghost: The preview at the mouse.
         pending: The layout under an unfinished stroke; `None` without one.
+        asks_about_roads: Whether a build zone was drawn over a road, and the user has not said yet
+            whether barriers may stand there.
         message: A message not yet shown.
     """
 
@@ -100,6 +102,7 @@ class Editor:
     ghost: Ghost | None = None
     pending: Layout | None = None
     message: str = ""
+    asks_about_roads: bool = False
     _stroke: _Stroke | None = field(default=None, init=False)
     _last: Cell | PointM | None = field(default=None, init=False)
 
@@ -122,7 +125,14 @@ class Editor:
 
     def choose(self, tool: Tool) -> None:
         """Take another tool."""
+        self.message = ""
         self.tool, self.ghost, self._stroke, self.pending = tool, None, None, None
+
+    def answer_about_roads(self, free: bool) -> None:
+        """Keep the roads in the build zone free, or let barriers stand on them."""
+        self.asks_about_roads = False
+        if free:
+            self.attempt("keep roads free", edits.with_roads_free)
 
     # The mouse.
 
@@ -170,6 +180,8 @@ class Editor:
             verb = "size" if stroke.sizes else "move" if stroke.moves else "draw"
             kind = stroke.thing.kind if stroke.thing is not None else "site"
             self._keep(f"{verb} {kind}", stroke.made)
+            is_zone = kind is ThingKind.ZONE
+            self.asks_about_roads = is_zone and bool(edits.roads_in_zone(stroke.made))
             self.selected = stroke.thing
         elif pending is not None and pending != self.session.design.layout:
             count = abs(len(pending) - len(self.session.design.layout))
@@ -193,6 +205,7 @@ class Editor:
         row, column = self.cursor or (zone.rows // 2, zone.columns // 2)
         if self.cursor is not None:
             row, column = row + rows, column + columns
+        self.message = ""
         self.cursor = min(max(row, 0), zone.rows - 1), min(max(column, 0), zone.columns - 1)
         self._show_at(self.cursor)
 
@@ -238,6 +251,7 @@ class Editor:
         except BlastEnvError as error:
             self.message = reason_of(error)
             return False
+        self.message = ""
         self._keep(label, scenario)
         return True
 

@@ -6,11 +6,14 @@ scenario goes through `Scenario.from_document`, which reports all its faults.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
-from math import hypot
 from typing import Any, Final, NamedTuple
+
+import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
+from blast_env.layout import Placement
+from blast_env.plots.plan import rectangles_of
 from blast_env.response.facade import STOREY_M
 from blast_env.site import (
     SCHEMA_VERSION,
@@ -19,7 +22,7 @@ from blast_env.site import (
     Scenario,
     VehicleSource,
 )
-from blast_env.site.sections import PointM
+from blast_env.site.sections import PointM, SegmentSource
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import source_bounds_m
 from blast_env.units import MODULE_SIDE_M
@@ -72,6 +75,10 @@ _DRAWN: Final = (
 )
 """The other kinds, topmost first."""
 
+_HALF_ROAD_M: Final = 1.5
+_OF_BUILDINGS: Final = ("facade", "protected")
+"""Values that all structures of a building share."""
+
 _BETTER_GLASS: Final = "window_laminated_6"
 
 
@@ -108,7 +115,10 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
     )
     for index, structure in enumerate(scenario.structures):
         role = ", protected" if structure.protected else ", terrace" if structure.carries else ""
-        yield SiteThing(ThingKind.STRUCTURE, index), f"{structure.name}{role}"
+        title = scenario.title_of(structure.building_name)
+        part = "" if title in (structure.name, structure.title) else f"{title}: "
+        name = structure.title or structure.name
+        yield SiteThing(ThingKind.STRUCTURE, index), f"{part}{name}{role}"
     for index, source in enumerate(scenario.charge):
         yield SiteThing(ThingKind.CHARGE, index), f"charge {index + 1}, {source.tnt_kg:g} kg"
     zone = scenario.build_zone
@@ -198,12 +208,13 @@ def _beside(source: AnySource, x_m: float, y_m: float) -> float:
     return min(_from_line_m(line_m, x_m, y_m) for line_m in lines_m)
 
 
-def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float:
+def _from_line_m(line_m: tuple[PointM, PointM], x_m: Any, y_m: Any) -> Any:
+    """Return the distance of a place, or of an array of places, from a line, m."""
     (x0, y0), (x1, y1) = line_m
     square = (x1 - x0) ** 2 + (y1 - y0) ** 2
-    along = ((x_m - x0) * (x1 - x0) + (y_m - y0) * (y1 - y0)) / square if square else 0.0
-    share = min(max(along, 0.0), 1.0)
-    return hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
+    along = ((x_m - x0) * (x1 - x0) + (y_m - y0) * (y1 - y0)) / (square or 1.0)
+    share = np.clip(along, 0.0, 1.0)
+    return np.hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
 
 
 def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
@@ -268,7 +279,8 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
     Args:
         scenario: The scenario.
         thing: The thing; `None` is the scenario itself.
-        values: New values by key of the scenario file; `None` removes a key.
+        values: New values by key of the scenario file; `None` removes a key. The facade of a
+            structure, and whether it is protected, are those of its whole building.
 
     Raises:
         ScenarioError: If the result is invalid.
@@ -277,12 +289,20 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
     def edit(document: Document) -> None:
         own = document if thing is None else _own(document, thing)
         for key, value in values.items():
-            if value is None:
-                own.pop(key, None)
-            else:
-                own[key] = value
+            for table in _parts_of(document, thing, own) if key in _OF_BUILDINGS else (own,):
+                if value is None:
+                    table.pop(key, None)
+                else:
+                    table[key] = value
 
     return changed(scenario, edit)
+
+
+def _parts_of(document: Document, thing: SiteThing | None, own: Document) -> list[Document]:
+    """Return the structures of a structure's building."""
+    if thing is None or thing.kind is not ThingKind.STRUCTURE or "building" not in own:
+        return [own]
+    return [each for each in document["structures"] if each.get("building") == own["building"]]
 
 
 def removed(scenario: Scenario, thing: SiteThing) -> Scenario:
@@ -366,6 +386,39 @@ def added(
     after = changed(scenario, edit)
     last = max(each.number for each, _ in things(after) if each.kind is kind)
     return after, SiteThing(kind, last)
+
+
+def roads_in_zone(scenario: Scenario) -> tuple[Rectangle, ...]:
+    """Return the usable ground of the build zone that is a road on which a charge may be."""
+    zone = scenario.build_zone
+    if zone is None:
+        return ()
+    rows, columns = np.indices((zone.rows, zone.columns))
+    left, bottom = zone.corner_m
+    x_m, y_m = (
+        left + MODULE_SIDE_M * (columns + 0.5),
+        bottom + MODULE_SIDE_M * (rows + 0.5),
+    )
+    road = np.zeros(x_m.shape, dtype=bool)
+    for source in scenario.charge:
+        if isinstance(source, SegmentSource):
+            road |= _from_line_m(source.segment_m, x_m, y_m) <= _HALF_ROAD_M
+    return tuple(rectangles_of(road & Placement.empty(scenario).usable, zone.corner_m))
+
+
+def with_roads_free(scenario: Scenario) -> Scenario:
+    """Return the scenario with the roads in its build zone kept free.
+
+    Raises:
+        ScenarioError: If that takes too many keep-outs.
+    """
+    areas = [{**_sized(each), "reason": "road"} for each in roads_in_zone(scenario)]
+
+    def edit(document: Document) -> None:
+        zone = document["build_zone"]
+        zone["keep_outs"] = [*zone.get("keep_outs", []), *areas]
+
+    return changed(scenario, edit)
 
 
 def _fit_catalogue(document: Document, whole: int | None) -> None:

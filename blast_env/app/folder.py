@@ -23,6 +23,7 @@ from blast_env.app.records import (
     RECORD,
     BlastRecord,
     CoarseLoads,
+    DesignSettings,
     Kept,
     check_key,
     read_kept,
@@ -35,6 +36,7 @@ from blast_env.files import make_folder, write_atomically
 from blast_env.site import Scenario
 
 _DESIGN: Final = "design.json"
+_SETTINGS: Final = "settings.json"
 _OPEN: Final = "open.json"
 
 
@@ -93,6 +95,18 @@ class DesignFolder:
         content = json.dumps(history.record(), allow_nan=False)
         with write_atomically(self.path / _DESIGN) as temporary:
             temporary.write_text(content, encoding="utf-8")
+
+    def settings(self) -> DesignSettings | None:
+        """Return the settings of its page; `None` if none were saved."""
+        return read_kept(DesignSettings, self.path / _SETTINGS)
+
+    def keep_settings(self, settings: DesignSettings) -> None:
+        """Save the settings of its page.
+
+        Raises:
+            BlastEnvError: If they cannot be written.
+        """
+        write_kept(settings, self.path / _SETTINGS)
 
     def load(self) -> History:
         """Return the design with its steps.

@@ -1,7 +1,7 @@
 """The elements that can be placed on a site, and those of a layout, for editing and drawing.
 
 Only this module of the page handles the elements of a layout; `Placement` decides whether one may
-stand at a place.
+stand at a place. A layout may cost more than the budget, which its words say.
 """
 
 from collections.abc import Iterable, Sequence
@@ -76,7 +76,7 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
     zone = scenario.build_zone
     if zone is None:
         return ()
-    placement = Placement.of(scenario, layout)
+    placement = Placement.of(scenario.without_budget, layout)
     if not zone.items:
         height = "" if zone.height_m is None else f", {zone.height_m:g} m high"
         return (Placeable("", f"module of 0.5 m{height}", False, placement.stock_left),)
@@ -163,7 +163,7 @@ def moved_to(old: Element, cell: Cell) -> Element:
 
 def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | None:
     """Return the reason why an element cannot stand beside a layout, or `None` if it can."""
-    return Placement.of(scenario, layout).explain(new)
+    return Placement.of(scenario.without_budget, layout).explain(new)
 
 
 def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple[str, ...]]:
@@ -173,9 +173,9 @@ def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple
         The layout, and one reason for each element removed.
     """
     try:
-        return Placement.of(scenario, layout).layout, ()
+        return Placement.of(scenario.without_budget, layout).layout, ()
     except LayoutError:
-        placement, reasons = Placement.empty(scenario), []
+        placement, reasons = Placement.empty(scenario.without_budget), []
     for each in layout:
         try:
             placement = placement.place(each)
@@ -189,12 +189,15 @@ def counted(scenario: Scenario, layout: Layout) -> str:
     zone = scenario.build_zone
     if zone is None:
         return "no build zone"
-    placement = Placement.of(scenario, layout)
+    placement = Placement.of(scenario.without_budget, layout)
     what = "pieces" if zone.items else "modules"
     words = f"{len(layout)} of {zone.stock} {what}, cost {placement.cost:g}"
-    return words if zone.budget is None else f"{words} of {zone.budget:g}"
+    if zone.budget is None:
+        return words
+    over = placement.cost - zone.budget
+    return f"{words} of {zone.budget:g}" + (f": {over:g} over the budget" if over > 0.0 else "")
 
 
 def cost_of(scenario: Scenario, layout: Layout) -> float:
     """Return the cost of a layout."""
-    return Placement.of(scenario, layout).cost
+    return Placement.of(scenario.without_budget, layout).cost

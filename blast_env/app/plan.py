@@ -153,7 +153,7 @@ def _features(scenario: Scenario, layout: Layout) -> tuple[Feature, ...]:
     """Return everything that the plan shows, the lowest first."""
     found = [*site_features(scenario, layout), *vehicle_features(scenario, layout)]
     if scenario.build_zone is not None:
-        usable = Placement.of(scenario, layout).usable
+        usable = Placement.of(scenario.without_budget, layout).usable
         found += cell_features(scenario.build_zone, usable)
     return in_order(found)
 

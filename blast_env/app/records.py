@@ -148,6 +148,20 @@ class Wave(Kept):
     overpressure_kpa: tuple[float, ...]
 
 
+class DesignSettings(Kept):
+    """The settings of a design's page, which its history does not have.
+
+    Attributes:
+        engine: The engine.
+        threats: Names of the chosen threats.
+        view: The view opened last.
+    """
+
+    engine: EngineRecord
+    threats: tuple[str, ...] = ()
+    view: str = "Plan"
+
+
 class Picture(Kept):
     """A picture of a blast: its file and its label."""
 
@@ -273,7 +287,7 @@ def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: Engine
     Hardening measures and the panes and walls in the bays are left out: no load depends on them.
     """
     divided = [
-        (each.name, each.facade.storey_m, each.facade.bay_m)
+        (each.name, each.facade.storey_m, each.facade.storeys, each.facade.bay_m)
         for each in scenario.structures
         if each.facade is not None
     ]

@@ -17,6 +17,7 @@ from blast_env.app.jobs import Workers, jobs_of, settle
 from blast_env.app.offers import title_of
 from blast_env.app.records import (
     BlastRecord,
+    DesignSettings,
     EngineRecord,
     Row,
     Verdict,
@@ -38,6 +39,7 @@ from blast_env.app.work import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Measure
+from blast_env.layout import check_layout
 from blast_env.layout.build_scene import charge_against
 from blast_env.site import AnyCharge, Scenario
 
@@ -93,9 +95,25 @@ class Session:
         """
         session = cls(folder, work, workers, folder.load())
         settle(folder.jobs, workers)
-        session.threats = usual_threats(session.scenario)
-        session.engine = EngineRecord.final(session.scenario)
+        kept = folder.settings() or DesignSettings(engine=EngineRecord.final(session.scenario))
+        session.engine, session.view = kept.engine, kept.view
+        session._choose(kept.threats)
         return session
+
+    def keep(self) -> None:
+        """Save engine, threats and view, with which the design is opened again.
+
+        Raises:
+            BlastEnvError: If they cannot be written.
+        """
+        kept = DesignSettings(engine=self.engine, threats=self.threats, view=self.view)
+        self.folder.keep_settings(kept)
+
+    def _choose(self, threats: Iterable[str]) -> None:
+        """Take the threats that the site has; the usual ones if it has none of them."""
+        known = {each.name for each in threats_of(self.scenario)}
+        self.threats = tuple(each for each in threats if each in known)
+        self.threats = self.threats or usual_threats(self.scenario)
 
     @property
     def design(self) -> Design:
@@ -141,7 +159,7 @@ class Session:
         """Add a measure to the active layout, or remove it.
 
         Raises:
-            LayoutError: If there is no such measure, or the budget does not pay for it.
+            LayoutError: If there is no such measure.
             BlastEnvError: As for `put`.
         """
         own = Measure.named(measure)
@@ -163,9 +181,7 @@ class Session:
 
     def _set(self, history: History) -> None:
         self.history = history
-        known = {each.name for each in threats_of(self.scenario)}
-        self.threats = tuple(each for each in self.threats if each in known)
-        self.threats = self.threats or usual_threats(self.scenario)
+        self._choose(self.threats)
         try:
             self.folder.save(history)
         finally:
@@ -189,7 +205,7 @@ class Session:
         folder = None
         for slot in chosen:
             task = BlastTask(
-                **self._on_site(),
+                **self._on_site(self.scenario.without_budget),
                 layout=placing.plain(self.design.layouts[slot]),
                 engine=self.engine,
                 blasts=str(self.folder.blasts),
@@ -239,7 +255,7 @@ class Session:
             BlastEnvError: If it cannot be started.
         """
         task = FilmTask(
-            **self._on_site(),
+            **self._on_site(self.scenario.without_budget),
             layout=placing.plain(self.design.layout),
             engine=self.engine,
             path=str(path),
@@ -293,10 +309,10 @@ class Session:
     def _begin(self, task: Task, title: str) -> Path:
         return self.workers.begin(task, self.folder.jobs, title)
 
-    def _on_site(self) -> dict[str, Any]:
-        """Return the parameters common to all work on the site."""
+    def _on_site(self, site: Scenario | None = None) -> dict[str, Any]:
+        """Return the parameters common to all work on the site, or on a variant of it."""
         return {
-            "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
+            "scenario": (site or self.scenario).model_dump(mode="json", exclude_none=True),
             "threats": self.chosen_threats(),
             "cache": str(self.work.cache),
         }
@@ -348,6 +364,7 @@ class Session:
             raise BlastEnvError(
                 f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
             )
+        check_layout(self.scenario, self.design.layout)  # refuses one that costs too much
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return the costs of the blasts of a search; none with particles."""
@@ -379,7 +396,7 @@ class Session:
     def key(self, layout: Layout, threat: NamedThreat) -> str:
         """Return the key of a blast."""
         charge = charge_against(self.scenario, layout, threat.charge)
-        return blast_key(self.scenario, layout, charge, self.engine)
+        return blast_key(self.scenario.without_budget, layout, charge, self.engine)
 
     def comparison(self) -> list[Row]:
         """Return the table of all blasts of the current design."""

@@ -10,9 +10,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from blast_env.app.edits import snapped
 from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutFile
-from blast_env.site import Scenario, load_scenario
+from blast_env.response.facade import STOREY_M
+from blast_env.site import SCHEMA_VERSION, Scenario, load_scenario
 
 if TYPE_CHECKING:
     from blast_env.io.importing import ImportedSite, ImportOptions
@@ -24,6 +26,25 @@ SITES: Final[Mapping[str, Callable[[Path], Scenario]]] = MappingProxyType({".tom
 
 MAPS: Final = (".geojson", ".json", ".osm", ".pbf", ".dxf")
 """Suffixes of maps and drawings, which take options: `imported_site`."""
+
+
+def blank_site(width_m: float, height_m: float) -> Scenario:
+    """Return a site with only what a site must have: a building to protect, and a charge.
+
+    Raises:
+        ScenarioError: If a side is out of bounds.
+    """
+    x_m, y_m = snapped(0.5 * width_m), snapped(0.5 * height_m)
+    house = {"kind": "ModularObstacle", "name": "building", "rows": 8, "columns": 8}
+    house |= {"corner_m": [x_m - 2.0, y_m - 2.0], "height_m": STOREY_M, "protected": True}
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "name": "blank",
+        "site": {"width_m": width_m, "height_m": height_m},
+        "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 100.0}],
+        "structures": [house],
+    }
+    return Scenario.from_document(document, "blank site")
 
 
 def site_of_file(path: Path) -> Scenario:

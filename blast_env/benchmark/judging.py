@@ -24,7 +24,7 @@ from blast_env.documents import checked_as, parse_json
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastCache, BlastEvaluator
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
-from blast_env.statistics import Estimate, stratified_estimate
+from blast_env.statistics import Estimate, mean_estimate, stratified_estimate
 
 JUDGE_CELL_M: Final = 0.25
 """Side of the judge's cells, m."""
@@ -125,6 +125,28 @@ class JudgedSubmission:
     def area(self) -> Estimate:
         """Return the area under the score over the logarithm of the blasts."""
         return self._mean(BUDGET_WEIGHTS)
+
+    def reduction(self, budget: int) -> Estimate:
+        """Return the mean share of the load taken off, with its interval over the problems.
+
+        Args:
+            budget: As for `score`; problems without a run count 0.
+        """
+        return mean_estimate([1.0 - share for share, _ in self._shares(budget)])
+
+    def lead(self, budget: int) -> Estimate:
+        """Return `reduction` less that of the best rule of each problem, paired by problem."""
+        return mean_estimate([rule - share for share, rule in self._shares(budget)])
+
+    def _shares(self, budget: int) -> list[tuple[float, float]]:
+        """Return the mean share that remains and that of the best rule, one pair per problem."""
+        pairs = []
+        for name in self.problems:
+            of_problem = [run for run in self.runs if run.problem == name]
+            spent = self._spent(name, budget)
+            own = [run.share for run in of_problem if run.budget == spent] or [1.0]
+            pairs.append((float(np.mean(own)), of_problem[0].rule))
+        return pairs
 
     def _mean(self, of_budgets: Mapping[int, float]) -> Estimate:
         """Return the mean score over budgets with weights."""

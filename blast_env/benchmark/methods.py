@@ -1,12 +1,26 @@
 """The methods of the package on the problems of the benchmark."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from blast_env.benchmark import BenchmarkProblem, Definition, KnownLayout, Method, ScoreReference
+from blast_env.benchmark import (
+    BUDGETS,
+    BenchmarkProblem,
+    Definition,
+    KnownLayout,
+    Method,
+    ScoreReference,
+)
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import engine_key
-from blast_env.design.search import LayoutProblem, Proposer, find_proposer, layouts_by_rule
+from blast_env.design.search import (
+    LayoutProblem,
+    Proposer,
+    ProposerKind,
+    find_proposer,
+    layouts_by_rule,
+)
+from blast_env.design.search.registry import proposer_row
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.contract import load_plugin
@@ -27,6 +41,14 @@ def method_of(proposer: Proposer) -> Method:
     return partial(_proposed, proposer)
 
 
+def _by_rule(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
+    """Return the layout of a rule; nothing where the site has none, as without a sight line."""
+    try:
+        return _proposed(proposer, problem, seed)
+    except BlastEnvError:
+        return ()
+
+
 def find_method(name: str) -> Method:
     """Return a method by the name of a proposer, or by `module:object`.
 
@@ -35,15 +57,37 @@ def find_method(name: str) -> Method:
         BlastEnvError: If the module or object does not exist or is not callable.
     """
     if ":" not in name:
-        return method_of(find_proposer(name))
+        is_rule = proposer_row(name).kind is ProposerKind.RULE
+        return partial(_by_rule if is_rule else _proposed, find_proposer(name))
     try:
         found = load_plugin(name)
     except (ImportError, AttributeError, ValueError) as error:
         raise BlastEnvError(f"method is {name!r}: {error}") from error
+    if isinstance(found, type):
+        found = found()
+    if hasattr(found, "propose"):
+        return method_of(found)
     if not callable(found):
         raise BlastEnvError(f"method is {name!r}, must be something to call")
     method: Callable[[BenchmarkProblem, int], Layout] = found
     return method
+
+
+def budgets_of(name: str, asked: Sequence[int]) -> tuple[int, ...]:
+    """Return the budgets with which a method enters.
+
+    Args:
+        name: As for `find_method`.
+        asked: The budgets that were asked for; a rule has 0 alone, a search those above 0. If
+            there are none: 50, and 0 for methods of the package that need no blast.
+    """
+    kind = ProposerKind.SEARCH if ":" in name else proposer_row(name).kind
+    if kind is ProposerKind.RULE:
+        return (0,)
+    if ":" in name and asked:
+        return tuple(asked)
+    known = tuple(asked or BUDGETS[:2])
+    return known if kind is ProposerKind.LEARNT else tuple(each for each in known if each)
 
 
 def reference_of(

@@ -15,8 +15,12 @@ _HEAD = """# Standings
 
 Judged entries to the [benchmark](benchmark.md). The files in `blast_env/benchmark/data/standings`
 have the layouts of every run. `blast-env judge --page` writes this page from them. The tables say
-how much of the load each layout takes off, by gas dynamics. Intervals are of 95 %, over the seeds.
+how much of the load each layout takes off, by gas dynamics. Intervals are of 95 %, over the seeds
+unless the title names the problems.
 """
+
+_NAMED = 6
+"""Most problems that a title names."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ def standings_tables(judged: Sequence[JudgedSubmission]) -> Iterator[StandingsTa
         groups.setdefault((tuple(sorted(each.problems)), each.cell_m), []).append(each)
     for (problems, cell_m), own in groups.items():
         yield _scores(own, problems, cell_m)
+        if len(problems) > 1:
+            yield _means(own, problems, cell_m)
         yield from (_reductions(own, name, cell_m) for name in problems)
 
 
@@ -73,10 +79,29 @@ def _scores(
         for each in sorted(judged, key=lambda each: -each.area().value)
     ]
     counted = f"{len(problems)} problem{'s' * (len(problems) > 1)}"
+    names = ", ".join(problems[:_NAMED]) + (", ..." if len(problems) > _NAMED else "")
     return StandingsTable(
-        f"Score on {counted}: {', '.join(problems)}; cells of {cell_m:g} m",
+        f"Score on {counted}: {names}; cells of {cell_m:g} m",
         ("method", "runs", *(f"{budget:,} blasts" for budget in budgets), "all budgets"),
         tuple(rows),
+    )
+
+
+def _means(
+    judged: Sequence[JudgedSubmission], problems: Sequence[str], cell_m: float
+) -> StandingsTable:
+    """Return the reductions over all problems, and the lead over the best rule of each."""
+    found = []
+    for each in judged:
+        for budget in sorted({run.budget for run in each.runs}):
+            off, lead = (of(budget).scaled(100.0) for of in (each.reduction, each.lead))
+            row = (each.method, f"{budget:,}", _text(off, "{:.1f}"), _text(lead, "{:+.1f}"))
+            found.append((off.value, row))
+    return StandingsTable(
+        f"Load taken off in all {len(problems)} problems, %, with intervals over the problems; "
+        f"cells of {cell_m:g} m",
+        ("method", "budget", "mean", "more than the best rule of each"),
+        tuple(row for _, row in sorted(found, key=lambda each: -each[0])),
     )
 
 

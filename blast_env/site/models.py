@@ -269,8 +269,20 @@ class Scenario(Section):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy with other values, without the hash of the original."""
         copied = super().model_copy(update=update, deep=deep)
-        copied.__dict__.pop("content_hash", None)
+        for cached in ("content_hash", "unlimited"):
+            copied.__dict__.pop(cached, None)
         return copied
+
+    @property
+    def without_budget(self) -> "Scenario":
+        """The scenario with any budget, on which no load depends."""
+        return self if self.build_zone is None or self.build_zone.budget is None else self.unlimited
+
+    @cached_property
+    def unlimited(self) -> "Scenario":
+        """A copy without a budget."""
+        zone = self.zone.model_copy(update={"budget": None})
+        return self.model_copy(update={"build_zone": zone})
 
     @cached_property
     def content_hash(self) -> str:

@@ -11,11 +11,15 @@ from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
 from blast_env.app.plan import PixelView, overlay_svg, plan_svg
+from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
 from blast_env.app.solids import boxes
+from blast_env.app.sources import blank_site
+from blast_env.app.threats import threats_of
 from blast_env.geometry import Piece
+from blast_env.layout import Placement
 from blast_env.plots.plan import STRUCTURE
-from blast_env.site import load_scenario
+from blast_env.site import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import WALL, column, hut, site_document
 from tests.vehicle_sites import POSTS, gate_site
 
@@ -45,6 +49,74 @@ def test_a_stroke_of_modules_is_one_step(editor: Editor) -> None:
     assert editor.session.history.present.label == "place 3"
     editor.session.undo()
     assert not editor.session.design.layout
+
+
+def test_a_message_goes_when_its_reason_does(editor: Editor) -> None:
+    editor.selected = SiteThing(ThingKind.STRUCTURE, 0)
+    editor.nudge(500.0, 0.0)
+    assert editor.message
+    editor.nudge(0.5, 0.0)
+    assert not editor.message
+    editor.message = "nothing is selected"
+    editor.choose(Tool.PLACE)
+    assert not editor.message
+
+
+def test_an_opened_design_has_its_engine_threats_and_view_again(tmp_path: Path) -> None:
+    work = WorkFolder(tmp_path)
+    document = site_document()
+    points = [{**document["charge"][0], "position_m": [2.0, y]} for y in (2.0, 6.0)]
+    created = work.create(hut(charge=points), "begin")
+    session = Session.opened(created, work, Workers())
+    first, second = (each.name for each in threats_of(session.scenario))
+    assert session.engine.cell_m == 0.25
+    session.engine, session.view = EngineRecord(name="gas", cell_m=0.5), "Results"
+    for chosen in ((second,), (first,)):
+        session.threats = chosen
+        session.keep()
+        again = Session.opened(work.open(created.design_id), work, Workers())
+        assert (again.engine, again.threats, again.view) == (session.engine, chosen, "Results")
+
+
+def test_a_zone_over_a_road_asks_and_keeps_it_free(tmp_path: Path) -> None:
+    road = {"kind": "segment", "start_m": [2.0, 1.0], "end_m": [2.0, 7.0], "tnt_kg": 5.0}
+    work = WorkFolder(tmp_path)
+    created = work.create(hut(charge=[road]), "begin")
+    editor = Editor(Session.opened(created, work, Workers()))
+    editor.choose(Tool.ZONE)
+    stroke(editor, (4.0, 2.0), (5.5, 6.0))
+    assert not editor.asks_about_roads
+    stroke(editor, (1.0, 2.0), (5.5, 6.0))
+    assert editor.asks_about_roads
+    editor.answer_about_roads(free=True)
+    assert not editor.asks_about_roads
+    usable = Placement.empty(editor.session.scenario).usable
+    assert not usable[:, :5].any()  # x 1 to 3.5 m
+    assert usable[:, 5:].any()
+
+
+def test_a_facade_is_that_of_the_whole_building(tmp_path: Path) -> None:
+    document = site_document()
+    (west,) = document["structures"]
+    west |= {"name": "west", "building": "office", "title": "Town Hall", "columns": 2}
+    east = {**west, "name": "east", "corner_m": [7.0, 3.0], "title": ""}
+    other = {**west, "name": "other", "corner_m": [8.5, 3.0]}
+    del other["building"], other["title"]
+    site = hut(structures=[west, east, other])
+    facade = {"wall": "brick_215", "storeys": 1}
+    after = edits.with_values(site, SiteThing(ThingKind.STRUCTURE, 1), {"facade": facade})
+    assert [each.facade is not None for each in after.structures] == [True, True, False]
+    labels = [words for thing, words in edits.things(after) if thing.kind is ThingKind.STRUCTURE]
+    assert labels[:2] == ["Town Hall, protected", "Town Hall: east, protected"]
+
+
+def test_a_blank_site_can_be_edited_at_once() -> None:
+    site = blank_site(60.0, 40.0)
+    assert (site.site.width_m, site.site.height_m) == (60.0, 40.0)
+    zone, _ = edits.added(site, ThingKind.ZONE, (4.0, 4.0), (20.0, 10.0))
+    assert zone.zone.columns == 32
+    with pytest.raises(ScenarioError, match="width_m"):
+        blank_site(1.0, 40.0)
 
 
 def test_why_a_module_cannot_stand_is_shown_as_it_is_dragged(editor: Editor) -> None:

@@ -133,11 +133,18 @@ def test_a_damaged_file_of_histories_gives_no_verdict(blasted: Session) -> None:
     path.write_bytes(whole)
 
 
-def test_the_budget_pays_or_it_is_said(blasted: Session) -> None:
+def test_a_layout_over_the_budget_can_be_looked_at_but_not_reported(blasted: Session) -> None:
     blasted.put("wall", blasted.design.with_layout((*WALL, GLASS)))
+    (threat,) = blasted.chosen_threats()
+    before = [each.key for each in blasted.shown(threat)]
+    blasted.harden("panels", taken=True)
+    assert len(blasted.design.layout) == len(WALL) + 2
+    words = placing.counted(blasted.scenario, blasted.design.layout)
+    assert words.endswith("cost 115 of 100: 15 over the budget")
+    assert [each.key for each in blasted.shown(threat)] == before  # no load depends on costs
     with pytest.raises(LayoutError, match="budget"):
-        blasted.harden("panels", taken=True)
-    assert blasted.design.layout == (*WALL, GLASS)
+        blasted.report(Path("a.html"))
+    blasted.undo()
     words = {each.name: each for each in placing.measures(blasted.scenario, blasted.design.layout)}
     assert words["glass"].is_taken
     assert not words["panels"].is_taken
@@ -173,8 +180,7 @@ def test_a_switch_on_the_page_takes_a_measure(tmp_path: Path) -> None:
         session.undo()
         assert not switch("panels, cost 45").value
         session.put("wall", session.design.with_layout((GLASS, *WALL)))
-        switch("panels, cost 45").value = True  # the budget does not pay for it
-        await user.should_see("budget")
-        assert not switch("panels, cost 45").value
+        switch("panels, cost 45").value = True
+        await user.should_see("15 over the budget")
 
     play(tmp_path, story)

@@ -7,9 +7,11 @@ from nicegui import ui
 from blast_env.app.page.numbers import NumberField
 from blast_env.app.page.uploads import complain, site_upload
 from blast_env.app.session import Sessions
+from blast_env.app.sources import blank_site
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.sites import generate_site
+from blast_env.units import MODULE_SIDE_M
 
 _MOST_SHOWN = 30
 
@@ -51,6 +53,16 @@ class StartPage:
             ui.button("generated site", icon="casino", on_click=self._generated).props(
                 "no-caps dense outline"
             )
+        with ui.row().classes("items-center gap-2"):
+            self._sides = [
+                NumberField(words, 40.0, least=MODULE_SIDE_M)
+                for words in ("width (m)", "depth (m)")
+            ]
+            for side in self._sides:
+                side.classes("w-28")
+            ui.button("blank site", icon="crop_free", on_click=self._blank).props(
+                "no-caps dense outline"
+            )
 
     def _designs(self) -> None:
         ui.label("Continue a design").classes("be-head")
@@ -74,6 +86,12 @@ class StartPage:
     def _generated(self) -> None:
         try:
             self._create(generate_site(int(self._seed.filled)), "generated")
+        except BlastEnvError as error:
+            complain(error)
+
+    def _blank(self) -> None:
+        try:
+            self._create(blank_site(*(each.filled for each in self._sides)), "a blank site")
         except BlastEnvError as error:
             complain(error)
 

@@ -123,6 +123,8 @@ class WorkPanel:
         self._runs = {each.name: each for each in runs}
         self._filling = False
         self._cards: list[_Card] | None = None
+        self._refusal: ui.notification | None = None
+        self._seen: object = None
         self._there: tuple[frozenset[str], ...] = ()
         self._build()
 
@@ -247,11 +249,13 @@ class WorkPanel:
         if self._filling:
             return
         self._session.engine = _ENGINES[name][0]
+        self._try(self._session.keep)
         self._after()
 
     def _against(self, names: Sequence[str]) -> None:
         if not self._filling and names:
             self._session.threats = tuple(names)
+            self._try(self._session.keep)
             self._after()
 
     def blast(self) -> None:
@@ -291,18 +295,30 @@ class WorkPanel:
 
     def _try(self, act: Callable[[], object]) -> bool:
         """Call `act`, or show its error; return whether it succeeded."""
+        self._dismiss()
         try:
             act()
         except BlastEnvError as error:
-            ui.notify(str(error), type="negative", multi_line=True, close_button=True, timeout=0)
+            self._refusal = ui.notification(
+                str(error), type="negative", multi_line=True, close_button=True, timeout=None
+            )
             return False
         return True
+
+    def _dismiss(self) -> None:
+        """Take away the last refusal, which the next action or edit may have mended."""
+        if self._refusal is not None:
+            self._refusal.dismiss()
+            self._refusal = None
 
     # Display.
 
     def refresh(self) -> None:
         """Show the current design."""
         session, design = self._session, self._session.design
+        if self._seen not in (None, design):
+            self._dismiss()
+        self._seen = design
         self._filling = True
         self._slots.value = design.active
         self._counted.text = placing.counted(design.scenario, design.layout)
