@@ -465,10 +465,9 @@ class Session:
         raise BlastEnvError(f"there is no {name}")
 
     def _facades(self, shown: Shown, threat: NamedThreat) -> FacadeVerdict | None:
-        charge = charge_against(self.scenario, shown.layout, threat.charge)
         folder = self.folder.blast_of(shown.key)
         cell_m = self.engine.gas.smallest_m
-        return FacadeVerdict.read(self.scenario, shown.layout, charge, cell_m, folder)
+        return FacadeVerdict.read(self.scenario, shown.layout, threat.charge, cell_m, folder)
 
     def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""

@@ -19,10 +19,12 @@ from blast_env.evaluation.consequences import BuildingResponse, by_building
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
+from blast_env.layout.build_scene import build_site
+from blast_env.layout.placement import met_by_blasts
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import FilledBay, peak_factor, respond
-from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site import AnyCharge, Scenario
+from blast_env.site.scene import BlastSite
 
 _BAYS: Final = "bays.npz"
 _DASH: Final = "\N{EN DASH}"
@@ -56,21 +58,21 @@ class FacadeVerdict:
         bays: The bays with a history, filled as the layout's measures have them.
         time_s: Times of the histories (times,).
         pressure_pa: Mean overpressure on each bay (bays, times).
-        charge: The charge at its place.
-        scenario: The site.
+        site: The site with the charge at its place and the barrier.
+        scenario: The scenario.
         cell_m: Side of the cells.
     """
 
     bays: tuple[FilledBay, ...]
     time_s: FloatArray
     pressure_pa: FloatArray
-    charge: Charge
+    site: BlastSite
     scenario: Scenario
     cell_m: float
 
     @classmethod
     def read(
-        cls, scenario: Scenario, layout: Layout, charge: Charge, cell_m: float, folder: Path
+        cls, scenario: Scenario, layout: Layout, charge: AnyCharge, cell_m: float, folder: Path
     ) -> "FacadeVerdict | None":
         """Return the verdict of a stored blast; `None` without histories of the facades."""
         try:
@@ -84,13 +86,14 @@ class FacadeVerdict:
         if not rows:
             return None
         bays = tuple(known[names[row]] for row in rows)
-        return cls(bays, time_s, pressure[rows].astype(np.float64), charge, scenario, cell_m)
+        site = build_site(scenario, met_by_blasts(layout), 0, charge)
+        return cls(bays, time_s, pressure[rows].astype(np.float64), site, scenario, cell_m)
 
     def buildings(self) -> list[BuildingResponse]:
         """Return the response of each building."""
         found = respond(self.bays, self.time_s, self.pressure_pa)
-        factor = peak_factor(self.cell_m, self.charge.tnt_kg)
-        return by_building(self.scenario, found, self.charge, factor)
+        factor = peak_factor(self.cell_m, self.site.charge.tnt_kg)
+        return by_building(self.scenario, found, self.site, factor)
 
     def verdicts(self) -> tuple[Verdict, ...]:
         """Return the verdict on each building, in numbers."""
@@ -107,7 +110,7 @@ class FacadeVerdict:
         from blast_env.plots.figures import save_figure
 
         building = self.buildings()[number]
-        (x_m, y_m), tnt_kg = self.charge.position_m, self.charge.tnt_kg
+        (x_m, y_m), tnt_kg = self.site.charge.position_m, self.site.charge.tnt_kg
         words = f"{tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
         save_figure(facade_picture([(words, building)], building.building), path)
 

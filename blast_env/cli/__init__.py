@@ -22,6 +22,9 @@ class _Commands(LazyGroup):
         ),
         "evaluate": "Compare layouts with no barrier, both exposed to the same threats.",
         "assess": "Assess the damage of buildings by charges: panes, panels, level of protection.",
+        "capacity": (
+            "Find the largest charge at each place, and the least stand-off, that keep each level."
+        ),
         "advise": (
             "Compare the protection for a budget: stand-off, shielding, hardening, and all "
             "combined."

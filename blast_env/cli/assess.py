@@ -11,6 +11,7 @@ from blast_env.cli.options import (
     CELLS_HELP,
     FINAL_CELL_HELP,
     FINAL_CELLS,
+    MASS_ERROR_HELP,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
@@ -27,8 +28,7 @@ from blast_env.cli.output import (
     result_console,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.evaluation import Case, Threat, draw_threats
-from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.consequences import (
     CASE_COLUMNS,
     BuildingResponse,
@@ -45,11 +45,12 @@ from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import GridError, convergence_index, final_engine
+from blast_env.evaluation.probability import Uncertainty, level_probability
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
-from blast_env.site import AnyCharge, Scenario, load_scenario
+from blast_env.site import Scenario, load_scenario
 from blast_env.site.scene import Charge
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_KPA
@@ -87,6 +88,7 @@ class AssessCommand(ChargeOptions):
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     cell_m: float | None = option(None, FINAL_CELL_HELP)
     cells: str | None = option(None, CELLS_HELP, show_default=FINAL_CELLS)
+    mass_error: float = option(0.1, MASS_ERROR_HELP, min=0.0, max=0.3)
     without_fallen: bool = option(
         False, "Remove pieces that overturn before the blast is over, and run it again."
     )
@@ -111,7 +113,7 @@ class AssessCommand(ChargeOptions):
         if self.layout is not None:
             layout = tuple(load_layout(self.layout, scenario))
             layouts[layout_counts(layout, "barrier")] = layout
-        charges = self._charges(scenario)
+        charges = self.fixed_charges(scenario, self.charges)
         engine = final_engine(JUDGE, [scenario], self.cell_m, cells=self.cells)
         coarser = engine.coarser
         print_line(engine.describe([scenario]))
@@ -137,18 +139,18 @@ class AssessCommand(ChargeOptions):
                         without_fallen=self.without_fallen,
                     )
         self._print_verdict(scenario, found, target)
-        if coarser is not None:
-            _print_cells(scenario, layouts, found, coarse, coarser)
+        error = _grid_error(scenario, layouts, found, coarse, coarser)
+        uncertainty = Uncertainty.of(self.mass_error, error)
+        for name, judged in reversed(found.items()):
+            likely = level_probability(judged, uncertainty)
+            print_line(f"probability, {name}: {likely.words(target)}")
+        if error is not None:
+            _print_cells(found, coarse, error)
         self._print(scenario, found, coarse)
         self._print_neighbours(scenario, found, coarse)
         self._print_barriers(found)
         self._print_glazing(scenario, list(found.values())[-1], target)
         self._write(scenario, layouts, found)
-
-    def _charges(self, scenario: Scenario) -> list[AnyCharge]:
-        threats = one_of_each_charge(draw_threats(scenario, range(self.charges)))
-        fixed = [self.fixed(scenario, threat.charge) for threat in threats]
-        return list(dict.fromkeys(fixed))
 
     def _print_verdict(
         self, scenario: Scenario, found: dict[str, Consequences], target: LevelOfProtection
@@ -291,19 +293,21 @@ def _charge_text(charge: Charge) -> str:
     return f"{charge.tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
 
 
-def _print_cells(
+def _grid_error(
     scenario: Scenario,
     layouts: dict[str, Layout],
     found: dict[str, Consequences],
     coarse: dict[str, Consequences],
-    coarser: Engine,
-) -> None:
-    """Print the impulse under the worst charge with its error, and levels that cells change."""
+    coarser: Engine | None,
+) -> GridError | None:
+    """Return the error of the cells under the worst charge; `None` without coarser cells."""
+    if coarser is None:
+        return None
     *_, (name, layout) = layouts.items()
     number = found[name].worst_number
     threat = Threat(found[name].barriers[number].charge, 0)
     bare = next(iter(found))
-    error = GridError(
+    return GridError(
         case=Case(scenario, (threat,)),
         layout=layout,
         threat=threat,
@@ -311,14 +315,21 @@ def _print_cells(
         fine=(found[name].loads[number], found[bare].loads[number]),
         coarse=(coarse[name].loads[0], coarse[bare].loads[0]),
     )
+
+
+def _print_cells(
+    found: dict[str, Consequences], coarse: dict[str, Consequences], error: GridError
+) -> None:
+    """Print the impulse under the worst charge with its error, and levels that cells change."""
+    *_, (name, judged) = found.items()
     print_line(impulse_text(error))
     print_line(error.words)
-    for building in found[name].buildings:
-        fine = found[name].of(building)[number].facade.level_of_protection
+    for building in judged.buildings:
+        fine = judged.of(building)[judged.worst_number].facade.level_of_protection
         other = coarse[name].level(building)
         if other != fine:
             print_line(
-                f"note: {building} reaches level {other.label!r} with {coarser.words}, and "
+                f"note: {building} reaches level {other.label!r} with {error.coarser.words}, and "
                 f"{fine.label!r} with the finer cells, under the worst charge"
             )
 

@@ -14,6 +14,7 @@ from blast_env.cli.output import message_console, printable
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.cases import draw_threats, one_of_each_charge
 from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
@@ -66,6 +67,10 @@ GivenCharge = tuple[float, float] | tuple[float, float, float]
 """Place of a charge, m, with its mass, kg TNT, unless the scenario's is meant."""
 
 TARGET_HELP: Final = "Required level of protection; else the scenario's, else {}."
+MASS_ERROR_HELP: Final = (
+    "Half the width of the 95 % interval of the charges' masses, as a share, for the probability "
+    "of the level."
+)
 CVAR_HELP: Final = "Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
 
 
@@ -138,6 +143,16 @@ class ChargeOptions(Command):
         if not isinstance(charge, VehicleCharge):
             scenario.with_charge(charge)  # refuses a place that is not clear
         return charge
+
+    def fixed_charges(self, scenario: Scenario, draws: int) -> list[AnyCharge]:
+        """Return the drawn charges, each place once, with the place and mass that the user gives.
+
+        Args:
+            scenario: The scenario.
+            draws: Number of draws.
+        """
+        threats = one_of_each_charge(draw_threats(scenario, range(draws)))
+        return list(dict.fromkeys(self.fixed(scenario, threat.charge) for threat in threats))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,6 +34,7 @@ from blast_env.evaluation.engines.gas_tables import means_by_wall
 from blast_env.evaluation.engines.oblique_walls import STEPPED, stepped_buildings
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
+from blast_env.evaluation.places import BayPlaces, bay_places
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element, Layout
 from blast_env.layout.build_scene import charge_against
@@ -48,7 +49,7 @@ from blast_env.response.facade import FacadeResponse, peak_factor, respond, shar
 from blast_env.response.sdof import impulses
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.facade import with_glass
-from blast_env.site.scene import WALLS, Charge
+from blast_env.site.scene import WALLS, BlastSite, Charge
 from blast_env.site.sections import buildings_of
 from blast_env.tables import Column, table_of
 
@@ -76,6 +77,7 @@ class BuildingResponse:
         peak_factor: Factor on its peaks that corrects their clipping by cells.
         known: Whether the loads on its bays are known, by bay; empty if not recorded.
         stepped: Whether it has an oblique wall, modelled as a staircase of modules.
+        site: The site with the charge and the barrier; `None` for loads without one.
     """
 
     building: str
@@ -84,6 +86,13 @@ class BuildingResponse:
     peak_factor: float = 1.0
     known: Mapping[str, bool] = field(default_factory=dict)
     stepped: bool = False
+    site: BlastSite | None = None
+
+    @cached_property
+    def places(self) -> BayPlaces:
+        """The distances of its bays from the charge, and whether it sees them."""
+        assert self.site is not None, "the response was made without a site"
+        return bay_places(self.site, [each.bay for each in self.on_cells.bays])
 
     @cached_property
     def facade(self) -> FacadeResponse:
@@ -437,7 +446,7 @@ def consequences_of(
     if result.bay_loads is not None and result.bay_loads.bays:
         factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)
         known = result.bay_loads.known(result.run)
-        responses = by_building(scenario, result.bay_loads.response, charge, factor, known)
+        responses = by_building(scenario, result.bay_loads.response, result.run.site, factor, known)
     return Consequences(
         tuple(responses),
         tuple(neighbours_of(scenario, result, charge)),
@@ -504,7 +513,7 @@ def _blast(
 def by_building(
     scenario: Scenario,
     facade: FacadeResponse,
-    charge: Charge,
+    site: BlastSite,
     peak_factor: float = 1.0,
     known: Mapping[str, bool] = MappingProxyType({}),
 ) -> list[BuildingResponse]:
@@ -513,7 +522,7 @@ def by_building(
     Args:
         scenario: Groups the structures into buildings.
         facade: The response of all bays of the site.
-        charge: The charge at its place.
+        site: The site with the charge at its place and the barrier.
         peak_factor: Factor on peaks that corrects their clipping by cells.
         known: Whether the loads on the bays are known, by bay; empty if not recorded.
     """
@@ -528,7 +537,9 @@ def by_building(
         )
         inside = {each.bay.name: known[each.bay.name] for each in part.bays if known}
         is_stepped = building in stepped
-        found.append(BuildingResponse(building, charge, part, peak_factor, inside, is_stepped))
+        found.append(
+            BuildingResponse(building, site.charge, part, peak_factor, inside, is_stepped, site)
+        )
     return found
 
 

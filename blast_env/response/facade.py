@@ -18,7 +18,13 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, WallLine
 from blast_env.response.buildings import LevelOfProtection, level_of_protection
 from blast_env.response.components import Glazing, Wall
-from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane, glazing_responses
+from blast_env.response.glass import (
+    GlazingCondition,
+    GlazingResponses,
+    Pane,
+    drawn_conditions,
+    glazing_responses,
+)
 from blast_env.response.walls import DamageLevel, Panel, PanelResponses, panel_responses
 
 STOREY_M = 3.5
@@ -352,14 +358,36 @@ def sharpened(
     Returns:
         Times (finer than before), and histories (bays, times).
     """
+    factors = np.full(len(pressure_pa), factor)
+    return rescaled(time_s, pressure_pa, factors, 1.0 / factors)
+
+
+def rescaled(
+    time_s: FloatArray, pressure_pa: FloatArray, peaks: FloatArray, durations: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return histories with other peaks and durations.
+
+    Each history is stretched in time about its first rise to half of its peak.
+
+    Args:
+        time_s: Times of the histories, ascending (times,).
+        pressure_pa: The histories (bays, times).
+        peaks: Factors on the pressures (bays,).
+        durations: Factors on the times from that rise (bays,).
+
+    Returns:
+        Times (finer than before), and histories (bays, times).
+    """
     steps = np.arange(_FINER * (len(time_s) - 1) + 1) / _FINER
     times_s = np.interp(steps, np.arange(len(time_s)), time_s)
-    sharper = np.zeros((len(pressure_pa), len(times_s)))
+    if (longest := float(durations.max(initial=1.0))) > 1.0:
+        times_s = time_s[0] + longest * (times_s - time_s[0])
+    found = np.zeros((len(pressure_pa), len(times_s)))
     for index, history in enumerate(pressure_pa):
         arrival_s = time_s[np.argmax(history >= 0.5 * history.max())]
-        before_s = arrival_s + factor * (times_s - arrival_s)
-        sharper[index] = factor * np.interp(before_s, time_s, history, left=0.0, right=0.0)
-    return times_s, sharper
+        before_s = arrival_s + (times_s - arrival_s) / durations[index]
+        found[index] = peaks[index] * np.interp(before_s, time_s, history, left=0.0, right=0.0)
+    return times_s, found
 
 
 def respond(
@@ -401,6 +429,51 @@ def respond(
             panel_responses(panels, time_s, pushed_pa[walled])
         ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class LoadDraws:
+    """Draws of the load on a bay and of the strength of its components.
+
+    Attributes:
+        peaks: Factors on the pressures (draws,).
+        durations: Factors on the times (draws,).
+        weaker: Share of panes that are weaker than the pane, above 0 and below 1 (draws,).
+        resistance: Factors on the resistance of wall panels (draws,).
+    """
+
+    peaks: FloatArray
+    durations: FloatArray
+    weaker: FloatArray
+    resistance: FloatArray
+
+
+def drawn_levels(
+    filled: FilledBay,
+    is_window: bool,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    draws: LoadDraws,
+) -> FloatArray:
+    """Return the level of protection by a component of a bay in each draw (draws,).
+
+    Args:
+        filled: The bay.
+        is_window: Whether its windows count, or else its wall panel.
+        time_s: Times of its history, ascending (times,).
+        pressure_pa: Its history, inwards positive (times,).
+        draws: The draws.
+    """
+    history, loads = (time_s, pressure_pa), (draws.peaks, draws.durations)
+    if is_window:
+        assert filled.glazing is not None
+        condition = drawn_conditions(_pane(filled.glazing), *history, (*loads, draws.weaker))
+        levels = np.array([0, *map(level_by_glass, GlazingCondition)])
+        return np.asarray(levels[condition.astype(np.int64)])
+    assert filled.wall is not None
+    panel = _panel(filled.wall, filled.bay.height_m)
+    damage = panel.drawn_damage(*history, (*loads, draws.resistance))
+    return np.asarray(4 - np.minimum(damage, 4.0).astype(np.int64))
 
 
 def _panes(bays: Sequence[FilledBay]) -> list[Pane]:

@@ -373,36 +373,13 @@ def glazing_responses(
         raise BlastEnvError(
             f"pressure_pa has shape {pressure_pa.shape}, must be ({len(panes)}, {len(time_s)})"
         )
-    from blast_env.response.kernels import bend
-
     rows, impulse_pa_s = np.zeros((len(panes), 6)), impulses(time_s, pressure_pa)
-    span_s = float(time_s[-1] - time_s[0])
     for index, pane in enumerate(panes):
-        curve, system = pane.curve, pane.system
-        step_s = system.period_s / (_STIFFENING * STEPS_PER_PERIOD)
-        bend(
-            system.load_mass_factor * system.mass_kg_m2,
-            *curve.bending,
-            *curve.wear,
-            _RISK_OF_DAMAGE,
-            time_s,
-            pressure_pa[index],
-            impulse_pa_s[index],
-            step_s,
-            ceil((span_s + system.period_s) / step_s),
-            rows[index],
-        )
-    peak_m, probability, break_s, break_m, break_m_s, left_pa_s = rows.T
-    klm, mass, middle_m, stiffness, tear_m = np.reshape(
-        [each.thrown_by for each in panes], (len(panes), 5)
-    ).T
-    # The net impulse so far is K_LM m v: fragments fly on with it and the remaining impulse.
-    thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
-    stretched = _stretched_share(thrown_m_s, break_m, mass, stiffness, tear_m)
+        _bend(pane, time_s, pressure_pa[index], impulse_pa_s[index], 0.0, rows[index])
+    peak_m, probability, break_s, *_ = rows.T
+    thrown_by = np.reshape([each.thrown_by for each in panes], (len(panes), 5))
+    stretched, speed, flight, hit = _thrown(rows, thrown_by)
     retained = stretched <= 1.0
-    speed = np.where(retained, 0.0, thrown_m_s)
-    flight = speed * np.sqrt(2.0 * middle_m / _GRAVITY_M_S2)
-    hit = _hit_height_m(middle_m, speed)
     condition = np.where(
         probability <= limit_probability,
         GlazingCondition.NO_BREAK,
@@ -429,6 +406,77 @@ def glazing_responses(
         condition.astype(np.float64),
         hazard,
     )
+
+
+def drawn_conditions(
+    pane: Pane,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    draws: tuple[FloatArray, FloatArray, FloatArray],
+) -> FloatArray:
+    """Return the `GlazingCondition` of a pane in draws of its load and strength (draws,).
+
+    Args:
+        pane: The pane.
+        time_s: Times of its history, ascending (times,).
+        pressure_pa: Its history, inwards positive (times,).
+        draws: Factors on pressures, factors on times, and the share of panes that are weaker, above
+            0 and below 1 (draws,).
+    """
+    rows, impulse_pa_s = np.zeros((len(draws[0]), 6)), impulses(time_s, pressure_pa)
+    for row, (peak, duration, weaker) in zip(rows, np.transpose(draws).tolist(), strict=True):
+        loads = duration * time_s, peak * pressure_pa, peak * duration * impulse_pa_s
+        _bend(pane, *loads, -np.log1p(-weaker), row)
+    stretched, _, flight, hit = _thrown(rows, np.tile(pane.thrown_by, (len(rows), 1)))
+    broken = np.where(stretched <= 1.0, GlazingCondition.RETAINED, flight_condition(flight, hit))
+    return np.where(draws[2] >= rows[:, 1], GlazingCondition.NO_BREAK, broken)
+
+
+def _bend(
+    pane: Pane,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    impulse_pa_s: FloatArray,
+    strength: float,
+    row: FloatArray,
+) -> None:
+    """Write the bending of a pane to a row; see `blast_env.response.kernels.bend`."""
+    from blast_env.response.kernels import bend
+
+    curve, system = pane.curve, pane.system
+    step_s = system.period_s / (_STIFFENING * STEPS_PER_PERIOD)
+    bend(
+        system.load_mass_factor * system.mass_kg_m2,
+        *curve.bending,
+        *curve.wear,
+        _RISK_OF_DAMAGE,
+        time_s,
+        pressure_pa,
+        impulse_pa_s,
+        step_s,
+        ceil((float(time_s[-1] - time_s[0]) + system.period_s) / step_s),
+        strength,
+        row,
+    )
+
+
+def _thrown(
+    rows: FloatArray, thrown_by: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the stretched share, and speed, flight and height of impact of fragments (panes,).
+
+    Args:
+        rows: The bending, as `blast_env.response.kernels.bend` writes it (panes, 6).
+        thrown_by: `Pane.thrown_by` of each (panes, 5).
+    """
+    _, _, _, break_m, break_m_s, left_pa_s = rows.T
+    klm, mass, middle_m, stiffness, tear_m = thrown_by.T
+    # The net impulse so far is K_LM m v: fragments fly on with it and the remaining impulse.
+    thrown_m_s = np.maximum(klm * break_m_s + left_pa_s / mass, 0.0)
+    stretched = _stretched_share(thrown_m_s, break_m, mass, stiffness, tear_m)
+    speed = np.where(stretched <= 1.0, 0.0, thrown_m_s)
+    flight = speed * np.sqrt(2.0 * middle_m / _GRAVITY_M_S2)
+    return stretched, speed, flight, _hit_height_m(middle_m, speed)
 
 
 def flight_condition(flight_m: FloatArray, hit_height_m: FloatArray) -> FloatArray:

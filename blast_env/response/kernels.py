@@ -130,13 +130,15 @@ def bend(
     impulse_pa_s: FloatArray,
     step_s: float,
     steps: int,
+    strength: float,
     out: FloatArray,
 ) -> None:
-    """Integrate the bending of an unbroken pane, and find the median breakage.
+    """Integrate the bending of an unbroken pane, and find its breakage.
 
     Writes to `out` the largest deflection and the share of panes that break, then the time, the
-    deflection, the speed and the remaining positive impulse at the median breakage. Slopes are
-    those of the segments before the points; the damage to the power `exponent` is the risk B.
+    deflection, the speed and the remaining positive impulse at breakage. Slopes are those of the
+    segments before the points; the damage to the power `exponent` is the risk B. The pane breaks at
+    the risk `strength`; if that is 0, as the median of the panes that break.
     """
     x, damage, peak = 0.0, 0.0, 0.0
     pushed, place = impulse_until(time_s, pressure_pa, impulse_pa_s, 0, time_s[0] + 0.5 * step_s)
@@ -161,8 +163,8 @@ def bend(
             damage += per_step * np.exp(rate)
         track[0, step], track[1, step], track[2, step] = damage, x, v
     share = -np.expm1(-(damage**exponent))
-    median = (-np.log1p(-0.5 * share)) ** (1.0 / exponent)
-    broken = min(np.searchsorted(track[0], median), steps - 1)
+    risk = strength if strength > 0.0 else -np.log1p(-0.5 * share)
+    broken = min(np.searchsorted(track[0], risk ** (1.0 / exponent)), steps - 1)
     break_s = time_s[0] + (broken + 1) * step_s
     left = 0.0
     if break_s < time_s[-1]:

@@ -16,6 +16,7 @@ history, and each step has its exact impulse, however short the load.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -165,30 +166,69 @@ def responses(
         )
     if len(time_s) < 2 or not (np.diff(time_s) > 0.0).all():
         raise BlastEnvError("time_s must ascend, and have at least two times")
-    from blast_env.response.kernels import integrate
-
     rows, impulse_pa_s = np.zeros((len(systems), 6)), impulses(time_s, pressure_pa)
     for index, system in enumerate(systems):
-        resistance = system.resistance
-        step_s = system.shortest_period_s / steps_per_period
-        lasts_s = float(time_s[-1] - time_s[0]) + _PERIODS_AFTER_LOAD * system.period_s
-        integrate(
-            system.load_mass_factor * system.mass_kg_m2,
-            resistance.deflection_m,
-            resistance.pressure_pa,
-            resistance.cap_pa,
-            resistance.rebound_cap_pa,
-            resistance.crack_m,
-            resistance.cracked_deflection_m,
-            resistance.cracked_pressure_pa,
-            time_s,
-            pressure_pa[index],
-            impulse_pa_s[index],
-            step_s,
-            int(np.ceil(lasts_s / step_s)),
-            rows[index],
-        )
+        history = time_s, pressure_pa[index], impulse_pa_s[index]
+        _integrate(system, history, 1.0, steps_per_period, rows[index])
     return Responses(*rows.T)
+
+
+def drawn_responses(
+    system: System,
+    time_s: FloatArray,
+    pressure_pa: FloatArray,
+    draws: tuple[FloatArray, FloatArray, FloatArray],
+) -> Responses:
+    """Return the response of a system in draws of its load and strength.
+
+    Args:
+        system: The system.
+        time_s: Times of its history, ascending (times,).
+        pressure_pa: Its history, inwards positive (times,).
+        draws: Factors on pressures, on times, and on the resistance (draws,).
+    """
+    rows, impulse_pa_s = np.zeros((len(draws[0]), 6)), impulses(time_s, pressure_pa)
+    for row, (peak, duration, strength) in zip(rows, np.transpose(draws).tolist(), strict=True):
+        history = duration * time_s, peak * pressure_pa, peak * duration * impulse_pa_s
+        _integrate(system, history, strength, STEPS_PER_PERIOD, row)
+    return Responses(*rows.T)
+
+
+def _integrate(
+    system: System,
+    history: tuple[FloatArray, FloatArray, FloatArray],
+    strength: float,
+    steps_per_period: int,
+    row: FloatArray,
+) -> None:
+    """Write the motion of a system to a row; see `blast_env.response.kernels.integrate`.
+
+    Args:
+        system: The system.
+        history: Times, pressures and impulses until them (times,).
+        strength: Factor on its resistance.
+        steps_per_period: Least number of steps in its shortest period.
+        row: Receives the fields of `Responses`.
+    """
+    from blast_env.response.kernels import integrate
+
+    resistance, time_s = system.resistance, history[0]
+    step_s = system.shortest_period_s / (steps_per_period * sqrt(strength))
+    lasts_s = float(time_s[-1] - time_s[0]) + _PERIODS_AFTER_LOAD * system.period_s / sqrt(strength)
+    integrate(
+        system.load_mass_factor * system.mass_kg_m2,
+        resistance.deflection_m,
+        strength * resistance.pressure_pa,
+        strength * resistance.cap_pa,
+        strength * resistance.rebound_cap_pa,
+        resistance.crack_m,
+        resistance.cracked_deflection_m,
+        strength * resistance.cracked_pressure_pa,
+        *history,
+        step_s,
+        int(np.ceil(lasts_s / step_s)),
+        row,
+    )
 
 
 def impulses(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:

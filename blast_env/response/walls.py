@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from blast_env.arrays import FloatArray
-from blast_env.response.sdof import Resistance, Responses, System, responses
+from blast_env.response.sdof import Resistance, Responses, System, drawn_responses, responses
 
 _GRAVITY_M_S2: Final = 9.81
 
@@ -309,6 +309,18 @@ class Panel:
             cracked_deflection_m=np.array([0.0, first_m, thickness, 100.0 * self.span_m]),
             cracked_pressure_pa=np.array([0.0, 0.99 * weight, 0.0, 0.0]),
         )
+
+    def drawn_damage(
+        self,
+        time_s: FloatArray,
+        pressure_pa: FloatArray,
+        draws: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> FloatArray:
+        """Return the damage in draws, see `drawn_responses` and `Limits.measure` (draws,)."""
+        motion = drawn_responses(self.system, time_s, pressure_pa, draws)
+        most = np.maximum(motion.peak_m, -motion.rebound_m)
+        ductility = most / self.system.resistance.yield_m
+        return self.section.limits.measure(ductility, self.rotation_deg(most))
 
     def rotation_deg(self, deflection_m: FloatArray) -> FloatArray:
         """Return the support rotation at a deflection, degrees."""

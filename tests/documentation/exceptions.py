@@ -157,6 +157,8 @@ SMALLER: Final[dict[str, str]] = {
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites": "clinic_front",
+    "python -m studies.sure draws": "guard_post",
+    "python -m studies.sure scaling": "guard_post",
     "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
     "python -m studies.gas corners": "--sizes 0.5",
     "python -m studies.gas judge --random-layouts 18 --charges 2": (

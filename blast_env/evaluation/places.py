@@ -1,0 +1,53 @@
+"""Places of bays relative to a charge: their distance, and whether it sees them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from blast_env.arrays import BoolArray, FloatArray
+from blast_env.response.facade import Bay
+from blast_env.site.scene import OUTWARDS, BlastSite, StructureOutline
+from blast_env.site.sight import in_sight
+from blast_env.units import MODULE_SIDE_M
+
+
+class BayPlaces(NamedTuple):
+    """The places of bays relative to a charge.
+
+    Attributes:
+        distance_m: Distance of the middle of each bay from the charge (bays,).
+        seen: Whether the middle of each bay is in sight of the charge (bays,).
+    """
+
+    distance_m: FloatArray
+    seen: BoolArray
+
+
+def bay_places(site: BlastSite, bays: Sequence[Bay]) -> BayPlaces:
+    """Return the places of bays relative to the charge of a site.
+
+    Args:
+        site: The site with its charge, structures and barrier.
+        bays: The bays.
+    """
+    outlines = {each.name: each for each in site.structures}
+    points = np.array([_middle_m(outlines[each.structure], each) for each in bays]).reshape(-1, 3)
+    outward = np.array([(*_outward(each), 0.0) for each in bays]).reshape(-1, 3)
+    charge_m = np.array([*site.charge.position_m, site.charge.height_m])
+    distance_m = np.linalg.norm(points - charge_m, axis=1)
+    return BayPlaces(distance_m, in_sight(site, points + MODULE_SIDE_M * outward, outward))
+
+
+def _middle_m(outline: StructureOutline, bay: Bay) -> tuple[float, float, float]:
+    along_m, height_m = 0.5 * (bay.left_m + bay.right_m), 0.5 * (bay.floor_m + bay.top_m)
+    if bay.line is not None:
+        return (*bay.line.point_at(along_m), height_m)
+    left, bottom, right, top = outline.rectangle_m
+    if bay.wall in ("west", "east"):
+        return left if bay.wall == "west" else right, along_m, height_m
+    return along_m, bottom if bay.wall == "south" else top, height_m
+
+
+def _outward(bay: Bay) -> tuple[float, float]:
+    return OUTWARDS[bay.wall] if bay.line is None else bay.line.normal

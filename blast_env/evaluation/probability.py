@@ -1,0 +1,264 @@
+"""The probability of a level of protection, and the part of each uncertain quantity in it.
+
+Five quantities are uncertain, and drawn once for all charges and bays:
+
+- the mass of each charge: normal, with bounds that the user gives as an interval of 95 %;
+- the load: log-normal, with the scatter from test to test and the error of the engine;
+- the cells: log-normal, with the grid convergence index as an interval of 95 %;
+- the strength of a pane: the share of panes that are weaker is uniform, so that its breakage is
+  that of `blast_env.response.glass`;
+- the resistance of wall panels: log-normal.
+
+No blast is run: histories are scaled. Pressures and times follow Kingery and Bulmash's reflected
+peak and impulse for the other mass at the distance of the bay (Hopkinson-Cranz scaling). Errors of
+the load multiply the pressures, so that the impulse scatters as much as the peak.
+
+Only the bays that can decide are drawn: of each component those with the largest damage, peak and
+impulse. The response that counts is the worst of those with and without suction and with and
+without sharper peaks, as in a verdict; which of them is found without draws.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import isnan, log, nan, sqrt
+from typing import Final
+
+import numpy as np
+
+from blast_env.arrays import FloatArray
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.consequences import BuildingResponse, Consequences
+from blast_env.evaluation.grid_error import GridError
+from blast_env.evaluation.scaling import MASS_RANGE, load_factors
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.components import Glazing, Wall
+from blast_env.response.facade import LoadDraws, drawn_levels, respond
+from blast_env.response.sdof import impulses
+from blast_env.values import generator
+
+DRAWS: Final = 1000
+"""Default number of draws."""
+
+_DRIVERS: Final = ("charge", "load model", "cells", "glass", "panels")
+_OF_INTERVAL: Final = 1.959964
+_BINS: Final = 20
+
+DECIDING: Final = 3
+"""Default number of bays of each component that are drawn, by damage, by peak and by impulse."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """The uncertain quantities. Shares are standard deviations of logarithms, unless stated.
+
+    Attributes:
+        mass: Half the width of the 95 % interval of the masses of charges, as a share.
+        scatter: Scatter of loads from test to test. Yang & Luo 2020 (J. Civil Environ. Eng. 42(2),
+            115) find 0.13 to 0.20 for peaks at 1.5 to 6 m/kg^(1/3), the most for reflected ones.
+        in_sight: Error of the engine on bays in sight of the charge: reflected impulses are within
+            0.06 of Kingery and Bulmash's (docs/engineers/gas.md).
+        in_shade: Its error on other bays: the spread of the experiments behind corners, 0.10 of
+            0.57, among which its means are.
+        cells: Half the width of the 95 % interval of the error of the cells, as a share.
+        panels: Scatter of the resistance of wall panels; an assumption of this project.
+    """
+
+    mass: float = 0.1
+    scatter: float = 0.2
+    in_sight: float = 0.06
+    in_shade: float = 0.18
+    cells: float = 0.0
+    panels: float = 0.15
+
+    @classmethod
+    def of(cls, mass: float, error: GridError | None) -> "Uncertainty":
+        """Return the uncertain quantities with those that a study gives.
+
+        Args:
+            mass: As the attribute.
+            error: The error of the cells, if known; its share of the impulse counts.
+        """
+        share = nan if error is None else error.of_load(lambda loads: loads.protected_impulse_pa_s)
+        return cls(mass=mass, cells=0.0 if isnan(share) else share)
+
+    def __post_init__(self) -> None:
+        """Check the shares.
+
+        Raises:
+            BlastEnvError: If one is negative, or that of the mass is above 0.3.
+        """
+        for name, value in vars(self).items():
+            if not 0.0 <= value < np.inf:
+                raise BlastEnvError(f"{name} is {value}, must be at least 0")
+        if self.mass > MASS_RANGE - 1.0 + 1e-9:
+            raise BlastEnvError(f"mass is {self.mass}, must be at most 0.3: histories are scaled")
+
+
+@dataclass(frozen=True, eq=False)
+class LevelProbability:
+    """Levels of protection of buildings in draws of the uncertain quantities.
+
+    Attributes:
+        levels: The lowest level of any building under any charge in each draw (draws,).
+        quantiles: The quantile of each uncertain quantity, above 0 and below 1 (draws, 5).
+    """
+
+    levels: FloatArray
+    quantiles: FloatArray
+
+    def of(self, level: LevelOfProtection) -> float:
+        """Return the probability that all buildings reach a level under every charge."""
+        return float((self.levels >= level).mean())
+
+    def drivers(self, level: LevelOfProtection) -> dict[str, float]:
+        """Return the first-order index of each uncertain quantity, the largest first.
+
+        It is the share of the variance of "the level is reached" that the quantity explains alone,
+        from the means of 20 classes of it, less what chance leaves in them. Empty if the level is
+        always reached, or never.
+        """
+        reached = (self.levels >= level).astype(np.float64)
+        total = float(reached.var())
+        if total == 0.0:
+            return {}
+        found: dict[str, float] = {}
+        for name, quantile in zip(_DRIVERS, self.quantiles.T, strict=True):
+            classes = np.array_split(reached[np.argsort(quantile)], _BINS)
+            between = np.var([each.mean() for each in classes])
+            chance = np.mean([each.var() / max(len(each) - 1, 1) for each in classes])
+            found[name] = max(float(between - chance), 0.0) / total
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    def words(self, level: LevelOfProtection) -> str:
+        """Return the probability and what drives it: `medium with 0.84; driven by ...`."""
+        text = f"{level.label!r} with {probability_text(self.of(level), len(self.levels))}"
+        main = [f"{name} ({share:.1f})" for name, share in self.drivers(level).items()]
+        main = [each for each in main if not each.endswith("(0.0)")][:2]
+        return f"{text}; driven by {' and '.join(main)}" if main else text
+
+
+def probability_text(value: float, draws: int) -> str:
+    """Return a probability as text; at an end, its bound of 95 % confidence.
+
+    Args:
+        value: Share of the draws.
+        draws: Their number; of none, the bound is three of that number.
+    """
+    bound = 3.0 / draws
+    if value >= 1.0:
+        return f"more than {1.0 - bound:.3f}"
+    return f"{value:.2f}" if value > 0.0 else f"less than {bound:.3f}"
+
+
+def level_probability(
+    judged: Consequences,
+    uncertainty: Uncertainty,
+    draws: int = DRAWS,
+    seed: int = 0,
+    deciding: int = DECIDING,
+) -> LevelProbability:
+    """Return the levels of protection in draws of the uncertain quantities.
+
+    Args:
+        judged: The consequences of the charges.
+        uncertainty: The uncertain quantities.
+        draws: Number of draws.
+        seed: Seed of the draws.
+        deciding: Number of bays of each component by damage, by peak and by impulse.
+
+    Raises:
+        BlastEnvError: If there are no buildings with a facade.
+    """
+    if not judged.responses:
+        raise BlastEnvError("no building has a facade: there is no level of protection")
+    quantiles = _latin(draws, seed)
+    levels = np.full(draws, int(LevelOfProtection.HIGH))
+    for each in _deciding(judged.responses, deciding):
+        levels = np.minimum(levels, each.levels(uncertainty, quantiles))
+    return LevelProbability(levels, quantiles)
+
+
+def _latin(draws: int, seed: int) -> FloatArray:
+    """Return a Latin hypercube of quantiles (draws, 5)."""
+    rng = generator(seed)
+    order = np.argsort(rng.random((draws, len(_DRIVERS))), axis=0)
+    return (order + rng.uniform(1e-6, 1.0 - 1e-6, order.shape)) / draws
+
+
+@dataclass(frozen=True, eq=False)
+class _Component:
+    """A component of a bay under a charge, with the history that decides."""
+
+    response: BuildingResponse
+    index: int
+    is_window: bool
+    damage: float
+    peak_pa: float
+    impulse_pa_s: float
+
+    @property
+    def kind(self) -> tuple[str, Glazing | Wall | None]:
+        filled = self.response.on_cells.bays[self.index]
+        return self.response.building, filled.glazing if self.is_window else filled.wall
+
+    def levels(self, uncertainty: Uncertainty, quantiles: FloatArray) -> FloatArray:
+        """Return the level of protection by the component in each draw (draws,)."""
+        from scipy.special import ndtri  # a quarter of a second to import
+
+        normal = np.clip(ndtri(quantiles), -4.0, 4.0)
+        mass = 1.0 + uncertainty.mass / _OF_INTERVAL * normal[:, 0]
+        mass = np.clip(mass, 1.0 / MASS_RANGE, MASS_RANGE)
+        places = self.response.places
+        engine = uncertainty.in_sight if places.seen[self.index] else uncertainty.in_shade
+        error = np.exp(sqrt(log(1.0 + uncertainty.scatter**2) + engine**2) * normal[:, 1])
+        error *= np.exp(uncertainty.cells / _OF_INTERVAL * normal[:, 2])
+        charge, away_m = self.response.charge, places.distance_m[self.index]
+        peaks, durations = load_factors(charge, away_m, mass * charge.tnt_kg, away_m)
+        draws = LoadDraws(
+            error * peaks,
+            durations,
+            quantiles[:, 3],
+            np.exp(uncertainty.panels * normal[:, 4]),
+        )
+        facade = self.response.on_cells
+        pressure_pa, factor = self._deciding_history
+        sharper = replace(draws, peaks=factor * draws.peaks, durations=draws.durations / factor)
+        filled = facade.bays[self.index]
+        return drawn_levels(filled, self.is_window, facade.time_s, pressure_pa, sharper)
+
+    @cached_property
+    def _deciding_history(self) -> tuple[FloatArray, float]:
+        """The history with or without suction, and the factor on peaks, of the worst response."""
+        facade, factor = self.response.on_cells, self.response.peak_factor
+        filled, own_pa = facade.bays[self.index], facade.pressure_pa[self.index]
+        filled = replace(filled, wall=None) if self.is_window else replace(filled, glazing=None)
+        found = []
+        for pressure_pa in (np.maximum(own_pa, 0.0), own_pa):
+            for each in {max(factor, 1.0), 1.0}:
+                times_s = facade.time_s / each
+                done = respond([filled], times_s, each * pressure_pa[np.newaxis])
+                found.append((done.worst_number, pressure_pa, each))
+        _, pressure_pa, each = max(found, key=lambda item: item[0])
+        return pressure_pa, each
+
+
+def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Component]:
+    """Yield the components that can decide: of each kind, those with the largest numbers."""
+    kinds: dict[object, list[_Component]] = {}
+    for response in responses:
+        facade = response.facade
+        peaks_pa = facade.pressure_pa.max(axis=1)
+        impulses_pa_s = impulses(facade.time_s, facade.pressure_pa).max(axis=1)
+        parts = ((facade.glazed, facade.glazing.hazard), (facade.walled, facade.walls.damage))
+        for is_window, (rows, damage) in zip((True, False), parts, strict=True):
+            for index, number in zip(rows.astype(int).tolist(), damage.tolist(), strict=True):
+                loads = float(peaks_pa[index]), float(impulses_pa_s[index])
+                each = _Component(response, index, is_window, number, *loads)
+                kinds.setdefault(each.kind, []).append(each)
+    for own in kinds.values():
+        kept: dict[int, _Component] = {}
+        for name in ("damage", "peak_pa", "impulse_pa_s"):
+            for each in sorted(own, key=lambda one: -float(getattr(one, name)))[:count]:
+                kept[id(each)] = each
+        yield from kept.values()

@@ -1,0 +1,33 @@
+"""`blast-env capacity`: a row for each layout and place."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import blast_env
+from blast_env.cli import app
+from blast_env.evaluation import capacity
+from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation.scaling import scaled_to
+from tests.gas_sites import WALL, glazed_hut
+
+
+def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the hut; all blasts but the first are scaled from it."""
+    site = tmp_path / "glazed.toml"
+    blast_env.save_scenario(glazed_hut(), site)
+    layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
+    first: list[Consequences] = []
+
+    def scaled(scenario, layout, charges, engine):  # type: ignore[no-untyped-def]
+        first[1:] = first[:1] or [consequences(scenario, layout, charges, engine)]
+        return scaled_to(first[-1], charges[0])
+
+    monkeypatch.setattr(capacity, "consequences", scaled)
+    options = ("--tnt-kg", "0.1", "--cell", "0.5", "--layout", layout)
+    done = CliRunner().invoke(app, ["capacity", *map(str, (site, *options))])
+    assert done.exit_code == 0, done.output
+    rows = [line.split() for line in done.output.splitlines() if "2.0, 4.0" in line]
+    assert len(rows) == 4
+    assert "largest charge (kg TNT) that keeps each level of protection" in done.output

@@ -1,0 +1,79 @@
+"""The largest charge and the least stand-off that keep a level, with scaled histories as blasts."""
+
+from typing import Any
+
+import pytest
+
+from blast_env.evaluation import capacity
+from blast_env.evaluation.capacity import Edge, Ladder
+from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.probability import Uncertainty
+from blast_env.evaluation.scaling import scaled_to
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.site.scene import Charge
+from tests.gas_sites import glazed_hut
+
+CHARGE = Charge((2.0, 4.0), 0.1)
+
+
+@pytest.fixture(scope="module")
+def blast() -> Consequences:
+    return consequences(glazed_hut(), (), [CHARGE], GasEngine())
+
+
+@pytest.fixture
+def ladder(blast: Consequences, monkeypatch: pytest.MonkeyPatch) -> Ladder:
+    def scaled(scenario: Any, _layout: object, charges: list[Charge], _: object) -> Consequences:
+        scenario.with_charge(charges[0])
+        return scaled_to(blast, charges[0])
+
+    monkeypatch.setattr(capacity, "consequences", scaled)
+    return Ladder(glazed_hut(), (), CHARGE, GasEngine())
+
+
+@pytest.mark.parametrize(
+    ("level", "nearer"), [(LevelOfProtection.MEDIUM, False), (LevelOfProtection.LOW, True)]
+)
+def test_a_level_is_kept_up_to_the_edge(
+    ladder: Ladder, blast: Consequences, level: LevelOfProtection, nearer: bool
+) -> None:
+    edge = ladder.edge(level, nearer)
+    assert edge.is_kept
+    assert not edge.is_end
+    for share, keeps in ((0.95, True), (1.05, False)):
+        charge = edge.charge._replace(tnt_kg=share * edge.charge.tnt_kg)
+        assert scaled_to(blast, charge).passes(level) is keeps
+    if nearer:
+        assert edge.charge.tnt_kg == CHARGE.tnt_kg
+        assert edge.stand_off_m == pytest.approx(6.0 - edge.charge.position_m[0])
+
+
+def test_the_stand_off_ends_at_the_border_of_the_site(ladder: Ladder) -> None:
+    edge = ladder.edge(LevelOfProtection.HIGH, nearer=True)
+    assert not edge.is_kept
+    assert edge.stand_off_text.startswith("> ")
+
+
+def test_a_lower_level_bears_more(ladder: Ladder) -> None:
+    edges = [ladder.edge(level) for level in list(LevelOfProtection)[1:]]
+    masses = [each.charge.tnt_kg for each in edges]
+    assert masses == sorted(masses, reverse=True)
+    before = ladder.blasts
+    ladder.edge(LevelOfProtection.MEDIUM)
+    assert ladder.blasts == before <= 11
+
+
+def test_the_end_of_the_ladder_is_a_bound() -> None:
+    assert Edge(CHARGE, 4.0, is_end=True).mass_text == ">= 0.1"
+    assert Edge(CHARGE, 4.0, is_kept=False, is_end=True).mass_text == "< 0.1"
+    assert Edge(CHARGE, 4.0, is_kept=False, is_end=True).stand_off_text == "> 4.0"
+    assert Edge(CHARGE, 4.0).stand_off_text == "4.0"
+
+
+def test_the_curve_falls_with_the_mass(ladder: Ladder) -> None:
+    level = LevelOfProtection.MEDIUM
+    ladder.edge(level)
+    masses, shares = zip(*ladder.curve(level, Uncertainty(), draws=20), strict=True)
+    assert list(masses) == sorted(masses)
+    assert shares[0] > 0.5 > shares[-1]

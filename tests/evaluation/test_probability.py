@@ -1,0 +1,120 @@
+"""The probability of a level, what drives it, and histories scaled to another mass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.probability import (
+    LevelProbability,
+    Uncertainty,
+    level_probability,
+    probability_text,
+)
+from blast_env.evaluation.scaling import scaled_to
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.sdof import impulses
+from blast_env.site.scene import Charge
+from tests.gas_sites import WALL, glazed_hut
+
+CHARGE = Charge((2.0, 4.0), 0.1)
+CERTAIN = Uncertainty(mass=0.0, scatter=0.0, in_sight=0.0, in_shade=0.0, panels=0.0)
+
+
+def judge(tnt_kg: float = CHARGE.tnt_kg) -> Consequences:
+    return consequences(glazed_hut(), WALL, [CHARGE._replace(tnt_kg=tnt_kg)], GasEngine())
+
+
+@pytest.fixture(scope="module")
+def found() -> Consequences:
+    return judge()
+
+
+def test_with_certain_loads_the_share_of_panes_that_break_decides(found: Consequences) -> None:
+    """The worst pane alone: one draw of the strength stands for all panes."""
+    glazing = found.responses[0].facade.glazing
+    likely = level_probability(found, CERTAIN)
+    breaks = float(glazing.break_probability.max())
+    assert 0.05 < breaks < 0.95
+    assert likely.of(LevelOfProtection.HIGH) == pytest.approx(1.0 - breaks, abs=2e-3)
+    assert next(iter(likely.drivers(LevelOfProtection.HIGH))) == "glass"
+
+
+def test_no_bay_that_is_left_out_decides(found: Consequences) -> None:
+    few, every = (level_probability(found, Uncertainty(), 100, deciding=k) for k in (3, 100))
+    np.testing.assert_array_equal(few.levels, every.levels)
+
+
+def test_more_charge_makes_a_level_less_likely(found: Consequences) -> None:
+    level = LevelOfProtection.HIGH
+    shares = [
+        level_probability(scaled_to(found, CHARGE._replace(tnt_kg=kg)), Uncertainty(), 200).of(
+            level
+        )
+        for kg in (0.31, 0.4, 0.52)
+    ]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] > shares[2]
+
+
+@pytest.mark.parametrize("share", [1.3, 1.0 / 1.3])
+def test_scaled_histories_are_those_of_a_blast_of_that_mass(
+    found: Consequences, share: float
+) -> None:
+    """On the bays with a tenth of the largest impulse or more; `studies.sure scaling` has sites."""
+    mass_kg = share * CHARGE.tnt_kg
+    blast, scaled = (
+        each.responses[0].on_cells
+        for each in (judge(mass_kg), scaled_to(found, CHARGE._replace(tnt_kg=mass_kg)))
+    )
+    of_blast, of_scaled = (
+        impulses(each.time_s, each.pressure_pa).max(axis=1) for each in (blast, scaled)
+    )
+    counts = of_blast > 0.1 * of_blast.max()
+    assert np.abs(of_scaled / of_blast - 1.0)[counts].max() < 0.1
+
+
+def test_an_index_is_the_share_of_the_variance_that_a_quantity_explains() -> None:
+    """A level that the charge decides alone, and one that nothing decides alone."""
+    quantiles = np.random.default_rng(1).random((4000, 5))
+    alone = np.where(quantiles[:, 0] < 0.7, 3, 2)
+    together = np.where((quantiles[:, 0] < 0.5) == (quantiles[:, 1] < 0.5), 3, 2)
+    level = LevelOfProtection.MEDIUM
+    of_alone, of_both = (LevelProbability(each, quantiles) for each in (alone, together))
+    assert of_alone.drivers(level)["charge"] > 0.9
+    assert max(of_both.drivers(level).values()) < 0.05
+    assert of_alone.words(level).startswith("'medium' with 0.7")
+    assert "driven by charge (1.0)" in of_alone.words(level)
+    assert of_alone.words(LevelOfProtection.HIGH) == "'high' with less than 0.001"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1.0, "more than 0.997"), (0.0, "less than 0.003"), (0.84, "0.84")]
+)
+def test_a_thousand_draws_prove_no_certainty(value: float, text: str) -> None:
+    assert probability_text(value, 1000) == text
+
+
+def test_a_mass_beyond_the_scaled_range_and_a_site_without_facades() -> None:
+    with pytest.raises(BlastEnvError, match=r"mass is 0\.4, must be at most 0\.3"):
+        Uncertainty(mass=0.4)
+    with pytest.raises(BlastEnvError, match="no building has a facade"):
+        level_probability(Consequences(()), Uncertainty())
+
+
+def test_in_the_shade_of_a_wall_loads_are_less_certain(found: Consequences) -> None:
+    places = found.responses[0].places
+    assert places.distance_m.min() == pytest.approx(4.0, abs=0.5)
+    assert not places.seen.any()
+    site = found.responses[0].site
+    assert site is not None
+    bare = replace(found.responses[0], site=replace(site, structures=site.structures[:1]))
+    assert bare.places.seen.tolist() == [True, True, *[False] * (len(places.seen) - 2)]
+    shaded, seen = (
+        level_probability(replace(found, responses=(each,)), replace(CERTAIN, in_shade=0.5), 200)
+        for each in (found.responses[0], bare)
+    )
+    assert shaded.of(LevelOfProtection.LOW) < seen.of(LevelOfProtection.LOW)
