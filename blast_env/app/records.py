@@ -178,7 +178,7 @@ class Verdict(Kept):
         level_on_cells: The same by the clipped peaks on the cells alone.
         panes: Number of its panes.
         broken: Expected number of broken panes.
-        condition: Performance condition of its worst pane, GSA.
+        condition: Performance condition of its worst pane, GSA, and its rating, ISO 16933.
         damage: Damage of its worst wall panel; empty where it has none.
         total_damage: Damage of all its components, added up.
         impulse_pa_s: Mean impulse on its bays.
@@ -337,7 +337,7 @@ class VerdictRow(Kept):
         building: Name of the building.
         level: Level of protection that it reaches.
         panes: Expected number of broken panes, and the number of panes.
-        condition: Performance condition of the worst pane, GSA.
+        condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
         damage: Damage of the worst wall panel.
         flags: Reasons to distrust its loads; a dash if there are none.
     """

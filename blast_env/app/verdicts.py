@@ -138,7 +138,7 @@ def _verdict(building: BuildingResponse) -> Verdict:
         level_on_cells=building.on_cells.level_of_protection,
         panes=facade.panes,
         broken=facade.broken_panes,
-        condition=facade.worst_condition.label,
+        condition=facade.worst_condition.words,
         damage=facade.worst_damage.name.lower() if len(facade.walled) else "",
         total_damage=building.severity.damage,
         impulse_pa_s=building.severity.load,

@@ -63,7 +63,7 @@ _HEADERS: Final = (
     "building",
     "level of protection",
     "panes broken",
-    "worst pane (GSA)",
+    "worst pane (GSA, ISO)",
     "worst panel",
 )
 _NEIGHBOURS: Final = (
@@ -165,6 +165,7 @@ class AssessCommand(ChargeOptions):
             print_line(f"flag: {note}")
         if doubt := judged.doubt(target):
             print_line(doubt)
+        print_line(judged.force_words)
 
     def _print(
         self,
@@ -366,6 +367,6 @@ def _row(found: Consequences, building: str, coarse: Consequences | None = None)
     return (
         found.level_words(building),
         f"{broken} of {worst.panes}",
-        max(facade.worst_condition for facade in facades).label,
+        max(facade.worst_condition for facade in facades).words,
         max(facade.worst_damage for facade in facades).name.lower(),
     )

@@ -139,7 +139,7 @@ def _gas_row(found: Consequences) -> Sequence[str]:
     return (
         min(each.level_of_protection for each in facades).label,
         f"{sum(each.broken_panes for each in facades):.1f}",
-        f"{condition.label}, {condition.rating}",
+        condition.words,
         max(each.worst_damage for each in facades).name.lower(),
         "flagged" if found.is_flagged else "",
     )

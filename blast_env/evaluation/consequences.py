@@ -45,7 +45,14 @@ from blast_env.response.buildings import (
 )
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import worst
-from blast_env.response.facade import FacadeResponse, peak_factor, respond, sharpened
+from blast_env.response.facade import (
+    FacadeResponse,
+    force_words,
+    peak_factor,
+    respond,
+    sharpened,
+)
+from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.facade import with_glass
@@ -208,6 +215,7 @@ class Consequences:
         """Notes on a verdict: walls not covered, oblique walls, loads out of range or not known."""
         stepped = dict.fromkeys(each.building for each in self.responses if each.stepped)
         notes = [f"{each.building}: {each.words}" for each in self.unjudged]
+        notes += self._thin
         notes += [f"{name}: {STEPPED}" for name in stepped]
         reasons: dict[str, list[str]] = {}
         for building, reason in self.unchecked:
@@ -230,11 +238,30 @@ class Consequences:
         return [is_known for each in self.responses for is_known in each.known.values()]
 
     @property
+    def _thin(self) -> list[str]:
+        """Notes on interlayers that are thinner than those of arena tests."""
+        found = dict.fromkeys(
+            (each.building, thin_mm)
+            for each in self.responses
+            for thin_mm in each.on_cells.thin_interlayers
+        )
+        return [
+            f"{building}: panes laminated with {thin_mm:g} mm: in arena tests interlayers under"
+            f" {LEAST_INTERLAYER_MM:g} mm failed early"
+            for building, thin_mm in found
+        ]
+
+    @property
+    def force_words(self) -> str:
+        """The largest forces that frames and connections have to carry, in a sentence."""
+        return force_words(each.facade for each in self.responses)
+
+    @property
     def is_flagged(self) -> bool:
         """Whether a building with a facade has a note on its loads or its walls."""
         return (
             any(building in self.buildings for building, _ in self.unchecked)
-            or bool(self.unjudged)
+            or bool(self.unjudged or self._thin)
             or any(each.stepped for each in self.responses)
             or not all(self._known)
         )

@@ -228,7 +228,7 @@ class Screening:
             self.stand_offs[threat.name][0].in_words(needed_m),
             threat.level.label,
             f"{threat.broken_panes:.1f} of {threat.panes}",
-            "-" if pane is None else f"{pane.label}, {pane.rating}",
+            "-" if pane is None else pane.words,
             "-" if panel is None else panel.name.lower(),
             ("passes" if kept else "fails") + (" (may be breached)" if threat.may_breach else ""),
         )

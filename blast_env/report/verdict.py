@@ -40,7 +40,7 @@ class BuildingLine:
         levels: Level of protection in words, with that on the cells if it differs.
         broken: Expected number of broken panes.
         panes: Number of its panes.
-        conditions: Performance condition of the worst pane, GSA.
+        conditions: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
         failed: Number of wall panels with hazardous damage or worse.
         panels: Number of its wall panels.
         damages: Damage of the worst panel.
@@ -157,7 +157,7 @@ def _line(study: Study, name: str) -> BuildingLine:
         levels=tuple(each.level_words(name) for each in both),
         broken=tuple(max(each.broken_panes for each in own) for own in facades),
         panes=first.panes,
-        conditions=tuple(max(each.worst_condition for each in own).label for own in facades),
+        conditions=tuple(max(each.worst_condition for each in own).words for own in facades),
         failed=tuple(
             max(sum(level >= DamageLevel.HAZARDOUS for level in each.walls.levels) for each in own)
             for own in facades

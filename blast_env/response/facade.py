@@ -5,7 +5,7 @@ panels, or both side by side. Its load is the mean overpressure over the bay; al
 share that history.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import cbrt, floor
@@ -19,6 +19,7 @@ from blast_env.geometry import Rectangle, WallLine
 from blast_env.response.buildings import LevelOfProtection, level_of_protection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.glass import (
+    LEAST_INTERLAYER_MM,
     GlazingCondition,
     GlazingResponses,
     Pane,
@@ -290,6 +291,22 @@ class FacadeResponse:
         return float(self.glazing.hazard.sum() + self.walls.damage.sum())
 
     @property
+    def thin_interlayers(self) -> tuple[float, ...]:
+        """Thicknesses of interlayers thinner than that of arena tests, mm."""
+        held = (each.glazing.interlayer for each in self.bays if each.glazing is not None)
+        return tuple(
+            sorted(
+                {
+                    each.thickness_mm
+                    for each in held
+                    if each is not None
+                    and each.material == "pvb"
+                    and each.thickness_mm < LEAST_INTERLAYER_MM
+                }
+            )
+        )
+
+    @property
     def level_of_protection(self) -> LevelOfProtection:
         """Level of protection of the building, that of its worst component."""
         return min(level_by_glass(self.worst_condition), level_of_protection(self.worst_damage))
@@ -320,6 +337,20 @@ def level_by_glass(condition: GlazingCondition) -> LevelOfProtection:
         GlazingCondition.WITHIN_1_M: LevelOfProtection.LOW,
         GlazingCondition.WITHIN_3_M: LevelOfProtection.VERY_LOW,
     }.get(condition, LevelOfProtection.BELOW_STANDARDS)
+
+
+def force_words(found: Iterable[FacadeResponse]) -> str:
+    """Return the largest forces that frames and connections have to carry, in a sentence."""
+    edges, supports = zip(
+        *((each.glazing.edge_force_n_m, each.walls.support_force_n_m) for each in found),
+        strict=True,
+    )
+    carried = ", ".join(
+        f"{words} {np.concatenate(forces).max() * 1e-3:.1f} kN/m"
+        for words, forces in (("pane edges", edges), ("supports of wall panels", supports))
+        if sum(map(len, forces))
+    )
+    return f"frames and connections are not assessed: they have to carry {carried}"
 
 
 def peak_factor(cell_m: float, tnt_kg: float) -> float:

@@ -25,12 +25,12 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from functools import cached_property
 from math import ceil
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.response.plate_table import WEIBULL_M, plate_curve
 from blast_env.response.sdof import (
@@ -51,6 +51,9 @@ DENSITY_KG_M3: Final = 2500.0
 
 STATIC_FATIGUE: Final = 16.0
 """Exponent of the duration of load (ASTM E1300)."""
+
+LEAST_INTERLAYER_MM: Final = 1.52
+"""Thickness of PVB below which laminated panes failed early in arena tests."""
 
 _REFERENCE_S: Final = 60.0
 _GRAVITY_M_S2: Final = 9.81
@@ -103,6 +106,11 @@ class GlazingCondition(IntEnum):
         """
         return ("A", "B", "D", "E", "F", "F")[self.value - 1]
 
+    @property
+    def words(self) -> str:
+        """Both: `3a, D`."""
+        return f"{self.label}, {self.rating}"
+
 
 class Interlayer(BaseModel):
     """Interlayer of laminated glass, which retains the fragments.
@@ -111,12 +119,16 @@ class Interlayer(BaseModel):
     as a membrane with the tension of its cohesion, which tears at a share of the short side.
 
     Attributes:
+        material: Whether it lies between plies, or is a film on the pane.
+        thickness_mm: Thickness.
         tension_n_m: Tension of the broken pane in its plane, N/m.
         tear_share: Deflection at which it tears or leaves the frame, over the short side.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    material: Literal["pvb", "film"] = "pvb"
+    thickness_mm: Annotated[StrictFloat, Field(gt=0.0, le=20.0)] = LEAST_INTERLAYER_MM
     tension_n_m: Annotated[StrictFloat, Field(gt=0.0)] = 16_000.0
     tear_share: Annotated[StrictFloat, Field(gt=0.0, le=1.0)] = 0.15
 
@@ -330,6 +342,9 @@ class GlazingResponses:
             fragments land before it (panes,).
         condition: `GlazingCondition` of broken panes; `NO_BREAK` if no larger share than the limit
             breaks (panes,).
+        edge_force_n_m: Largest mean force per length of edge, N/m, which frame and joint have to
+            carry: the resistance of the unbroken pane over its edges, or the tension of the
+            interlayer of a broken one (panes,).
         hazard: The condition as a number that increases within it: below 1 no break, from 1
             retained, from 2 within 1 m, from 3 within 3 m, from 4 to 5 farther (panes,).
     """
@@ -342,6 +357,7 @@ class GlazingResponses:
     flight_m: FloatArray
     hit_height_m: FloatArray
     condition: FloatArray
+    edge_force_n_m: FloatArray
     hazard: FloatArray
 
     def or_worse(self, other: "GlazingResponses") -> "GlazingResponses":
@@ -404,6 +420,7 @@ def glazing_responses(
         flight,
         hit,
         condition.astype(np.float64),
+        _edge_forces_n_m(panes, peak_m, probability > limit_probability),
         hazard,
     )
 
@@ -477,6 +494,18 @@ def _thrown(
     speed = np.where(stretched <= 1.0, 0.0, thrown_m_s)
     flight = speed * np.sqrt(2.0 * middle_m / _GRAVITY_M_S2)
     return stretched, speed, flight, _hit_height_m(middle_m, speed)
+
+
+def _edge_forces_n_m(panes: Sequence[Pane], peak_m: FloatArray, broken: BoolArray) -> FloatArray:
+    """Return the mean force on the edges of panes with a largest deflection, N/m (panes,)."""
+    forces = []
+    for pane, deflection_m, is_broken in zip(panes, peak_m, broken, strict=True):
+        reached_m, pressure_pa, _ = pane.curve.bending
+        edge_m = 2.0 * (pane.width_m + pane.height_m)
+        force = float(np.interp(deflection_m, reached_m, pressure_pa)) * pane.area_m2 / edge_m
+        holds = pane.interlayer
+        forces.append(max(force, holds.tension_n_m) if is_broken and holds else force)
+    return np.array(forces)
 
 
 def flight_condition(flight_m: FloatArray, hit_height_m: FloatArray) -> FloatArray:

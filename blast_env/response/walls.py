@@ -355,12 +355,15 @@ class PanelResponses:
         ductility: Largest deflection over that at yield (panels,).
         rotation_deg: Largest support rotation (panels,).
         damage: Damage as a number, see `Limits.measure` (panels,).
+        support_force_n_m: Force per length of support, N/m, which the connection has to carry: its
+            share of the largest resistance (panels,).
     """
 
     motion: Responses
     ductility: FloatArray
     rotation_deg: FloatArray
     damage: FloatArray
+    support_force_n_m: FloatArray
 
     @property
     def levels(self) -> list[DamageLevel]:
@@ -381,6 +384,7 @@ class PanelResponses:
             np.where(worse, other.ductility, self.ductility),
             np.where(worse, other.rotation_deg, self.rotation_deg),
             np.where(worse, other.damage, self.damage),
+            np.maximum(self.support_force_n_m, other.support_force_n_m),
         )
 
 
@@ -407,4 +411,8 @@ def panel_responses(
     for panel, own in of_panels.items():
         rotation[own] = panel.rotation_deg(most[own])
         damage[own] = panel.section.limits.measure(ductility[own], rotation[own])
-    return PanelResponses(motion, ductility, rotation, damage)
+    carried_m = [
+        panel.span_m * (1.0 if panel.supports is Supports.CANTILEVER else 0.5) for panel in panels
+    ]
+    force = motion.largest_resistance_pa * np.array(carried_m)
+    return PanelResponses(motion, ductility, rotation, damage, force)

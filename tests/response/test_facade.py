@@ -9,8 +9,8 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue, find_component
-from blast_env.response.facade import Bay, FilledBay, divide, respond, sharpened
-from blast_env.response.glass import GlazingCondition
+from blast_env.response.facade import Bay, FilledBay, divide, force_words, respond, sharpened
+from blast_env.response.glass import GlazingCondition, Interlayer
 from blast_env.response.walls import panel_responses
 
 GROUND = Rectangle(10.0, 20.0, 22.0, 27.0)
@@ -132,3 +132,14 @@ def test_windows_and_walls_of_a_building_decide_together() -> None:
     calm = respond(bays, time_s, np.zeros((3, 2)))
     assert calm.broken_panes == 0.0
     assert calm.level_of_protection is LevelOfProtection.HIGH
+
+
+def test_thin_interlayers_are_named_and_films_are_not() -> None:
+    layer = Interlayer(thickness_mm=0.76)
+    thin = glazing("window_laminated_6").model_copy(update={"interlayer": layer})
+    film = glazing("window_film_6")
+    bays = [FilledBay(bay(), each) for each in (thin, film, glazing("window_laminated_12"))]
+    found = respond(bays, np.array([0.0, 0.01]), np.full((3, 2), 100.0))
+    assert found.thin_interlayers == (0.76,)
+    assert "pane edges" in force_words([found])
+    assert "wall panels" not in force_words([found])

@@ -133,3 +133,23 @@ def test_both_panes_of_double_glazing_bear_the_load() -> None:
     assert share == pytest.approx(0.008, rel=0.1)
     uneven = Pane(1.5, 1.2, 5.56e-3, outer_thickness_m=3e-3)
     assert single.load_resistance_pa() < uneven.load_resistance_pa() < load
+
+
+def test_a_frame_carries_the_load_of_an_unbroken_pane_over_its_edges() -> None:
+    pane = Pane(1.6, 1.0, 5.56e-3)
+    load = 0.5 * pane.load_resistance_pa()
+    found = glazing_responses([pane], np.array([0.0, 2.0, 3.0]), np.array([[0.0, load, load]]))
+    assert found.edge_force_n_m[0] == pytest.approx(load * 1.6 * 1.0 / (2.0 * 2.6), rel=0.02)
+
+
+def test_a_broken_laminated_pane_pulls_at_its_frame() -> None:
+    pane = Pane(1.6, 1.0, 5.84e-3, interlayer=Interlayer())
+    found = glazing_responses([pane], *blast(20e3, 100.0))
+    assert found.break_probability[0] > 0.9
+    assert found.edge_force_n_m[0] >= 16_000.0
+
+
+def test_ratings_of_iso_go_with_the_conditions_of_gsa() -> None:
+    assert [each.words for each in GlazingCondition] == [
+        *("1, A", "2, B", "3a, D", "3b, E", "4, F", "5, F")
+    ]

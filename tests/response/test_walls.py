@@ -99,3 +99,11 @@ def test_rotation_of_supports() -> None:
     assert Panel(STEEL, 2.0, Supports.CANTILEVER).rotation_deg(np.array([2.0])) == pytest.approx(
         [45.0]
     )
+
+
+def test_the_support_carries_half_of_the_yield_resistance() -> None:
+    panel = Panel(ReinforcedConcrete(thickness_m=0.15), 3.5)
+    found = panel_responses([panel], *triangle(200e3, 2000.0, 1))
+    assert found.ductility[0] > 1.0
+    cap_pa = panel.system.resistance.cap_pa
+    assert found.support_force_n_m[0] == pytest.approx(0.5 * 3.5 * cap_pa, rel=1e-3)

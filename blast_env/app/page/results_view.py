@@ -40,7 +40,7 @@ _VERDICT_COLUMNS: Final = (
     ("building", "building", "left"),
     ("level", "level of protection", "left"),
     ("panes", "panes broken", "right"),
-    ("condition", "worst pane (GSA)", "left"),
+    ("condition", "worst pane (GSA, ISO)", "left"),
     ("damage", "worst wall panel", "left"),
     ("flags", "flags", "left"),
 )

@@ -42,10 +42,13 @@ BAY_COLUMNS: Final = (
     Column("panes", "", "panes in the bay"),
     Column("break_probability", "", "share of such panes that break"),
     Column("condition", "", "performance condition of glazing, GSA: 1, 2, 3a, 3b, 4, 5"),
+    Column("rating", "", "hazard rating of glazing, ISO 16933: A to F"),
     Column("flight_m", "m", "how far the fragments of panes that break fly; 0 where they are held"),
     Column("ductility", "", "of the wall panel: largest deflection over that at yield"),
     Column("rotation_deg", "degrees", "support rotation of the wall panel"),
     Column("damage", "", "damage of the wall panel in the terms of PDC-TR 06-08"),
+    Column("edge_force_n_m", "N/m", "force per length of pane edge that frames have to carry"),
+    Column("support_force_n_m", "N/m", "force per length of support of the wall panel"),
 )
 """One row per bay; values for components that a bay lacks are empty."""
 
@@ -241,21 +244,27 @@ def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
             "panes": filled.panes,
             "break_probability": np.nan,
             "condition": "",
+            "rating": "",
             "flight_m": np.nan,
             "ductility": np.nan,
             "rotation_deg": np.nan,
             "damage": "",
+            "edge_force_n_m": np.nan,
+            "support_force_n_m": np.nan,
         }
         if index in panes:
             pane = panes[index]
             row["flight_m"] = found.glazing.flight_m[pane]
             row["break_probability"] = found.glazing.break_probability[pane]
-            row["condition"] = GlazingCondition(int(found.glazing.condition[pane])).label
+            condition = GlazingCondition(int(found.glazing.condition[pane]))
+            row["condition"], row["rating"] = condition.label, condition.rating
+            row["edge_force_n_m"] = found.glazing.edge_force_n_m[pane]
         if index in panels:
             panel = panels[index]
             row["ductility"] = found.walls.ductility[panel]
             row["rotation_deg"] = found.walls.rotation_deg[panel]
             row["damage"] = found.walls.levels[panel].name.lower()
+            row["support_force_n_m"] = found.walls.support_force_n_m[panel]
         rows.append(row)
     return rows
 
