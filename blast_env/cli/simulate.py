@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar, cast
 
 from blast_env.cli.command import argument, option, options_of
 from blast_env.cli.options import (
@@ -34,7 +34,6 @@ from blast_env.cli.output import (
 from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.evaluation.engines import Blast, BlastResult, Engine, default_engine, find_engine
-from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.layout.build_scene import draw_threat
@@ -176,8 +175,9 @@ class SimulateCommand(ChargeOptions, JsonOptions):
         self, scenario: Scenario, layout: Layout, engine: Engine, charge: AnyCharge
     ) -> "ShownBlast[Any, Any]":
         blast = engine.blast(scenario, layout, self.seed, charge)
-        shown: ShownBlast[Any, Any] = load_plugin(engine.shown)(self, blast)
-        return shown
+        if isinstance(blast, Blast):
+            return ShownParticles(self, blast)
+        return ShownGas(self, cast("GasBlast", blast))
 
 
 _AnyBlast = TypeVar("_AnyBlast", Blast, "GasBlast")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import Threat
-from blast_env.evaluation.engines.contract import load_plugin
+from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
 from blast_env.layout import Placement
 from blast_env.site import AnySource, PointSource, Scenario
@@ -19,6 +19,7 @@ from blast_env.site.zone import distances_m
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:
+    from blast_env.evaluation.engines.gas import GasBlast
     from blast_env.plots.placing import BlastScreening, PlacingPainter
     from blast_env.plots.pressure_film import PressureScreening
     from blast_env.plots.window import Window
@@ -174,7 +175,7 @@ class Display:
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
-        if self._last_frame is None and episode.objective.evaluator.engine.screening:
+        if self._last_frame is None and episode.objective.evaluator.engine.medium:
             self._last_frame = _screening(episode, painter.size_px).last_frame()
         if self._last_frame is None:  # the engine gives no state of the blast to draw
             return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
@@ -208,10 +209,13 @@ def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | 
     blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
     charges = len(episode.objective.case.charges)
     remark = f": the worst of {charges} charges" if charges > 1 else ""
-    made: BlastScreening | PressureScreening = load_plugin(evaluator.engine.screening)(
-        blast, _outcome(episode), remark, size_px
-    )
-    return made
+    if isinstance(blast, Blast):
+        from blast_env.plots.placing import BlastScreening
+
+        return BlastScreening(blast, _outcome(episode), remark, size_px)
+    from blast_env.plots.pressure_film import PressureScreening
+
+    return PressureScreening(cast("GasBlast", blast), _outcome(episode), remark, size_px)
 
 
 def _shown_threat(episode: Episode) -> Threat:

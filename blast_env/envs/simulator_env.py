@@ -18,7 +18,6 @@ from blast_env.envs.arguments import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult, Engine, find_engine
-from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Element
 from blast_env.layout import check_layout
 from blast_env.layout.build_scene import draw_threat
@@ -313,9 +312,9 @@ def _unfolding_class(engine: Engine) -> Any:
     Raises:
         BlastEnvError: If the engine runs no blasts.
     """
-    if not engine.unfolding:
+    if not engine.medium:
         raise BlastEnvError(f"engine {engine.name!r} runs no blasts: there is none to show")
-    return load_plugin(engine.unfolding)
+    return UnfoldingGas if engine.medium == "gas" else UnfoldingParticles
 
 
 def _plan_shape(scenario: Scenario, cell_m: float) -> tuple[int, int]:

@@ -15,8 +15,9 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
+from importlib.metadata import entry_points
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -356,10 +357,8 @@ class Engine(ABC):
         caveat: Warning with every result, one sentence; empty for none.
         validated_range: The range in which it was validated, for "outside ...".
         options: Settings that only this engine has.
-        unfolding: The class that shows a blast step by step in `BlastSimulator-v0`, as
-            "module:Class"; empty where there is no blast to show.
-        screening: The class that makes films of a blast, in the same form.
-        shown: The class that shows a blast in `blast-env simulate`, in the same form.
+        medium: What carries its blasts, which decides how they are shown; empty where there is no
+            blast to show.
     """
 
     has_noise: ClassVar[bool] = False
@@ -370,9 +369,7 @@ class Engine(ABC):
     caveat: ClassVar[str] = ""
     validated_range: ClassVar[str] = "the validated range of the engine"
     options: ClassVar[tuple[EngineOption, ...]] = ()
-    unfolding: ClassVar[str] = ""
-    screening: ClassVar[str] = ""
-    shown: ClassVar[str] = ""
+    medium: ClassVar[Literal["", "gas", "particles"]] = ""
 
     name: str
     version: str
@@ -484,7 +481,8 @@ class _Row:
 
     Attributes:
         place: "module:Class", as text: only the engine in use is imported, because Numba alone
-            takes half a second.
+            takes half a second. Empty for an engine of another room, which is found by its entry
+            point in the group `blast_env.engines`, as those of other packages are.
         needs_calibration: Same as `Engine.needs_calibration` of the class.
         extra: The package extra that it needs; empty for none.
     """
@@ -501,7 +499,7 @@ _TABLE: Final[Mapping[str, _Row]] = MappingProxyType(
         ),
         "event": _Row("blast_env.evaluation.engines.particles:EventEngine", needs_calibration=True),
         "gas": _Row("blast_env.evaluation.engines.gas:GasEngine"),
-        "surrogate": _Row("blast_env.design.surrogate.engine:SurrogateEngine", extra="agents"),
+        "surrogate": _Row("", extra="agents"),
     }
 )
 
@@ -555,15 +553,20 @@ def find_engine(
 
 
 def _made(name: str) -> Engine:
-    if name not in _TABLE:
-        raise UnknownNameError("engine", name, ENGINE_NAMES)
-    row = _TABLE[name]
+    row = _TABLE.get(name, _Row(""))
     with import_extra(row.extra, f"engine {name!r}") if row.extra else nullcontext():
-        made: Engine = load_plugin(row.place)()
+        made: Engine = (load_plugin(row.place) if row.place else _of_entry_point(name))()
     return made
 
 
+def _of_entry_point(name: str) -> Any:
+    found = entry_points(group="blast_env.engines")
+    if name not in found.names:
+        raise UnknownNameError("engine", name, sorted({*ENGINE_NAMES, *found.names}))
+    return found[name].load()
+
+
 def load_plugin(place: str) -> Any:
-    """Import and return the object at "module:name"; see `Engine.unfolding`."""
+    """Import and return the object at "module:name"."""
     module, _, name = place.partition(":")
     return getattr(import_module(module), name)

@@ -10,7 +10,7 @@ from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,9 +116,7 @@ class GasEngine(GasSettings, Engine):
         EngineOption("cells", "Whether cells of gas dynamics grow with the blast."),
         EngineOption("until", "Loads that a blast of gas dynamics waits for."),
     )
-    unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingGas"
-    screening: ClassVar[str] = "blast_env.plots.pressure_film:PressureScreening"
-    shown: ClassVar[str] = "blast_env.cli.simulate:ShownGas"
+    medium: ClassVar[Literal["", "gas", "particles"]] = "gas"
 
     name: str = "gas"
     version: str = f"gas 6 (numba {version('numba')})"

@@ -10,7 +10,7 @@ from functools import cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final, Literal
 
 import numpy as np
 
@@ -57,9 +57,7 @@ class ParticleEngine(Engine):
     needs_calibration: ClassVar[bool] = True
     title: ClassVar[str] = "Particles"
     caveat: ClassVar[str] = PARTICLES_OVERRATE
-    unfolding: ClassVar[str] = "blast_env.envs.simulator_env:UnfoldingParticles"
-    screening: ClassVar[str] = "blast_env.plots.placing:BlastScreening"
-    shown: ClassVar[str] = "blast_env.cli.simulate:ShownParticles"
+    medium: ClassVar[Literal["", "gas", "particles"]] = "particles"
     step_name: ClassVar[str] = "steps"
 
     @abstractmethod

@@ -1,7 +1,7 @@
 """Another engine is one file and one line: with a name and loads it does all that the others do."""
 
 import json
-from types import MappingProxyType
+from importlib.metadata import EntryPoint, EntryPoints
 
 import gymnasium as gym
 import pytest
@@ -21,9 +21,10 @@ WALL = [(10, 0), (11, 0), (12, 0)]
 
 @pytest.fixture(autouse=True)
 def one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Add the line: the file is `tests/evaluation/engines/shade.py`."""
-    row = contract._Row("tests.evaluation.engines.shade:ShadeEngine")
-    monkeypatch.setattr(contract, "_TABLE", MappingProxyType({**contract._TABLE, "shade": row}))
+    """Add the line of a package's pyproject.toml: `[project.entry-points."blast_env.engines"]`."""
+    place = "tests.evaluation.engines.shade:ShadeEngine"
+    line = EntryPoints([EntryPoint("shade", place, "blast_env.engines")])
+    monkeypatch.setattr(contract, "entry_points", lambda group: line.select(group=group))
 
 
 def test_it_is_found_by_its_name_and_described() -> None:
