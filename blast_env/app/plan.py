@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from html import escape
 from itertools import groupby
 from math import ceil, floor
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -37,6 +37,9 @@ from blast_env.site import Scenario
 from blast_env.site.sections import PointM
 from blast_env.site.structure import Colour
 from blast_env.units import MODULE_SIDE_M
+
+if TYPE_CHECKING:  # needs the extra `maps`
+    from blast_env.io.importing.sketch import MapSketch
 
 _FITS: Final = "#0072B2"  # Okabe and Ito: blue and orange, safe for colour-blind readers
 _REFUSED: Final = "#D55E00"
@@ -432,6 +435,44 @@ def _wrapped(view: PixelView, x_px: float, y_px: float, text: str) -> list[str]:
     return [
         _text(x, first + _LINE_PX * number, line, _REFUSED, 13) for number, line in enumerate(lines)
     ]
+
+
+_SKETCH_PX: Final = 500
+
+
+class SketchView:
+    """The picture of a map's buildings.
+
+    Args:
+        sketch: The buildings.
+    """
+
+    def __init__(self, sketch: "MapSketch") -> None:
+        left, bottom, right, top = sketch.bounds
+        width, height = sketch.stretch * (right - left), top - bottom
+        scale = _SKETCH_PX / max(width, height)
+        self._sketch, self._corner = sketch, (left, top)
+        self._scales = scale * sketch.stretch, scale
+        self.size_px = max(int(scale * width), 1), max(int(scale * height), 1)
+
+    def place(self, x_px: float, y_px: float) -> PointM:
+        """Return the place in the coordinates of the file."""
+        (left, top), (across, up) = self._corner, self._scales
+        return left + x_px / across, top - y_px / up
+
+    def svg(self, chosen: PointM | None) -> str:
+        """Return the outlines, and a star at the chosen place."""
+        rings = "".join(
+            f"M{'L'.join('{:.1f} {:.1f}'.format(*self._pixel(each)) for each in outline)}Z"
+            for outline in self._sketch.outlines
+        )
+        ink = _hex(INK)
+        star = "" if chosen is None else _star(*self._pixel(chosen), _SELECTED)
+        return f'<path d="{rings}" fill="#d5dbe3" stroke="{ink}" stroke-width="0.7"></path>{star}'
+
+    def _pixel(self, place: PointM) -> PointM:
+        (left, top), (across, up) = self._corner, self._scales
+        return across * (place[0] - left), up * (top - place[1])
 
 
 def words_of_place(view: PixelView, x_m: float, y_m: float) -> str:

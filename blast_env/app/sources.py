@@ -18,6 +18,7 @@ from blast_env.site import SCHEMA_VERSION, Scenario, load_scenario
 
 if TYPE_CHECKING:
     from blast_env.io.importing import ImportedSite, ImportOptions
+    from blast_env.io.importing.sketch import MapSketch
 
 Made = TypeVar("Made")
 
@@ -78,6 +79,17 @@ def imported_site(path: Path, options: "ImportOptions") -> "ImportedSite":
     if options.zone_around_m is None or own.scenario.build_zone is not None:
         return own
     return read(path, options)
+
+
+def map_sketch(path: Path, options: "ImportOptions") -> "MapSketch":
+    """Return the outlines of the buildings of a map or drawing.
+
+    Raises:
+        BlastEnvError: If it cannot be read, or has no building.
+    """
+    from blast_env.io.importing.sketch import sketch_of  # here, because it needs `maps`
+
+    return sketch_of(path, options)
 
 
 def layout_of_file(path: Path) -> LayoutFile:

@@ -384,7 +384,11 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
         mass.value = "50,5"
         user.find(marker="import").click()
         await user.should_see("no building is protected", retries=200)
-        user.find("protected buildings (names, separated by commas)").type("Library")
+        user.find(marker="sketch").click()
+        await user.should_see("Click the building to protect.", retries=200)
+        user.find("middle of the site, x, y of the file (or all of it)").type("7.5006, 54.80045")
+        user.find("width, depth of the site (m), with its middle").type("60, 50")
+        user.find("protected buildings (names, separated by commas)").type("Town Hall")
         user.find(marker="import").click()
         await user.should_see(marker="take-site", retries=200)
         await user.should_see("of its outline")
@@ -392,6 +396,7 @@ def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
         assert session.scenario.georeference is not None
         assert {each.tnt_kg for each in session.scenario.charge} == {50.5}
         assert any(each.protected for each in session.scenario.structures)
+        assert (session.scenario.site.width_m, session.scenario.site.height_m) == (60.0, 50.0)
 
     play(tmp_path, story)
 

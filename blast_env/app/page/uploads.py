@@ -11,7 +11,15 @@ from nicegui.elements.upload_files import FileUpload
 from blast_env.app.guard import MOST_BYTES
 from blast_env.app.jobs import Workers
 from blast_env.app.page.numbers import NumberField
-from blast_env.app.sources import MAPS, SITES, imported_site, is_map, site_of_file
+from blast_env.app.plan import SketchView
+from blast_env.app.sources import (
+    MAPS,
+    SITES,
+    imported_site,
+    is_map,
+    map_sketch,
+    site_of_file,
+)
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
 from blast_env.io.importing.convert import ImportedSite
@@ -142,7 +150,13 @@ class ImportDialog:
         self._use = use
         with ui.dialog(value=True) as self._dialog, ui.card().classes("w-[560px] max-w-full gap-2"):
             ui.label(f"Import {file.name}").style("font-weight: 600; font-size: 16px")
+            show = ui.button("show its buildings", icon="map", on_click=self._show_map)
+            show.props("dense outline no-caps").mark("sketch")
+            self._map = ui.column().classes("w-full gap-0")
             with ui.grid(columns=2).classes("w-full gap-2"):
+                self._centre = _text("middle of the site, x, y of the file (or all of it)")
+                self._size = _text("width, depth of the site (m), with its middle")
+                self._layers = _text("layers or tags of buildings, separated by commas")
                 self._protect = _text("protected buildings (names, separated by commas)")
                 self._near = _text("or the building nearest to x, y of the file")
                 self._charges = _text("charges at x, y; x, y of the file (or its streets)")
@@ -168,9 +182,10 @@ class ImportDialog:
             BlastEnvError: If a value is out of bounds, or no place.
         """
         return ImportOptions(
-            protect=tuple(
-                part.strip() for part in _filled(self._protect).split(",") if part.strip()
-            ),
+            centre=next(iter(_places(_filled(self._centre))), None),
+            size_m=next(iter(_places(_filled(self._size))), None),
+            buildings_from=_parts(self._layers),
+            protect=_parts(self._protect),
             protect_near=next(iter(_places(_filled(self._near))), None),
             charge_at=tuple(_places(_filled(self._charges))),
             tnt_kg=self._tnt.filled,
@@ -181,6 +196,30 @@ class ImportDialog:
             crs=_filled(self._crs) or None,
             units=_filled(self._units) or None,
         )
+
+    async def _show_map(self) -> None:
+        """Show the buildings of the map; a click protects one, in the middle of a site of 100 m."""
+        options = ImportOptions(
+            buildings_from=_parts(self._layers),
+            crs=_filled(self._crs) or None,
+            units=_filled(self._units) or None,
+        )
+        found = await read_upload(self._workers, self._file, map_sketch, options)
+        if found is None or self._map.is_deleted:
+            return
+        self._map.clear()
+        view = SketchView(found)
+
+        def choose(event: events.MouseEventArguments) -> None:
+            x, y = view.place(event.image_x, event.image_y)
+            self._near.value = self._centre.value = f"{x:.8g}, {y:.8g}"
+            self._size.value = _filled(self._size) or "100, 100"
+            image.content = view.svg((x, y))
+
+        with self._map:
+            ui.label("Click the building to protect.").classes("be-quiet")
+            image = ui.interactive_image(size=view.size_px, events=["click"], on_mouse=choose)
+            image.content = view.svg(None)
 
     async def _import(self) -> None:
         try:
@@ -233,6 +272,10 @@ def _number(
 ) -> NumberField:
     field = NumberField(label, number, optional=optional, whole=whole)
     return field.props("stack-label").classes("w-full")
+
+
+def _parts(element: Any) -> tuple[str, ...]:
+    return tuple(part.strip() for part in _filled(element).split(",") if part.strip())
 
 
 def _filled(element: Any) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.option_fields import option
 from blast_env.units import MODULE_SIDE_M
 
@@ -36,6 +36,8 @@ _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
         "default_height_m": (MODULE_SIDE_M, MOST_SITE_M),
         "level_height_m": (1.0, 100.0),
         "least_area_m2": (MODULE_SIDE_M**2, 1e6),
+        "tnt_kg": (0.01, 100_000.0),
+        "clearance_m": (0.0, MOST_SITE_M),
     }
 )
 
@@ -109,6 +111,8 @@ class ImportOptions:
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
                 raise BlastEnvError(f"{_option(name)} is {value:g}, must be {low:g} to {high:g}")
+        if self.preset not in CALIBRATIONS:
+            raise UnknownNameError("preset", self.preset, CALIBRATIONS)
         for side_m in self.size_m or ():
             if not 2.0 <= side_m <= MOST_SITE_M:
                 raise BlastEnvError(f"--size is {side_m:g}, must be 2 to {MOST_SITE_M:g} m")

@@ -95,6 +95,7 @@ def _densest(values: FloatArray, weights: FloatArray, period: float, near: float
 
 
 OUTSIDE: Final = "outside the site"
+_EXCHANGED: Final = ": are longitude and latitude exchanged?"
 _HAIR_M: Final = 0.01
 _ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
 
@@ -143,6 +144,11 @@ class PlacedSite:
         """Return the things of a role."""
         return tuple(each for each in self.things if each.role is role)
 
+    def hint_of_exchange(self, place: tuple[float, float]) -> str:
+        """Return a hint for a place outside the site that is inside with x and y exchanged."""
+        x_m, y_m = self.to_site(np.array([place[::-1]]))[0]
+        return _EXCHANGED if shapely.intersects_xy(self.box, x_m, y_m) else ""
+
     def to_site(self, places: FloatArray) -> FloatArray:
         """Return places of the map (n, 2) in metres of the site (n, 2)."""
         turned = rotated(self.plane.to_metres(places), -self.rotation_deg)
@@ -166,7 +172,10 @@ def place_site(
     if not things:
         raise _nothing(site_map, faulty, options)
     plane = plane_around(site_map.coordinates, _reference(things, options))
-    near = closed(_near(site_map, things, plane, options, ledger), ledger)
+    near = _near(site_map, things, plane, options, ledger)
+    if not near:
+        raise _elsewhere(site_map, things, options)
+    near = closed(near, ledger)
     if site_map.is_drawing:
         near = with_courtyards(near, ledger)
     open_lines = [each for each in near if each.fault]
@@ -236,6 +245,20 @@ def _nothing(site_map: SiteMap, faulty: Sequence[Thing], options: ImportOptions)
     if options.buildings_from:
         advice = f"--buildings-from {' '.join(options.buildings_from)} chooses nothing"
     return BlastEnvError(f"{site_map.path}: has no building that is marked as such; {advice}")
+
+
+def _elsewhere(site_map: SiteMap, things: Sequence[Thing], options: ImportOptions) -> BlastEnvError:
+    """Return the error of a site around which the map has nothing."""
+    flag, place = ("--centre", options.centre) if options.centre else ("--origin", options.origin)
+    assert place is not None
+    x, y = place
+    box = shapely.box(*shapely.total_bounds([each.geometry for each in things]))
+    left, bottom, right, top = box.bounds
+    hint = _EXCHANGED if shapely.intersects_xy(box, y, x) else ""
+    return BlastEnvError(
+        f"{site_map.path}: has nothing near {flag} {x:.10g},{y:.10g}, but from "
+        f"{left:.10g},{bottom:.10g} to {right:.10g},{top:.10g}{hint}"
+    )
 
 
 def _reference(things: Sequence[Thing], options: ImportOptions) -> tuple[float, float]:

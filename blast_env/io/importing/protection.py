@@ -89,13 +89,13 @@ def _nearest(
         if each.geometry.convex_hull.distance(point) < distances_m[best]:
             words = f" ({shortened(each.name)})" if each.name else ""
             raise BlastEnvError(
-                f"--protect-near is {place[0]:.10g} {place[1]:.10g}: the building nearest to it "
+                f"--protect-near is {place[0]:.10g},{place[1]:.10g}: the building nearest to it "
                 f"is {each.place}{words}, which is left out: {each.fault}"
             )
     if not shapely.intersects(point, site.box):
         raise BlastEnvError(
-            f"--protect-near is {place[0]:.10g} {place[1]:.10g}, which is at ({x_m:,.1f}, "
-            f"{y_m:,.1f}) m of the site, outside of it: are longitude and latitude exchanged?"
+            f"--protect-near is {place[0]:.10g},{place[1]:.10g}, which is at ({x_m:,.1f}, "
+            f"{y_m:,.1f}) m of the site, outside of it{site.hint_of_exchange(place)}"
         )
     return best
 

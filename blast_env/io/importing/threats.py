@@ -146,6 +146,7 @@ def _asked(
             raise BlastEnvError(
                 f"--charge-at is {place[0]:.10g},{place[1]:.10g}, which is at ({x_m:.2f}, "
                 f"{y_m:.2f}) m of the site: outside, in a building, or too near to one"
+                f"{site.hint_of_exchange(place)}"
             )
         yield _point(float(x_m), float(y_m), options.tnt_kg)
 

@@ -273,6 +273,8 @@ def test_choices_that_name_nothing(tmp_path: Path) -> None:
 
 def test_options_out_of_bounds_are_named() -> None:
     assert error_of_options(margin_m=-1.0) == "--margin is -1, must be 0 to 2000"
+    assert error_of_options(tnt_kg=-5.0) == "--tnt-kg is -5, must be 0.01 to 100000"
+    assert "no preset 'balistic', did you mean" in error_of_options(preset="balistic")
     assert error_of_options(size_m=(1.0, 50.0), centre=(0, 0)) == "--size is 1, must be 2 to 2000 m"
     assert "--origin needs --size" in error_of_options(origin=(0.0, 0.0))
     assert "--size needs --origin or --centre" in error_of_options(size_m=(20.0, 20.0))

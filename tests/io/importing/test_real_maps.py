@@ -1,5 +1,6 @@
 """Faults of real maps and drawings: nothing vanishes, stops the file or is guessed in silence."""
 
+import re
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -250,6 +251,15 @@ def test_exchanged_longitude_and_latitude_are_refused(tmp_path: Path) -> None:
     assert imported(path, protect_near=lon_lat).buildings[0].protected
     message = error_of(path, protect_near=lon_lat[::-1])
     assert "outside of it: are longitude and latitude exchanged?" in message
+    swapped = lon_lat[::-1]
+    for option in ({"centre": swapped}, {"origin": swapped}):
+        message = error_of(path, protect_near=lon_lat, size_m=(60.0, 40.0), **option)
+        assert re.search(
+            r"nothing near --\w+ 3.59\d+e-05,8.09\d+, but from .* exchanged\?", message
+        )
+    message = error_of(path, protect_near=lon_lat, charge_at=(swapped,))
+    assert "too near to one: are longitude and latitude exchanged?" in message
+    assert "exchanged" not in error_of(path, protect_near=(3.0, 50.0))
 
 
 def test_heights_that_no_file_has_are_guessed_by_neighbours_and_kind(tmp_path: Path) -> None:
