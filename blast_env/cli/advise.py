@@ -11,6 +11,7 @@ from blast_env.cli.options import (
     CELL_HELP,
     CELLS_HELP,
     FINAL_CELLS,
+    MASS_ERROR_HELP,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
@@ -20,6 +21,7 @@ from blast_env.cli.output import ResultTable, print_cost, print_line, progress_b
 from blast_env.cli.targets import PICTURES
 from blast_env.design.search import LayoutProblem
 from blast_env.design.search.advice import (
+    MARGIN,
     Advice,
     AdviceVerdict,
     MeasureKind,
@@ -33,6 +35,12 @@ from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, consequences, verdict_word
 from blast_env.evaluation.engines.contract import JUDGE, Engine, find_engine
 from blast_env.evaluation.grid_error import GridError, final_engine, grid_error
+from blast_env.evaluation.probability import (
+    DRAWS,
+    Uncertainty,
+    level_probability,
+    probability_text,
+)
 from blast_env.geometry import Layout, layout_words
 from blast_env.layout import Placement, write_layout
 from blast_env.layout.placement import met_by_blasts
@@ -41,7 +49,21 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.models import SCHEMA_VERSION
 
-_HEADERS: Final = ("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks")
+_BARELY: Final = AdviceVerdict.PASSES_BARELY
+_PROBABLE_MARGIN: Final = 0.3
+"""Margin in damage levels after a layout failed before a judge who wants a probability."""
+
+_HEADERS: Final = (
+    "kind",
+    "layout",
+    "cost",
+    "blasts",
+    "level",
+    "passes",
+    "judged",
+    "sharp peaks",
+    "probability",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +80,10 @@ class AdviseCommand(ChargeOptions):
     scenario: str = argument(SCENARIO_HELP)
     budget_cost: float | None = option(None, "Most that may be spent; else the zone's budget.")
     target: str | None = option(None, TARGET_HELP.format("medium"))
+    target_probability: float | None = option(
+        None, "Least probability of the level; else the scenario's, else none.", min=0.5, max=0.999
+    )
+    mass_error: float = option(0.1, MASS_ERROR_HELP, min=0.0, max=0.3)
     charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
     budget: int = option(60, "Most blasts of a search.", min=1)
     rounds: int = option(3, "Most searches for each kind.", min=1)
@@ -106,21 +132,30 @@ class AdviseCommand(ChargeOptions):
         print_cost((each, scenario, charge) for each, charge in asked)
         charges = [threat.charge for threat in threats]
         judged: dict[Layout, Consequences] = {}
+        shares: dict[Layout, float] = {}
+        wanted = scenario.objective.target_probability
 
         def verdict(layout: Layout) -> AdviceVerdict:
             if layout not in judged:
                 judged[layout] = consequences(scenario, layout, charges, judge)
-            return _verdict_of(judged[layout], target)
+                likely = level_probability(judged[layout], Uncertainty(mass=self.mass_error))
+                shares[layout] = likely.of(target)
+            found = _verdict_of(judged[layout], target)
+            return found if shares[layout] >= (wanted or 0.0) else min(found, _BARELY)
 
         found: list[Advice] = []
         for kind in kinds:
             first = tuple(each.layout for each in found) if kind is MeasureKind.TOGETHER else ()
             arguments = (verdict, problem, kind, self.budget, self.seed, first)
             with progress_bar(f"{kind}") as progress:
-                found.append(advise_until(*arguments, progress, rounds=self.rounds))
+                margin = MARGIN if wanted is None else _PROBABLE_MARGIN
+                rounds = self.rounds
+                found.append(advise_until(*arguments, progress, rounds=rounds, margin=margin))
         best = best_of(found, verdict)
         error = _error(problem, best.layout, judged, judge)
-        self._print(scenario, target, best, found, judged, judge, error)
+        passes = verdict(best.layout) is AdviceVerdict.PASSES
+        print_line(_answer(scenario, target, best, found, judged, shares[best.layout], passes))
+        self._print(scenario, target, best, found, judged, shares, judge, error)
         if self.out is not None:
             made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
             print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
@@ -159,8 +194,10 @@ class AdviseCommand(ChargeOptions):
         """Return the scenario with the requested target and budget."""
         target = wanted_level(self.target, scenario, LevelOfProtection.MEDIUM).label
         kept = scenario.objective.model_dump(
-            include={"charges", "cvar_level", "measure"}, exclude_none=True
+            include={"charges", "cvar_level", "measure", "target_probability"}, exclude_none=True
         )
+        if self.target_probability is not None:
+            kept["target_probability"] = self.target_probability
         document = scenario.model_dump() | {
             "schema_version": SCHEMA_VERSION,
             "objective": {**kept, "kind": "response", "target": target},
@@ -176,10 +213,10 @@ class AdviseCommand(ChargeOptions):
         best: Advice,
         found: list[Advice],
         judged: dict[Layout, Consequences],
+        shares: dict[Layout, float],
         judge: Engine,
         error: GridError | None,
     ) -> None:
-        print_line(_answer(scenario, target, best, found, judged))
         for note in judged[best.layout].notes:
             print_line(f"flag: {note}")
         if error is not None:
@@ -199,11 +236,12 @@ class AdviseCommand(ChargeOptions):
                 "yes" if each.passes else "no",
                 verdict_word(seen.passes_on_cells(target), seen.is_flagged).lower(),
                 seen.verdict(target).lower(),
+                probability_text(shares[each.layout], DRAWS),
             )
         result_console().print(table)
         print_line(
             f"passes: by the search; judged: {judge.words}; level, sharp peaks: the same impulses "
-            "with peaks that cells do not clip as well."
+            "with peaks that cells do not clip as well; probability: of the required level."
         )
 
 
@@ -236,18 +274,25 @@ def _answer(
     best: Advice,
     found: list[Advice],
     judged: dict[Layout, Consequences],
+    share: float,
+    passes: bool,
 ) -> str:
     """Return the answer in a line or two: the cost to pass, and whether walls help."""
     by_kind = {each.kind: each for each in found}
     cost = Placement(scenario, best.layout).cost
     flagged = " (flagged)" if judged[best.layout].is_flagged else ""
-    if not judged[best.layout].passes(target):
-        answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}."
+    wanted, likely = scenario.objective.target_probability, probability_text(share, DRAWS)
+    if not passes:
+        least = (
+            "" if wanted is None else f" with a probability of {wanted:g}; the best has {likely}"
+        )
+        answer = f"{scenario.name}: nothing that was tried reaches {target.label!r}{least}."
     elif not best.layout:
-        answer = f"{scenario.name}: the empty site reaches {target.label!r}{flagged}."
+        answer = f"{scenario.name}: the empty site reaches {target.label!r} with {likely}{flagged}."
     else:
         words = layout_words(best.layout)
-        answer = f"{scenario.name}: {target.label!r} costs {cost:g}{flagged}: {words}."
+        level = f"{target.label!r} with {likely}"
+        answer = f"{scenario.name}: {level} costs {cost:g}{flagged}: {words}."
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
     if shield is None or judged[shield.layout].passes(target):
         return answer

@@ -148,7 +148,9 @@ def probability_text(value: float, draws: int) -> str:
     bound = 3.0 / draws
     if value >= 1.0:
         return f"more than {1.0 - bound:.3f}"
-    return f"{value:.2f}" if value > 0.0 else f"less than {bound:.3f}"
+    if value <= 0.0:
+        return f"less than {bound:.3f}"
+    return f"{value:.3f}" if min(value, 1.0 - value) < 0.01 else f"{value:.2f}"
 
 
 def level_probability(

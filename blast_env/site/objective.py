@@ -20,6 +20,7 @@ from blast_env.statistics import (
 from blast_env.units import PA_PER_PSI
 
 Reference = Annotated[StrictFloat, Field(gt=0.0, le=1e12)]
+Probability = Annotated[StrictFloat, Field(gt=0.0, lt=1.0)]
 Level = Annotated[StrictFloat, Field(ge=0.0, lt=1.0)]
 _UNITS: Final = {"impulse": "Pa s", "peak": "Pa", "both": ""}
 _NOUNS: Final = {"impulse": "impulse", "peak": "peak overpressure", "both": "load"}
@@ -45,6 +46,8 @@ class ObjectiveSection(Section):
         measure: Measure of the response: `"damage"` is that of the worse of window and wall panel
             in a bay, by the area of bays; `"glazing"` that of windows alone, by the area of panes.
         target: Level of protection of the response to reach under every charge.
+        target_probability: Least probability of the target, in judgements of layouts
+            (`blast_env.evaluation.probability`); the objective itself does not depend on it.
         quantity: Quantity of the load; peaks need the engine `gas`.
         reference_impulse_pa_s: Impulse that counts as 1 with `"both"`.
         reference_peak_pa: Peak overpressure that counts as 1 with `"both"`.
@@ -56,6 +59,7 @@ class ObjectiveSection(Section):
     kind: Literal["load", "response"] = "load"
     measure: Literal["damage", "glazing"] = "damage"
     target: Literal["very low", "low", "medium", "high"] | None = None
+    target_probability: Probability | None = None
     quantity: Literal["impulse", "peak", "both"] = "impulse"
     reference_impulse_pa_s: Reference | None = None
     reference_peak_pa: Reference | None = None
@@ -72,6 +76,8 @@ class ObjectiveSection(Section):
             is_default = getattr(self, key) == type(self).model_fields[key].default
             if not self.is_response and not is_default:
                 problems.append(Problem(key, f"must be left out: kind is {self.kind!r}"))
+        if self.target is None and self.target_probability is not None:
+            problems.append(Problem("target_probability", "must be left out: there is no target"))
         for key in ("reference_impulse_pa_s", "reference_peak_pa"):
             is_given = getattr(self, key) is not None
             if self.quantity == "both" and not is_given:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
@@ -21,6 +22,7 @@ from blast_env.design.search.advice import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case
+from blast_env.evaluation.probability import LevelProbability
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import Placement, load_layout
 from blast_env.plots.cost_level import PricedDamage, cheapest
@@ -136,11 +138,8 @@ def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
     assert front[-1].damage == min(each.damage for each in found.tried)
 
 
-def test_what_a_judge_fails_is_searched_for_again_with_a_margin(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_a_judge_fails_is_searched_for_again_with_a_margin() -> None:
     """The judge is stricter than the search: it wants more glass, or a wall, than would do."""
-    monkeypatch.setattr("blast_env.design.search.advice._MARGIN", 0.05)
     scenario = glazed_yard(target="medium")
     problem = LayoutProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
     once = advise(problem, MeasureKind.TOGETHER, 12)
@@ -148,7 +147,7 @@ def test_what_a_judge_fails_is_searched_for_again_with_a_margin(
     def judge(layout: Layout) -> AdviceVerdict:
         return AdviceVerdict.FAILS if layout == once.layout else AdviceVerdict.PASSES
 
-    found = advise_until(judge, problem, MeasureKind.TOGETHER, 12, rounds=3)
+    found = advise_until(judge, problem, MeasureKind.TOGETHER, 12, rounds=3, margin=0.05)
     assert judge(found.layout) is AdviceVerdict.PASSES
     assert found.passes
     assert found.best.damage < once.best.damage - 0.05
@@ -168,6 +167,24 @@ def test_a_search_begins_with_rules_against_each_charge_for_a_share_of_the_budge
     middle = scenario.zone.rows / 2
     assert any(min(x[0] for x in each) < middle < max(x[0] for x in each) for each in layouts)
     assert list(against_each(scenario, charges[:1])) == []
+
+
+def test_a_layout_passes_with_the_probability_that_is_wanted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every layout has the level with 0.9, by draws of no blast."""
+    likely = LevelProbability(np.repeat([2, 0], [90, 10]), np.full((100, 5), 0.5))
+    monkeypatch.setattr("blast_env.cli.advise.level_probability", lambda *_: likely)
+    site = tmp_path / "yard.toml"
+    blast_env.save_scenario(glazed_yard(charges="mean"), site)
+    options = ("--tnt-kg", "0.02", "--budget", "1", "--rounds", "1", "--judge-cell", "0.5")
+    asked = ("--target", "low", "--target-probability")
+    passed, failed = (run(site, *options, *asked, share) for share in ("0.85", "0.95"))
+    assert "the empty site reaches 'low' with 0.90 (flagged)." in passed
+    assert (
+        "nothing that was tried reaches 'low' with a probability of 0.95; the best has 0.90."
+        in failed
+    )
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,8 @@ def test_an_index_is_the_share_of_the_variance_that_a_quantity_explains() -> Non
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(1.0, "more than 0.997"), (0.0, "less than 0.003"), (0.84, "0.84")]
+    ("value", "text"),
+    [(1.0, "more than 0.997"), (0.0, "less than 0.003"), (0.84, "0.84"), (0.998, "0.998")],
 )
 def test_a_thousand_draws_prove_no_certainty(value: float, text: str) -> None:
     assert probability_text(value, 1000) == text

@@ -201,6 +201,10 @@ def test_measures_need_items() -> None:
     [
         ({"quantity": "peak"}, "objective.quantity: must be left out: kind is 'response'"),
         ({"kind": "load", "target": "low"}, "objective.target: must be left out: kind is 'load'"),
+        (
+            {"target_probability": 0.95},
+            "objective.target_probability: must be left out: there is no target",
+        ),
         ({"target": "good"}, "objective.target: is 'good', must be"),
     ],
 )

@@ -34,8 +34,8 @@ _MOST_LOOKED_AT: Final = 10
 _KEPT: Final = 3
 """Number of best barriers that the search changes."""
 
-_MARGIN: Final = 0.1
-"""Required reduction of the damage after a layout failed before a judge, in damage levels."""
+MARGIN: Final = 0.1
+"""Default margin to the damage of a layout that failed before a judge, in damage levels."""
 
 _TOO_LITTLE: Final = 1e-9
 """Least excess over 1 of the worth of a layout that fails."""
@@ -49,7 +49,8 @@ class AdviceVerdict(IntEnum):
 
     Attributes:
         FAILS: The layout misses the target.
-        PASSES_BARELY: It reaches the target, but not with peaks unclipped by the cell size.
+        PASSES_BARELY: It reaches the target, but not with peaks unclipped by the cell size, or not
+            with the required probability.
         PASSES: It reaches the target either way.
     """
 
@@ -243,6 +244,7 @@ def advise_until(
     progress: Callable[[float], None] | None = None,
     *,
     rounds: int = 1,
+    margin: float = MARGIN,
 ) -> Advice:
     """Search until a judge passes the best layout, and return the best of all searches.
 
@@ -257,6 +259,7 @@ def advise_until(
         begin_with: Initial layouts.
         progress: Called with the share of the searches that is done.
         rounds: Largest number of searches.
+        margin: The margin, in damage levels.
     """
     every: list[Advice] = []
     below = inf
@@ -269,7 +272,7 @@ def advise_until(
             progress(len(every) / rounds)
         if not found.passes or judge(found.layout) is AdviceVerdict.PASSES:
             break
-        below = found.best.damage - _MARGIN
+        below = found.best.damage - margin
         begin_with = (*begin_with, found.layout)
     return replace(
         best_of(every, judge),
