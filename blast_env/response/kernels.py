@@ -69,6 +69,8 @@ def integrate(
     points: FloatArray,
     values: FloatArray,
     cap: float,
+    growth_points: FloatArray,
+    growth: FloatArray,
     rebound_cap: float,
     crack: float,
     cracked_points: FloatArray,
@@ -96,12 +98,13 @@ def integrate(
             resistance = polyline(cracked_points, cracked_values, x)
         else:
             resistance = polyline(points, values, x - offset)
-            if resistance > cap:
-                offset += (resistance - cap) / (values[1] / points[1])
-                resistance = cap
-            elif resistance < -rebound_cap:
-                offset += (resistance + rebound_cap) / (values[1] / points[1])
-                resistance = -rebound_cap
+            grown = polyline(growth_points, growth, abs(x))
+            if resistance > cap * grown:
+                offset += (resistance - cap * grown) / (values[1] / points[1])
+                resistance = cap * grown
+            elif resistance < -rebound_cap * grown:
+                offset += (resistance + rebound_cap * grown) / (values[1] / points[1])
+                resistance = -rebound_cap * grown
         now_s = time_s[0] + step * step_s
         until, place = impulse_until(time_s, pressure_pa, impulse_pa_s, place, now_s + 0.5 * step_s)
         v += (until - pushed - step_s * resistance) / mass

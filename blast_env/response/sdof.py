@@ -40,6 +40,8 @@ class Resistance:
         pressure_pa: Resistance from 0 (points,); extrapolated with the last slope.
         cap_pa: Yield resistance; infinite without yield.
         rebound_cap_pa: Yield resistance in rebound.
+        growth_m: Deflections of `growth`, ascending from 0 (points,).
+        growth: Factors on both yield resistances at these deflections, extrapolated (points,).
         crack_m: Deflection at which it cracks; infinite without cracking.
         cracked_deflection_m: Deflections after cracking, ascending from 0 (points,).
         cracked_pressure_pa: Resistance after cracking (points,).
@@ -52,6 +54,8 @@ class Resistance:
     pressure_pa: FloatArray
     cap_pa: float = np.inf
     rebound_cap_pa: float = np.inf
+    growth_m: FloatArray = field(default_factory=lambda: np.array([0.0, 1.0]))
+    growth: FloatArray = field(default_factory=lambda: np.array([1.0, 1.0]))
     crack_m: float = _NO_CRACK
     cracked_deflection_m: FloatArray = field(default_factory=lambda: np.array([0.0, 1.0]))
     cracked_pressure_pa: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0]))
@@ -61,6 +65,7 @@ class Resistance:
         for name, deflection in (
             ("deflection_m", self.deflection_m),
             ("cracked_deflection_m", self.cracked_deflection_m),
+            ("growth_m", self.growth_m),
         ):
             if len(deflection) < 2 or deflection[0] != 0.0 or not (np.diff(deflection) > 0.0).all():
                 raise BlastEnvError(f"{name} is {deflection}, must ascend from 0")
@@ -220,6 +225,8 @@ def _integrate(
         resistance.deflection_m,
         strength * resistance.pressure_pa,
         strength * resistance.cap_pa,
+        resistance.growth_m,
+        resistance.growth,
         strength * resistance.rebound_cap_pa,
         resistance.crack_m,
         resistance.cracked_deflection_m,

@@ -10,13 +10,13 @@ antiterrorism design, US Army Corps of Engineers, 2008). Each limit gives its so
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from functools import cached_property
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat
 
 from blast_env.arrays import FloatArray
 from blast_env.response.sdof import Resistance, Responses, System, drawn_responses, responses
@@ -128,7 +128,8 @@ class ReinforcedConcrete(_Section):
 
     The moment follows from equilibrium of the steel and a rectangular stress block of concrete, the
     stiffness from the mean of the uncracked and cracked sections (UFC 3-340-02, sections 4-9 and
-    4-11), with dynamic strengths.
+    4-11), with dynamic strengths. Beyond yield the stress of the steel grows with the rotation of
+    the supports (`design_stress_pa`); the lever arm stays that of the whole section.
 
     Attributes:
         thickness_m: Thickness.
@@ -136,7 +137,13 @@ class ReinforcedConcrete(_Section):
         cover_m: Depth of the centre of the steel below the face.
         concrete_pa: Compressive strength.
         steel_pa: Yield strength.
-        dynamic_increase: Factor on both strengths at the strain rates of a blast.
+        steel_ultimate_pa: Ultimate strength; 1.08 times the yield strength unless given, the least
+            of class B (EN 1992-1-1, annex C).
+        dynamic_increase: Factor on concrete and on the yield strength at the strain rates of a
+            blast.
+        ultimate_increase: The same on the ultimate strength (UFC 3-340-02, table 4-1).
+        tension_membrane: Whether both supports hold it in its plane, and all steel is continuous
+            and anchored there: it then hangs as a membrane at large deflections.
     """
 
     kind: Literal["reinforced_concrete"] = "reinforced_concrete"
@@ -145,7 +152,10 @@ class ReinforcedConcrete(_Section):
     cover_m: Annotated[StrictFloat, Field(gt=0.0)] = 0.035
     concrete_pa: Annotated[StrictFloat, Field(gt=0.0)] = 30e6
     steel_pa: Annotated[StrictFloat, Field(gt=0.0)] = 500e6
+    steel_ultimate_pa: Annotated[StrictFloat, Field(gt=0.0)] | None = None
     dynamic_increase: Annotated[StrictFloat, Field(ge=1.0, le=2.0)] = 1.17
+    ultimate_increase: Annotated[StrictFloat, Field(ge=1.0, le=2.0)] = 1.05
+    tension_membrane: StrictBool = False
 
     @property
     def mass_kg_m2(self) -> float:
@@ -159,9 +169,32 @@ class ReinforcedConcrete(_Section):
     @property
     def moment_n(self) -> float:
         """Yield moment per metre of width."""
-        force = self.steel_share * self._depth_m * self.steel_pa * self.dynamic_increase
+        return self.moment_at(0.0)
+
+    def moment_at(self, rotation_deg: float) -> float:
+        """Return the moment per metre of width that it has at a support rotation, N."""
+        force = self.steel_share * self._depth_m * self.design_stress_pa(rotation_deg)
         block_m = force / (0.85 * self.concrete_pa * self.dynamic_increase)
         return force * (self._depth_m - 0.5 * block_m)
+
+    def design_stress_pa(self, rotation_deg: float) -> float:
+        """Return the dynamic stress of the steel at a support rotation, Pa.
+
+        Up to 2 degrees it yields; up to 6 degrees, a fourth of the hardening is added, beyond half
+        of it (UFC 3-340-02, table 4-2; TM 5-1300 has 5 degrees for 6). Steel whose dynamic ultimate
+        strength is not above its dynamic yield strength does not harden.
+        """
+        yields_pa = self.steel_pa * self.dynamic_increase
+        ultimate_pa = self.steel_ultimate_pa or _CLASS_B * self.steel_pa
+        hardening_pa = max(ultimate_pa * self.ultimate_increase - yields_pa, 0.0)
+        first, second = HARDENING_DEG
+        share = 0.0 if rotation_deg <= first else 0.25 if rotation_deg <= second else 0.5
+        return yields_pa + share * hardening_pa
+
+    def membrane_n(self, rotation_deg: float) -> float:
+        """Return the tension of the steel of both faces per metre of width, N/m."""
+        steel_m = 2.0 * self.steel_share * self._depth_m
+        return steel_m * self.design_stress_pa(rotation_deg) if self.tension_membrane else 0.0
 
     @property
     def bending_stiffness_n_m(self) -> float:
@@ -244,6 +277,14 @@ class Sheeting(_Section):
         return known[self.material]
 
 
+_CLASS_B: Final = 1.08
+
+HARDENING_DEG: Final = (2.0, 6.0)
+"""Support rotations beyond which the steel of concrete has a fourth and half of its hardening."""
+
+_ROTATIONS_DEG: Final = (0.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0, 6.06, 8.0, 10.0, 12.0, 20.0)
+
+
 @dataclass(frozen=True)
 class Panel:
     """A wall panel or slab that spans one way.
@@ -266,6 +307,9 @@ class Panel:
             resistance = self._rocking(stiffness_pa_m, cap_pa)
         else:
             resistance = Resistance.elastic_plastic(stiffness_pa_m, cap_pa)
+        if isinstance(self.section, ReinforcedConcrete):
+            growth_m, growth = self._growth(self.section, cap_pa)
+            resistance = replace(resistance, growth_m=growth_m, growth=growth)
         elastic, plastic = load_mass_factors(self.supports)
         return System(self.section.mass_kg_m2, 0.5 * (elastic + plastic), resistance)
 
@@ -290,6 +334,20 @@ class Panel:
         work = 0.5 * 0.75 * cap * first_m + 0.5 * (0.75 + 1.0) * cap * (last_m - first_m)
         yield_m = 2.0 * (last_m - work / cap)
         return cap / yield_m, cap
+
+    def _growth(self, section: ReinforcedConcrete, cap_pa: float) -> tuple[FloatArray, FloatArray]:
+        """Return deflections, and factors on the yield resistance of concrete at these.
+
+        A membrane of tension T takes over where 8 T x / L^2 exceeds the resistance in bending.
+        """
+        bends = [section.moment_at(each) / section.moment_n for each in _ROTATIONS_DEG]
+        arm_m = self.span_m if self.supports is Supports.CANTILEVER else 0.5 * self.span_m
+        deflection_m = arm_m * np.tan(np.radians(_ROTATIONS_DEG))
+        growth = np.array(bends)
+        if self.supports is not Supports.CANTILEVER:
+            tension_n = np.array([section.membrane_n(each) for each in _ROTATIONS_DEG])
+            growth = np.maximum(growth, 8.0 * tension_n * deflection_m / self.span_m**2 / cap_pa)
+        return deflection_m, growth
 
     def _rocking(self, stiffness_pa_m: float, cap_pa: float) -> Resistance:
         """Return a resistance that drops at cracking to that of the panel's weight.

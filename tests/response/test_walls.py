@@ -107,3 +107,33 @@ def test_the_support_carries_half_of_the_yield_resistance() -> None:
     assert found.ductility[0] > 1.0
     cap_pa = panel.system.resistance.cap_pa
     assert found.support_force_n_m[0] == pytest.approx(0.5 * 3.5 * cap_pa, rel=1e-3)
+
+
+def test_the_stress_of_steel_grows_with_the_rotation_of_the_supports() -> None:
+    """UFC 3-340-02, table 4-2, by hand: 420 and 620 MPa."""
+    section = ReinforcedConcrete(thickness_m=0.2, steel_pa=420e6, steel_ultimate_pa=620e6)
+    yields, ultimate = 1.17 * 420e6, 1.05 * 620e6
+    stresses = [section.design_stress_pa(each) for each in (2.0, 4.0, 8.0)]
+    expected = [yields, yields + 0.25 * (ultimate - yields), 0.5 * (yields + ultimate)]
+    assert stresses == pytest.approx(expected)
+    class_b = ReinforcedConcrete(thickness_m=0.2)
+    assert class_b.design_stress_pa(8.0) == class_b.design_stress_pa(0.0)
+
+
+def test_hardening_and_a_membrane_hold_a_panel_back() -> None:
+    plain, hard, held = (
+        ReinforcedConcrete(thickness_m=0.15, steel_pa=420e6, **more)
+        for more in (
+            {"steel_ultimate_pa": 420e6},
+            {"steel_ultimate_pa": 800e6},
+            {"steel_ultimate_pa": 420e6, "tension_membrane": True},
+        )
+    )
+    panels = [Panel(each, 3.5) for each in (plain, hard, held)]
+    found = panel_responses(panels, *triangle(400e3, 2000.0, 3))
+    assert 8.0 < found.rotation_deg[0] < 30.0
+    assert found.rotation_deg[1] < 0.95 * found.rotation_deg[0]
+    assert found.rotation_deg[2] < 0.75 * found.rotation_deg[0]
+    small = panel_responses(panels, *triangle(400e3, 400.0, 3))
+    assert small.rotation_deg[0] < 2.0
+    assert small.rotation_deg[1] == small.rotation_deg[0]
