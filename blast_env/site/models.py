@@ -309,6 +309,7 @@ class Scenario(Section):
         content["schema_version"] = 1
         _omit_defaults(content, self, "scenario")
         if "objective" in content:
+            del content["objective"]["target_probability"]  # of judgements; no load depends on it
             _omit_defaults(content["objective"], self.objective, "objective")
         for key in ("charge", "structures"):
             for table, section in zip(content[key], getattr(self, key), strict=True):

@@ -137,6 +137,17 @@ def test_the_bill_has_measures_and_plans_have_not() -> None:
     assert len(list(barrier_features(plan.scenario, plan.layout))) == len(WALL)
 
 
+def test_a_probability_of_the_target_counts_for_no_hash() -> None:
+    """No load depends on it: it is for judgements."""
+    found = document(target="medium")
+    found["objective"]["target_probability"] = 0.95
+    probable = Scenario.from_document(found, "yard")
+    assert (
+        probable.content_hash
+        == Scenario.from_document(document(target="medium"), "yard").content_hash
+    )
+
+
 def test_hash_is_as_ever_where_nothing_of_it_is_used() -> None:
     bare = document()
     del bare["build_zone"]["hardening"]
