@@ -23,6 +23,7 @@ from blast_env.geometry import layout_counts, layout_text
 from blast_env.layout import write_layout
 from blast_env.plots.plan import stand_off_text
 from blast_env.provenance import code_version, command, versions
+from blast_env.report.checks import checks_of
 from blast_env.report.figures import (
     front_figure,
     mass_figure,
@@ -165,6 +166,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "verdict": verdict,
         "sources": _sources(study, verdict, summary),
         "standing": _standing(verdict),
+        "checks": checks_of(study),
         "spread": _spread(study),
         "noun": study.scenario.objective.noun,
         "bay_tables": _bay_tables(study),

@@ -1,0 +1,122 @@
+"""Checks of a report that a reviewer can repeat by hand, each with all of its numbers."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from blast_env.particles.calibration.references import (
+    CURVES_SCALED_M,
+    burst_of,
+    kingery_bulmash,
+)
+from blast_env.report.study import Study
+from blast_env.response.facade import FacadeResponse
+from blast_env.response.sdof import impulses
+from blast_env.units import MS_PER_S, PA_PER_KPA
+
+_INTERVALS: Final = 6
+
+
+@dataclass(frozen=True)
+class HandCheck:
+    """A check by hand.
+
+    Attributes:
+        title: What is checked, and against which source.
+        lines: The numbers, in the order of the calculation.
+    """
+
+    title: str
+    lines: tuple[str, ...]
+
+
+def checks_of(study: Study) -> tuple[HandCheck, ...]:
+    """Return the checks of a report: a stand-off, an impulse, a pane and the cost.
+
+    Impulse and pane need a building with a facade.
+    """
+    found = [_stand_off(study)]
+    if study.bare.responses:
+        facade = study.bare.responses[0].on_cells
+        found.append(HandCheck("Impulse of a bay: sum of mean pressure times time", _sum(facade)))
+        found += _pane(facade)
+    found.append(HandCheck("Cost: number times unit cost", tuple(_cost(study))))
+    return tuple(found)
+
+
+def _stand_off(study: Study) -> HandCheck:
+    threat = study.threats[0]
+    charge = threat.against(study.scenario)
+    target = min(
+        (each for each in study.targets if each.protected),
+        key=lambda each: each.bounds_m.distance_to(charge.position_m),
+    )
+    away_m = target.bounds_m.distance_to(charge.position_m)
+    scale = float(np.cbrt(charge.tnt_kg))
+    lines = [
+        f"{threat.name}: {charge.tnt_kg:g} kg TNT at ({charge.position_m[0]:g},"
+        f" {charge.position_m[1]:g}) m, {away_m:.2f} m from the outline of {target.name}",
+        f"Z = {away_m:.2f} m / ({charge.tnt_kg:g} kg)^(1/3) = {away_m / scale:.2f} m/kg^(1/3)",
+    ]
+    if CURVES_SCALED_M[0] <= away_m / scale <= CURVES_SCALED_M[1]:
+        burst = burst_of(charge.height_m, charge.tnt_kg)
+        peak_pa, impulse_pa_s = (
+            kingery_bulmash(quantity, away_m, charge.tnt_kg, burst)
+            for quantity in ("reflected_overpressure", "reflected_impulse")
+        )
+        fine = study.pair(target, threat, study.options.cells[1]).bare
+        lines += [
+            f"Kingery and Bulmash, {burst}, normal reflection: {peak_pa / PA_PER_KPA:,.1f} kPa,"
+            f" {impulse_pa_s:,.0f} Pa s",
+            f"gas, most loaded wall without the layout, mean over the wall:"
+            f" {fine.wall_impulse_pa_s:,.0f} Pa s; largest peak {fine.peak_pa / PA_PER_KPA:,.1f}"
+            " kPa",
+        ]
+    return HandCheck("Stand-off and load in the open: UFC 3-340-02, chapter 2", tuple(lines))
+
+
+def _sum(facade: FacadeResponse) -> tuple[str, ...]:
+    """Return the impulse of the most loaded bay as a sum over intervals until its largest value."""
+    net_pa_s = impulses(facade.time_s, facade.pressure_pa)
+    index = int(net_pa_s.max(axis=1).argmax())
+    own, time_s = net_pa_s[index], facade.time_s
+    last = int(own.argmax())
+    first = int(np.searchsorted(own, 1e-5 * own[last]))
+    ends_s = np.linspace(time_s[max(first - 1, 0)], time_s[last], _INTERVALS + 1)
+    parts_pa_s = np.diff(np.interp(ends_s, time_s, own))
+    step_s = float(ends_s[1] - ends_s[0])
+    means = " + ".join(f"{part / step_s / PA_PER_KPA:.3f}" for part in parts_pa_s)
+    return (
+        f"{facade.bays[index].bay.name}, from {MS_PER_S * ends_s[0]:.2f} ms to the largest running"
+        f" integral at {MS_PER_S * ends_s[-1]:.2f} ms, {_INTERVALS} intervals of"
+        f" {MS_PER_S * step_s:.3f} ms",
+        f"({means}) kPa x {MS_PER_S * step_s:.3f} ms = {parts_pa_s.sum():.1f} Pa s",
+        f"in the table of bays: {own[last]:.1f} Pa s",
+    )
+
+
+def _pane(facade: FacadeResponse) -> Iterator[HandCheck]:
+    glazing = next((each.glazing for each in facade.bays if each.glazing is not None), None)
+    if glazing is None:
+        return
+    pane = glazing.pane
+    load_kpa = pane.load_resistance_pa() / PA_PER_KPA
+    lines = (
+        f"{glazing.title}: {pane.width_m:g} x {pane.height_m:g} m, least thickness"
+        f" {glazing.thickness_mm:g} mm, four sides held, 3 s, 8 of 1,000 break",
+        f"non-factored load from the chart times the glass type factor {pane.kind.type_factor:g}"
+        + (" and the share of the other pane" if pane.outer_thickness_m else "")
+        + f"; here {load_kpa:.2f} kPa",
+    )
+    yield HandCheck("Load resistance of a pane: charts of ASTM E1300", lines)
+
+
+def _cost(study: Study) -> Iterator[str]:
+    lines = study.bill.to_dict("records")
+    for line in lines[:-1]:
+        unit = line["unit_cost"]
+        known = "" if unit != unit else f" x {unit:,.10g}"  # NaN without a unit cost
+        yield f"{line['item']}: {line['count']}{known} = {line['cost']:,.10g}"
+    yield f"sum {lines[-1]['cost']:,.10g}; cost of the layout {study.cost:,.10g}"
