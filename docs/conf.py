@@ -70,7 +70,6 @@ PUBLIC: Final = (
     "blast_env.benchmark.data",
     "blast_agents.training",
     "blast_env.design.search",
-    "blast_agents.league",
 )
 """Packages whose `__all__` is documented; a name of several of them, with the first."""
 

@@ -1,6 +1,6 @@
 """Write the blasts of cache folders as one table of inputs and loads.
 
-Studies, searches, leagues and trainings keep their blasts (`--cache`, `--blasts`, a run folder's
+Studies, searches and trainings keep their blasts (`--cache`, `--blasts`, a run folder's
 `blasts`). A table of them is training data for a surrogate, and remains valid when a new version
 of the code invalidates the cache.
 """

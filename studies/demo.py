@@ -17,22 +17,14 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-from blast_agents.league import (
-    Contest,
-    RandomLayout,
-    Result,
-    ResultStore,
-    Standings,
-    known_track,
-    standard_entries,
-)
-from blast_agents.league.trained import TrainedRun
-from blast_agents.training import TrainingSettings, load_hyperparameters, train
+from blast_agents.training import TrainingSettings, load_agent, load_hyperparameters, train
 from blast_agents.training.environments import environment_id
 from blast_agents.training.hyperparameters import SELF_LABELLING
 from blast_agents.training.run_folder import EvaluationRow, RunFolder, read_rows
 from blast_agents.training.train import TrainingResult
 
+from blast_env.benchmark import Method, make, site_problems
+from blast_env.benchmark.methods import find_method, method_of
 from blast_env.cli.evaluation_report import interval
 from blast_env.cli.output import (
     ResultTable,
@@ -42,7 +34,11 @@ from blast_env.cli.output import (
     result_console,
     user_errors,
 )
+from blast_env.design.rules import random_layout
+from blast_env.design.search import ProposerKind, proposers
+from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import Comparison, Evaluators, compare
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.io.export import LayoutPlan, export_layouts
@@ -50,6 +46,7 @@ from blast_env.plots.figures import save_figure
 from blast_env.plots.gas import facades
 from blast_env.plots.pressure_film import write_pressure_film
 from blast_env.plots.site_picture import site_picture
+from blast_env.values import generator
 
 HEADERS: Final = (
     "layouts",
@@ -58,59 +55,59 @@ HEADERS: Final = (
     "95 % interval",
     "agent ahead by",
     "95 % interval",
-    "ms",
 )
 """Columns of the printed table."""
 
 
+NOTHING: Final = "no barrier"
+RANDOM: Final = "random layout"
+AGENT: Final = "trained agent"
+
+
 @dataclass(frozen=True, eq=False)
 class AgentComparison:
-    """The trained agent against the other entries.
+    """The trained agent against the other methods, on the same charges.
 
     Attributes:
-        standings: Standings of a league with one agent.
+        results: Comparison of each method's layouts with no barrier, by name.
+        rules: Names of the rules among them.
+        engine: Name of the judging engine, with its cells.
     """
 
-    standings: Standings
+    results: Mapping[str, Comparison]
+    rules: tuple[str, ...]
+    engine: str
 
     @property
-    def agent(self) -> Result:
-        """The trained agent."""
-        return next(each for each in self.standings.results if each.has_learnt)
+    def agent(self) -> Comparison:
+        """The layouts of the trained agent."""
+        return self.results[AGENT]
 
     @property
-    def random(self) -> Result:
-        """The random layouts."""
-        return next(each for each in self.standings.results if each.name == RandomLayout.name)
+    def best_rule(self) -> str:
+        """Name of the rule with the largest mean reduction."""
+        return max(self.rules, key=lambda name: self.results[name].reduction.value)
 
     @property
-    def best_rule(self) -> Result:
-        """The rule with the largest mean reduction."""
-        return max(self.standings.rules, key=lambda rule: self.standings.reduction(rule).value)
-
-    @property
-    def best_rule_each(self) -> Result:
-        """The best rule for each case, which only blasts with all rules can determine."""
-        rules = self.standings.rules
-        means = np.array([rule.loads.mean(axis=1) for rule in rules])
-        chosen = [rules[number] for number in means.argmin(axis=0).tolist()]
+    def best_rule_each(self) -> Comparison:
+        """The best rule for each charge, which only blasts with all rules can determine."""
+        rules = [self.results[name] for name in self.rules]
+        chosen = np.argmin([rule.loads.mean(axis=1) for rule in rules], axis=0).tolist()
         return replace(
-            self.best_rule,
-            entry=replace(self.best_rule.entry, title="best rule for each case"),
-            proposals=tuple(rule.proposals[case] for case, rule in enumerate(chosen)),
-            loads=np.array([rule.loads[case] for case, rule in enumerate(chosen)]),
+            rules[0],
+            layouts=tuple(rules[each].layouts[case] for case, each in enumerate(chosen)),
+            loads=np.array([rules[each].loads[case] for case, each in enumerate(chosen)]),
         )
 
     @property
     def has_learnt(self) -> bool:
         """Whether the agent beats random layouts by more than both confidence intervals."""
-        agent, random = map(self.standings.reduction, (self.agent, self.random))
-        return bool(agent.low > random.high)
+        return bool(self.agent.reduction.low > self.results[RANDOM].reduction.high)
 
     @property
     def verdict(self) -> str:
         """Whether the agent has learnt anything, and its lead over the best rule, in words."""
-        gain = self.standings.difference(self.agent, self.random)
+        gain = self.agent.difference(self.results[RANDOM])
         if isnan(gain.low):
             return "No verdict: one threat gives no interval."
         value, low, high = gain.scaled(100.0)
@@ -121,33 +118,30 @@ class AgentComparison:
             else "Not shown that the agent has learnt: its 95 % interval reaches that of random "
             "layouts"
         )
-        ahead = self.standings.difference(self.agent, self.best_rule).scaled(100.0)
+        ahead = self.agent.difference(self.results[self.best_rule]).scaled(100.0)
         return (
             f"{outcome}. It takes off {value:.1f} percentage points more than random layouts do "
             f"(95 % interval of the paired difference {low:.1f} to {high:.1f}), and "
-            f"{ahead.value:+.1f} points beside the best rule, {self.best_rule.name!r} "
+            f"{ahead.value:+.1f} points beside the best rule, {self.best_rule!r} "
             f"({ahead.low:+.1f} to {ahead.high:+.1f})."
         )
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return the printed table, one row per entry; see `HEADERS`."""
-        others = [each for each in self.standings.results if each is not self.agent]
-        return [self._row(result) for result in (*others, self.best_rule_each, self.agent)]
+        """Return the printed table, one row per method; see `HEADERS`."""
+        others = {name: each for name, each in self.results.items() if name != AGENT}
+        others |= {"best rule for each case": self.best_rule_each, AGENT: self.agent}
+        return [self._row(name, each) for name, each in others.items()]
 
-    def _row(self, result: Result) -> tuple[str, ...]:
-        reduction = self.standings.reduction(result)
-        ahead = self.standings.difference(self.agent, result)
+    def _row(self, name: str, result: Comparison) -> tuple[str, ...]:
+        ahead = self.agent.difference(result)
         return (
-            result.name,
+            name,
             f"{result.loads.mean():,.0f}",
-            percent(reduction.value),
-            interval(reduction),
-            *(("-", "-") if result is self.agent else (percent(ahead.value), interval(ahead))),
-            f"{result.proposal_ms:.1f}",
+            percent(result.reduction.value),
+            interval(result.reduction),
+            *(("-", "-") if name == AGENT else (percent(ahead.value), interval(ahead))),
         )
 
-
-AGENT: Final = "trained agent"
 
 _CHANGES: Final[Mapping[str, Any]] = MappingProxyType(
     {
@@ -296,25 +290,41 @@ def clear(run: Path) -> None:
 
 def compare_methods(settings: DemoSettings, trained: TrainingResult) -> AgentComparison:
     """Compare the best weights of the training with the other methods on unseen threats."""
-    scenario = trained.folder.scenario(trained.configuration)
-    agent = replace(TrainedRun.load(settings.run).entry, title=AGENT)
-    contest = Contest(
-        known_track(scenario, settings.threats, seeds=1, noisy=False),
-        (*standard_entries([scenario]), agent),
-        ResultStore(settings.out / "results"),
-        trained.configuration.settings.engine,
-    )
-    with progress_bar(f"{settings.threats} unseen threats") as progress:
-        return AgentComparison(contest.play(settings.processes, progress))
+    engine = trained.configuration.settings.engine
+    problems = [
+        make(each, 0, engine=engine) for each in site_problems(settings.scenario, settings.threats)
+    ]
+    scenario = problems[0].scenario
+    rules = {
+        row.title: find_method(name)
+        for name, row in proposers(ProposerKind.RULE, suiting=[scenario]).items()
+    }
+    methods: dict[str, Method] = {
+        NOTHING: lambda *_: (),
+        RANDOM: lambda problem, seed: random_layout(problem.scenario, generator(seed)),
+        **rules,
+        AGENT: method_of(LearntSearch(agent=load_agent(settings.run))),
+    }
+    layouts = {
+        name: [method(each, seed) for seed, each in enumerate(problems)]
+        for name, method in methods.items()
+    }
+    evaluators, cases = Evaluators(engine), [each.definition.case for each in problems]
+    with progress_bar(f"{len(cases)} unseen threats") as progress:
+        results = {}
+        for name, own in layouts.items():
+            results[name] = compare(evaluators, cases, own, settings.processes)
+            progress(len(results) / len(layouts))
+    return AgentComparison(results, tuple(rules), evaluators.engine.words)
 
 
 def print_comparison(comparison: AgentComparison) -> None:
     """Print one row per method: mean impulse, reduction, time to propose a layout."""
-    cases = comparison.standings.track.cases
+    cases = comparison.agent.cases
     table = ResultTable(
         f"{cases[0].scenario.name}: {len(cases)} threats that the training has not met, the same "
-        f"for all; judged by the engine {comparison.standings.engine}\n(Pa s: mean impulse on the "
-        "protected structures; ahead: in percentage points, paired; ms: time to propose a layout)",
+        f"for all; judged by the engine {comparison.engine}\n(Pa s: mean impulse on the "
+        "protected structures; ahead: in percentage points, paired)",
         HEADERS,
     )
     for row in comparison.rows():
@@ -332,8 +342,7 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
     Returns:
         The files.
     """
-    standings, agent = comparison.standings, comparison.agent
-    case, layout = standings.track.cases[0], agent.proposals[0].layout
+    case, layout = comparison.agent.cases[0], comparison.agent.layouts[0]
     scenario, threat, out = case.scenario, case.threats[0], settings.out
     blasts = [GasBlast(scenario, each, threat.seed, charge=threat.charge) for each in ((), layout)]
     film = out / "side_by_side.mp4"

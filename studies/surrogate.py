@@ -44,6 +44,8 @@ DATA: Final = tuple(
 
 _FOLDS: Final = 5
 _EVERY: Final = 10
+_STRIDE: Final = 4000
+"""Between the held-out seeds of two sites."""
 
 Processes = Annotated[int, typer.Option(min=1)]
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)

@@ -7,6 +7,7 @@ from blast_env.benchmark.definitions import (
     SMALL,
     Definition,
     secret_sites,
+    site_problems,
 )
 from blast_env.benchmark.judging import (
     JUDGE_CELL_M,
@@ -44,6 +45,7 @@ __all__ = [
     "play",
     "secret_sites",
     "shipped_standings",
+    "site_problems",
     "standings_page",
     "standings_tables",
     "stored_references",

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from hashlib import sha256
+from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -12,6 +13,7 @@ from blast_env.bundled import ITEM_SITES
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import (
+    fixed_charges,
     one_of_each_charge,
     practice_hidden,
     practice_visible,
@@ -20,6 +22,7 @@ from blast_env.evaluation.cases import (
 from blast_env.layout.build_scene import draw_threat
 from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
 from blast_env.sites import FAMILIES, generate_site
+from blast_env.values import whole_number
 
 Family = Literal["told", "hidden", "vehicle", "unseen", "response"]
 
@@ -44,7 +47,13 @@ _DRAWS: Final = 16
 _GENERATED: Final = "site_"
 """Prefix of the names of generated sites, before the seed."""
 
+MOST_PLACES: Final = 1000
+"""Most known charges of one site."""
+
 _SECRET_BITS: Final = 62
+
+_STRIDE: Final = 4000
+"""Between the judge's seeds of two places that are drawn from one source."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +61,10 @@ class Definition:
     """Definition of a problem. It never changes; a changed problem is a new version.
 
     Attributes:
-        site: Bundled name, or `site_SEED` for a generated site with heights and a catalogue.
+        site: Bundled name, path, or `site_SEED` for a generated site with heights and a catalogue.
         family: Knowledge of the charge.
-        place: Number of the site's charge in the family `told`, from 1.
+        place: Number of the charge in the family `told`, from 1: one of each of the site's sources
+            in turn, then another of each.
         version: Version; 1 had the sum of positive phases as load.
     """
 
@@ -67,7 +77,7 @@ class Definition:
     def name(self) -> str:
         """Name, such as `control_room-told-v2`; with another place, `control_room-told_2-v2`."""
         place = "" if self.place == 1 else f"_{self.place}"
-        return f"{self.site}-{self.family}{place}-v{self.version}"
+        return f"{Path(self.site).stem}-{self.family}{place}-v{self.version}"
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -101,8 +111,10 @@ class Definition:
         return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
 
     def _told(self) -> Case:
-        scenario, seed = self.scenario, SeedRange.JUDGEMENT.seeds(0, 1)[0]
-        source = scenario.charge[self.place - 1]
+        scenario = self.scenario
+        drawn, number = divmod(self.place - 1, len(scenario.charge))
+        seed = SeedRange.JUDGEMENT.seeds(drawn * _STRIDE, 1)[0]
+        source = scenario.charge[number]
         alone = scenario.model_copy(update={"charge": (source,)})
         charge = draw_threat(alone, seed)
         judged = visible_case(scenario, charge, [seed])
@@ -167,6 +179,29 @@ def find_definition(name: str) -> Definition:
     if name not in DEFINITIONS:
         raise UnknownNameError("problem", name, DEFINITIONS)
     return DEFINITIONS[name]
+
+
+def site_problems(
+    scenario: str | Path, most: int = 16, *, is_hidden: bool = False
+) -> tuple[Definition, ...]:
+    """Return problems on a site of any scenario file.
+
+    Args:
+        scenario: Bundled name or path.
+        most: Largest number of charges, each a problem. Fixed charges count once each.
+        is_hidden: Whether one problem has all charges instead.
+
+    Raises:
+        BlastEnvError: If the file is invalid, it has no build zone, or `most` is out of bounds.
+    """
+    site = str(scenario)
+    found = Definition(site, "vehicle" if is_hidden else "told")
+    found.scenario.zone  # noqa: B018  # refuses a scenario without one
+    if is_hidden:
+        return (found if found.scenario.vehicles else Definition(site, "hidden"),)
+    count = whole_number("cases", most, 1, MOST_PLACES)
+    count = min(count, len(fixed_charges(found.scenario)) or count)
+    return tuple(Definition(site, "told", place) for place in range(1, count + 1))
 
 
 @cache

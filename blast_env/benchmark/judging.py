@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Final, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from blast_env.arrays import FloatArray
 from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import (
@@ -132,21 +133,21 @@ class JudgedSubmission:
         Args:
             budget: As for `score`; problems without a run count 0.
         """
-        return mean_estimate([1.0 - share for share, _ in self._shares(budget)])
+        return mean_estimate(1.0 - self._shares(budget)[0])
 
     def lead(self, budget: int) -> Estimate:
         """Return `reduction` less that of the best rule of each problem, paired by problem."""
-        return mean_estimate([rule - share for share, rule in self._shares(budget)])
+        return mean_estimate(np.subtract(*self._shares(budget)[::-1]))
 
-    def _shares(self, budget: int) -> list[tuple[float, float]]:
-        """Return the mean share that remains and that of the best rule, one pair per problem."""
+    def _shares(self, budget: int) -> FloatArray:
+        """Return the mean shares that remain, and those of the best rules (2, problems)."""
         pairs = []
         for name in self.problems:
             of_problem = [run for run in self.runs if run.problem == name]
             spent = self._spent(name, budget)
             own = [run.share for run in of_problem if run.budget == spent] or [1.0]
             pairs.append((float(np.mean(own)), of_problem[0].rule))
-        return pairs
+        return np.array(pairs).T
 
     def _mean(self, of_budgets: Mapping[int, float]) -> Estimate:
         """Return the mean score over budgets with weights."""

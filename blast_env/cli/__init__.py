@@ -32,9 +32,6 @@ class _Commands(LazyGroup):
         "search": "Search for the layout with the least load on the protected structures.",
         "bench": "Time blasts and the environment on this machine, and measure the memory.",
         "train": ("Train an agent that proposes layouts, or resume an interrupted training."),
-        "league": (
-            "Compare searches, rules and trained agents on the same held-out cases and seeds."
-        ),
         "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
         "propose": "Propose a layout for any site in seconds without a blast.",
         "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 from blast_env.benchmark import (
     BUDGETS,
@@ -37,6 +37,7 @@ from blast_env.cli.command import FOLDER, argument, option
 from blast_env.cli.options import CacheOptions, ProcessOptions
 from blast_env.cli.output import print_line, print_table, progress_bar
 from blast_env.design.search import ProposerKind, proposers
+from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, LoadsCache
 from blast_env.evaluation.engines import JUDGE, find_engine
@@ -75,12 +76,10 @@ class JudgeCommand(ProcessOptions, CacheOptions):
     threat: str = option(
         "visible",
         "Of --scenario. visible: a problem for each charge. hidden: one for all charges.",
-        choices=("visible", "hidden"),
     )
     cases: int = option(16, "Most visible charges of a --scenario.", min=1)
     budget: tuple[int, ...] = option(
-        (),
-        "Blasts that a method may spend; may be given again; else 50, and 0 where none is needed.",
+        (), "Blasts of a method; may be given again; else 50, and 0 for those that need none."
     )
     seeds: int = option(1, "Runs of a method for each problem and budget above 0.", min=1)
     secret: str | None = option(
@@ -99,7 +98,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         """Return the way to resume after Ctrl-C: from the written runs, if there are any."""
         kept = super().how_to_resume()
         through = "the same command resumes after the completed runs"
-        return through + f"; {kept}" if self.out is not None and self._plays else kept
+        return f"{through}; {kept}" if self.out is not None and self._plays else kept
 
     @property
     def _plays(self) -> bool:
@@ -137,10 +136,9 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         if self.secret is not None:
             return {each.name: each for each in secret_sites(self.secret, self.sites)}
         if self.scenario:
-            threat: Literal["visible", "hidden"] = (
-                "hidden" if self.threat == "hidden" else "visible"
-            )
-            own = [site_problems(each, threat, self.cases) for each in self.scenario]
+            check_names("threat", [self.threat], ["visible", "hidden"])
+            is_hidden = self.threat == "hidden"
+            own = [site_problems(each, self.cases, is_hidden=is_hidden) for each in self.scenario]
             return {each.name: each for of_site in own for each in of_site}
         names = DEFINITIONS if self.problem == ("all",) else self.problem or SMALL
         return {name: make(name).definition for name in names}
@@ -157,7 +155,10 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         sites = [each.scenario for each in definitions.values()]
         for name in self.method:
             for each in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
-                yield each, find_method(each), budgets_of(each, self.budget)
+                budgets = budgets_of(each, self.budget)
+                if not budgets:
+                    raise BlastEnvError(f"--budget is 0: {each} needs blasts")
+                yield each, find_method(each), budgets
         if self.run:
             with import_extra("agents", "trained agents"):
                 from blast_agents.training import load_agent

@@ -145,7 +145,7 @@ class SeedRange(Enum):
     TRAINING = range(2**31)
     """Episodes of the environments, and seeds given by users."""
     JUDGEMENT = range(2**31, 2**33)
-    """Final judgement of layouts and agents: league, evaluation, checks of a search."""
+    """Final judgement of layouts and agents: benchmark, evaluation, checks of a search."""
     SEARCH = range(2**33, 2**33 + 2**31)
     """Blasts of searches."""
     SELECTION = range(2**33 + 2**31, 2**34)

@@ -9,7 +9,6 @@ from typing import Any, Final
 
 import numpy as np
 import torch
-from blast_agents.league.store import ResultStore
 from blast_agents.training import load_hyperparameters
 from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
@@ -192,14 +191,6 @@ def _loads(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, read), True)
 
 
-def _result(folder: Path) -> Format:
-    store = ResultStore(folder / "results")
-    store.keep_loads("a case and a layout", (1.5, 2.5, 3.5))
-    (path,) = store.folder.iterdir()
-    read = _from_file(path, lambda _: store.loads("a case and a layout", 3))
-    return Format((path.read_bytes(),), read, True)
-
-
 def _geojson(folder: Path) -> Format:
     house = outline(_in_degrees(rectangle(0, 0, 6, 4)), name="House", height=6)
     road = {"type": "LineString", "coordinates": _in_degrees([(-5, -8), (15, -8)])}
@@ -318,7 +309,6 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "runs of a study": _runs,
         "front.csv": _front,
         "cache entry": _loads,
-        "league result": _result,
         "GeoJSON": _geojson,
         "GeoJSON, local": _local_geojson,
         "OpenStreetMap": _osm,

@@ -14,10 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from blast_agents.league import Contest, LeagueEntry, ResultStore, standard_entries
-from blast_agents.league.entries import NoBarrier
-from blast_agents.league.report import write_league
-from blast_agents.league.tracks import known_track
 from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint
 from typer.testing import CliRunner
@@ -32,7 +28,6 @@ from blast_env.files import FolderStore, is_temporary
 from blast_env.journal import Journal
 from blast_env.layout import write_layout
 from blast_env.site import load_scenario, save_scenario
-from tests.agents.league_cases import road_scenario
 from tests.agents.training_runs import (
     hyperparameters,
     scenario_file,
@@ -116,24 +111,6 @@ def _files(folder: Path) -> dict[str, bytes]:
     }
 
 
-def _league(folder: Path) -> None:
-    track = known_track(road_scenario(), 2, 2)
-    entries = (
-        *standard_entries([road_scenario()], ["random"], [4]),
-        LeagueEntry(NoBarrier("nothing")),
-    )
-    contest = Contest(track, entries, ResultStore(folder / "results"))
-    write_league([contest.play()], folder, "command")
-
-
-def _league_outcome(folder: Path) -> Any:
-    store = FolderStore(folder / "results", ".result")
-    kept = [
-        (key, re.sub(rb'"(seconds|cpu_s)":[^,}]*', b"", content)) for key, content in store.items()
-    ]
-    return kept, _left(store.folder), _left(folder)
-
-
 def _study(folder: Path) -> None:
     FreeFieldStudy(load_scenario("free_field"), (10.0, 12.0), (0, 1), "event").run(
         store=folder / "runs.jsonl"
@@ -198,7 +175,6 @@ JOBS: Final = {
     "train": Job(_train, _training_outcome),
     "search": Job(_search, _files),
     "evaluate": Job(_evaluate, _files),
-    "league": Job(_league, _league_outcome),
     "calibrate": Job(_study, _study_outcome),
     "report": Job(_report, _report_outcome),
     "app": Job(_page, _page_outcome),

@@ -18,6 +18,7 @@ from blast_env.benchmark import (
     judge,
     make,
     shipped_standings,
+    site_problems,
     standings_page,
     standings_tables,
     stored_references,
@@ -166,12 +167,42 @@ def far(_problem: BenchmarkProblem, _seed: int) -> Layout:
 
 def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> None:
     """Else a second method would enter the standings with the layouts of the first."""
-    command = JudgeCommand(out=tmp_path, budget=(0,))
+    command = JudgeCommand(out=tmp_path)
     found = [
-        command._played(f"{__name__}:{name}", {NAME: DEFINITIONS[NAME]}).runs[0].layout
-        for name in ("near", "far", "near")
+        command._played(method.__name__, method, (0,), {NAME: DEFINITIONS[NAME]}).runs[0].layout
+        for method in (near, far, near)
     ]
     assert found == [wall(16), wall(12), wall(16)]
+
+
+def test_reductions_and_leads_are_over_the_problems() -> None:
+    """Shares of 0.95 and 0.9 of two problems, whose best rules leave 0.98 and 0.95."""
+    runs = (
+        JudgedRun(NAME, 0, 0, 0, wall(13), 0.95, 0.98, 0.9),
+        JudgedRun("other", 0, 0, 0, wall(12), 0.9, 0.95, 0.9),
+    )
+    both = JudgedSubmission("own", 0.5, "row 1", runs)
+    assert both.reduction(50).value == pytest.approx(0.075)
+    assert both.lead(50).value == pytest.approx(0.04)
+    assert both.lead(50).high - 0.04 == pytest.approx(12.706 * 0.01, rel=1e-4)
+    _, table, *_ = standings_tables([both])
+    assert table.rows[0][:3] == ("own", "0", "7.5 (-24.3 to 39.3)")
+
+
+@pytest.mark.parametrize(("most", "places"), [(2, 2), (16, 3)])
+def test_fixed_charges_of_ones_own_site_are_problems_once_each(most: int, places: int) -> None:
+    found = site_problems("control_room", most)
+    assert [each.place for each in found] == list(range(1, places + 1))
+    charges = [each.case.charge for each in found]
+    assert charges == [DEFINITIONS[each.name].case.charge for each in found]
+    (hidden,) = site_problems("control_room", is_hidden=True)
+    assert set(hidden.case.charges) == set(charges) or most == 2
+
+
+def test_charges_on_a_line_are_drawn_at_different_places() -> None:
+    found = site_problems("courtyard", 3)
+    assert len({each.case.charge for each in found}) == 3
+    assert len({each.case.threats[0].seed for each in found}) == 3
 
 
 def test_what_was_found_with_any_budget_is_shown() -> None:
@@ -191,7 +222,7 @@ def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(
 
 
 def test_after_ctrl_c_it_is_said_what_goes_on(tmp_path: Path) -> None:
-    entry = JudgeCommand(method="random", out=tmp_path)
+    entry = JudgeCommand(method=("random",), out=tmp_path)
     assert entry.how_to_resume().startswith("the same command resumes after the completed runs")
     assert "--cache" in replace(entry, out=None).how_to_resume()
     assert "runs" not in replace(entry, out=None).how_to_resume()

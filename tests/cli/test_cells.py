@@ -59,15 +59,6 @@ def test_training_and_its_evaluations_use_the_cells(
     assert engine.cell_m == 0.25
 
 
-def test_a_league_uses_the_cells(site: Path, tmp_path: Path, cells: set[float]) -> None:
-    given = ("--scenario", site, "--out", tmp_path / "out", "--cases", 2, "--seeds", 1)
-    options = ("--methods", "random", "--budgets", 1, "--engine", "gas", "--cell", 0.25)
-    result = run("league", *given, *options)
-    assert result.exit_code == 0, result.output
-    assert cells == {0.25}
-    assert "cells of 0.25 m" in result.stdout
-
-
 def test_growing_cells_are_those_of_every_command_that_runs_gas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,7 +75,6 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
     small = ("n_steps=4", "batch_size=4", "n_epochs=1", "evaluation_cases=2")
     settings = [text for each in small for text in ("--set", each)]
     trained: tuple[str | Path, ...] = ("--scenario", site, "--engine", "gas", *settings)
-    played = ("--scenario", site, "--engine", "gas", "--methods", "random", "--budgets", 1)
     searched = ("--scenario", site, "--engine", "gas", "--method", "random", "--budget", 1)
     commands: tuple[tuple[str | Path | float, ...], ...] = (
         ("simulate", site, "--engine", "gas"),
@@ -92,7 +82,6 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
         ("assess", site),
         ("propose", site, "--verify", "--budget", 2),
         ("train", *trained, "--run", tmp_path / "run", "--envs", 1, "--steps", 4),
-        ("league", *played, "--out", tmp_path / "league", "--cases", 2, "--seeds", 1),
     )
     for arguments in commands:
         used.clear()
@@ -102,10 +91,8 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
 
 
 def test_cells_are_for_gas_alone(site: Path, tmp_path: Path) -> None:
-    for command in (("train", "--run"), ("league", "--out")):
-        result = run(
-            *command, tmp_path / "a", "--scenario", site, "--engine", "event", "--cell", 0.25
-        )
-        assert result.exit_code == 2
-        assert "engine 'event' has no cells" in " ".join(result.stderr.split())
-        assert not (tmp_path / "a").exists()
+    folder = tmp_path / "a"
+    result = run("train", "--run", folder, "--scenario", site, "--engine", "event", "--cell", 0.25)
+    assert result.exit_code == 2
+    assert "engine 'event' has no cells" in " ".join(result.stderr.split())
+    assert not folder.exists()

@@ -28,7 +28,6 @@ COMMANDS = (
     "search",
     "bench",
     "train",
-    "league",
 )
 
 

@@ -258,7 +258,6 @@ def test_json_is_short_unless_all_is_asked_for(site: Path, layout: Path) -> None
         (("evaluate", "--layout", "LAYOUT", "--cache", "file"), "--cache file: cannot be a folder"),
         (("evaluate", "--layout", "LAYOUT", "--export", "no/a.dxf"), "there is no folder"),
         (("search", "--out", "file/a"), "--out file/a: cannot be a folder"),
-        (("league", "--out", "file"), "--out file: cannot be a folder"),
         (("train", "--run", "file/a"), "--run file/a: cannot be a folder"),
         (
             ("calibrate", "--name", "a", "--reference", "paper_ufc", "--out", "file"),
@@ -313,7 +312,7 @@ EVALUATE = ("evaluate", "--layout", "LAYOUT", "--engine", "event")
         ((*SEARCH, "--out", "a", "--cache", "c/d"), "the same command resumes with the blasts"),
         ((*EVALUATE, "--out", "a/b"), "with --cache FOLDER the blasts"),
         ((*EVALUATE, "--cache", "c"), "the same command resumes"),
-        (("league", "--out", "a", "--methods", "random"), "the same command resumes"),
+        (("judge", "--out", "a", "--method", "random"), "the same command resumes"),
         (
             ("calibrate", "--name", "a", "--reference", "paper_ufc", "--engine", "event"),
             "the same command resumes after the finished blasts",

@@ -3,9 +3,9 @@
 from typing import Any
 
 import pytest
-from blast_agents.league.entries import standard_entries
 
 from blast_env.design.posts import line_of_posts, posts_and_wall
+from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import Placement
@@ -105,8 +105,8 @@ def test_without_a_vehicle_there_is_no_line_of_posts() -> None:
         line_of_posts(load_scenario("courtyard"))
 
 
-def test_the_rules_enter_a_league_only_where_there_are_vehicles() -> None:
-    names = [entry.name for entry in standard_entries([gate_site()])]
-    assert {"line of posts", "posts and a wall"} <= set(names)
-    both = standard_entries([gate_site(), load_scenario("courtyard")])
-    assert not {"line of posts", "posts and a wall"} & {entry.name for entry in both}
+def test_the_rules_are_only_for_sites_with_vehicles() -> None:
+    posts = {"line_of_posts", "posts_and_wall"}
+    assert posts <= set(proposers(ProposerKind.RULE, suiting=[gate_site()]))
+    both = proposers(ProposerKind.RULE, suiting=[gate_site(), load_scenario("courtyard")])
+    assert not posts & set(both)

@@ -3,23 +3,33 @@
 from pathlib import Path
 from types import MappingProxyType
 
-import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
 import blast_env
 from blast_env import save_scenario
 from blast_env.app import offers
+from blast_env.benchmark import JudgedSubmission, make, play
+from blast_env.benchmark.methods import find_method
 from blast_env.cli import app
 from blast_env.cli.evaluate import EvaluateCommand
 from blast_env.cli.search import SearchCommand
 from blast_env.design.proposal import problem_of
-from blast_env.design.search import ProposerKind, layouts_by_rule, registry
+from blast_env.design.rules import random_layout
+from blast_env.design.search import (
+    LayoutProblem,
+    ProposerKind,
+    Report,
+    SearchResult,
+    layouts_by_rule,
+    registry,
+)
 from blast_env.design.search.registry import ProposerRow
 from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError
 from blast_env.site.scene import Charge
-from tests.agents.league_cases import road_scenario
+from blast_env.values import generator
+from tests.benchmark.row import RowEngine
 from tests.design.corner import fill_from_the_corner
 from tests.design.search_cases import small_scenario
 from tests.design.test_surrogate import YARD, by_hand
@@ -86,13 +96,16 @@ def test_the_rule_is_among_those_that_a_proposal_is_chosen_from_and_held_against
     assert ruled.count("(cells)") == 2  # beside the load and its reduction
 
 
-def test_both_enter_a_league(tmp_path: Path) -> None:
-    save_scenario(road_scenario(), tmp_path / "road.toml")
-    few = ("--cases", 1, "--seeds", 1, "--budgets", 4, "--methods", "one_after_another")
-    run("league", *few, "--scenario", tmp_path / "road.toml", "--out", tmp_path / "out")
-    summary = pd.read_csv(tmp_path / "out" / "known_road_summary.csv").set_index("entry")
-    assert summary.loc["from the corner", "is_rule"]
-    assert summary.loc["one_after_another, 4 blasts", "blasts"] == 4
+def test_both_are_methods_of_the_benchmark(tmp_path: Path) -> None:
+    save_scenario(hut(), tmp_path / "hut.toml")
+    few = ("--method", "rules", "--method", "one_after_another", "--budget", 2, "--cell", 0.5)
+    run("judge", *few, "--scenario", tmp_path / "hut.toml", "--out", tmp_path / "out")
+    rule, search = (
+        JudgedSubmission.load(tmp_path / "out" / f"judged_{name}.json").runs[0]
+        for name in ("corner", "one_after_another")
+    )
+    assert (rule.problem, rule.blasts, search.blasts) == ("hut-told-v2", 0, 2)
+    assert min(rule.share, search.share) >= rule.best
 
 
 def test_the_page_offers_both() -> None:
@@ -138,71 +151,49 @@ def test_something_must_have_learnt() -> None:
         LearntSearch()
 
 
-OPTIMISER = """
-from blast_env.design.rules import random_layout
-from blast_env.design.search import SearchResult
-from blast_env.values import generator
-
 class Own:
+    """Takes the first of some random layouts, or breaks a rule."""
+
     name = "own"
 
-    def propose(self, problem, budget, seed=0, report=None):
+    def __init__(self, layouts: int = 1, illegal: bool = False) -> None:
+        self.layouts, self.illegal = layouts, illegal
+
+    def propose(
+        self,
+        problem: LayoutProblem,
+        budget: int,
+        seed: int = 0,
+        report: Report | None = None,
+    ) -> SearchResult:
         rng = generator(seed)
-        count = budget // len(problem.threats)
+        count = self.layouts * budget // len(problem.threats)
         tried = [random_layout(problem.scenario, rng) for _ in range(count)]
-        return SearchResult(min(tried, key=problem.load))
+        best = min(tried, key=problem.load)
+        return SearchResult(((99, 99),) if self.illegal else best)
 
-class Greedy(Own):
-    name = "greedy for blasts"
 
-    def propose(self, problem, budget, seed=0, report=None):
-        return super().propose(problem, 2 * budget, seed)
-
-class Illegal(Own):
-    name = "illegal"
-
-    def propose(self, problem, budget, seed=0, report=None):
-        return SearchResult(((99, 99),))
-
+greedy = Own(layouts=4)
+illegal = Own(illegal=True)
 nothing = 3
-"""
-
-
-def league(folder: Path, place: str) -> Result:
-    (folder / "own_optimiser.py").write_text(OPTIMISER)
-    save_scenario(road_scenario(), folder / "road.toml")
-    few = ("--cases", 1, "--seeds", 1, "--budgets", 4, "--methods", "", "--method", place)
-    arguments = ("league", *few, "--scenario", folder / "road.toml", "--out", folder / "out")
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 @pytest.mark.parametrize(
-    ("place", "words"),
+    ("name", "words"),
     [
-        ("own_optimiser:Greedy", "greedy for blasts, 4 blasts, case 'road 0': the search asks"),
-        ("own_optimiser:Illegal", "illegal, 4 blasts, case 'road 0': "),
-        ("own_optimiser:nothing", "'own_optimiser:nothing' is no proposer: it needs a name"),
-        ("own_optimiser:Missing", "'own_optimiser:Missing' cannot be imported"),
-        ("no_such_module:Own", "'no_such_module:Own' cannot be imported"),
-        ("own", "--method is 'own', must be MODULE:OBJECT"),
+        ("greedy", "the search asks for"),
+        ("illegal", "has 2 values"),
+        ("nothing", "must be something to call"),
+        ("missing", "has no attribute 'missing'"),
     ],
 )
-def test_an_optimiser_of_ones_own_is_held_to_the_rules(
-    place: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    result = league(tmp_path, place)
-    assert result.exit_code == 2, result.output
-    assert words in " ".join(result.stderr.split())
+def test_an_optimiser_of_ones_own_is_held_to_the_rules(name: str, words: str) -> None:
+    problem = make("control_room-told-v2", 2, engine=RowEngine())
+    with pytest.raises(BlastEnvError, match=words):
+        play(find_method(f"{__name__}:{name}"), [(lambda _: problem, 2, 0)])
 
 
-def test_an_optimiser_of_ones_own_enters_a_league(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    result = league(tmp_path, "own_optimiser:Own")
-    assert result.exit_code == 0, result.output
-    summary = pd.read_csv(tmp_path / "out" / "known_road_summary.csv").set_index("entry")
-    assert summary["blasts"].to_dict()["own, 4 blasts"] == 4
+def test_an_optimiser_of_ones_own_enters_as_an_object_or_a_class() -> None:
+    problem = make("control_room-told-v2", 2, engine=RowEngine())
+    (found,) = play(find_method(f"{__name__}:Own"), [(lambda _: problem, 2, 0)])
+    assert found.blasts == 2

@@ -53,7 +53,6 @@ _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
 
 GIVEN: Final = (
     Given(("docs/start.md",), "depot.toml", "docs/data/depot.toml"),
-    Given(("docs/researchers/league.md",), "own_optimiser.py", "docs/data/own_optimiser.py"),
     Given(
         ("docs/howto/pictures.md", "docs/engineers/gas.md", "docs/howto/cluster.md"),
         "wall.json",
@@ -70,23 +69,10 @@ GIVEN: Final = (
     Given(("docs/howto/report.md",), "layout.json", "wall/layout.json", _SITE),
     Given(("docs/engineers/gas.md",), "my_site.toml", "scenarios/courtyard.toml"),
     Given(
-        ("docs/howto/app.md", "docs/researchers/league.md"),
+        ("docs/howto/app.md", "docs/researchers/benchmark.md"),
         "runs/courtyard",
         "agent",
         _AGENT,
-    ),
-    Given(
-        ("docs/researchers/league.md",),
-        "runs/perimeter_gate",
-        "agent",
-        f"blast-env train --scenario perimeter_gate --run agent {_TRAIN}",
-    ),
-    Given(
-        ("docs/researchers/league.md",),
-        "runs/own_best",
-        "agent",
-        "blast-env train --algo self_labelling --engine gas --scenario courtyard"
-        f" --run agent {_LABEL}",
     ),
 )
 
@@ -106,7 +92,6 @@ BACKGROUND: Final = {
 
 _CLUSTER: Final = "--cluster dask.json"
 
-_LEAGUE: Final = "--cases 1 --seeds 1 --budgets 4 --methods random"
 
 SMALLER: Final[dict[str, str]] = {
     # README.md
@@ -188,16 +173,11 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env judge --method genetic --budget 50 --seeds 10 --out entry": (
         "--problem visitor_entrance-told_2-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
-    "blast-env judge entry/submission.json --out entry": "--cell 0.5",
+    "blast-env judge --scenario courtyard --cases 8 --method rules --method best_rule"
+    " --run runs/courtyard --out out/entry": "--cases 1 --budget 2 --cell 0.5",
+    "blast-env judge entry/genetic.json --out entry": "--cell 0.5",
     # docs/paper
     # docs/researchers
-    "blast-env league --track known --run runs/courtyard --run runs/perimeter_gate --processes 2"
-    " --out out/league": _LEAGUE,
-    "blast-env league --track all --cases 16 --seeds 16 --budgets 50,200,1000 --out out/league": (
-        _LEAGUE
-    ),
-    "blast-env league --engine gas --first-engine event --agent-search 50 --run runs/own_best"
-    " --out out/gas": f"{_LEAGUE} --agent-search 3 --scenario courtyard",
     "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
     " --envs 1 --steps 300 --set cases=1 --set cases_per_round=1 --set samples=4"
     " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=300"
@@ -210,8 +190,6 @@ SMALLER: Final[dict[str, str]] = {
     " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
     " --set evaluation_cases=2 --run out/hotel_ppo": _TRAIN,
-    "blast-env league --budgets 50 --methods random,genetic --method own_optimiser:Descent"
-    " --scenario courtyard --out out/own": f"{_LEAGUE} --methods random",
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5,12 --out out/search": (
         "--budget 8 --held-out 1"
     ),

@@ -38,7 +38,6 @@ PUBLIC = (
     "blast_env.design.proposal",
     "blast_env.design.search",
     "blast_agents.training",
-    "blast_agents.league",
 )
 GIVEN_BY_THE_CALLER = {
     "Observable",  # what an observation is given

@@ -11,12 +11,10 @@ from blast_env.design.search.problem import (
     LayoutAgent,
     LayoutProblem,
     Progress,
-    Proposal,
     Proposer,
     Report,
     SamplingAgent,
     SearchResult,
-    timed_proposal,
 )
 from blast_env.design.search.registry import (
     Need,
@@ -41,7 +39,6 @@ __all__ = [
     "Plan",
     "PopulationAnnealingSearch",
     "Progress",
-    "Proposal",
     "Proposer",
     "ProposerKind",
     "RandomSearch",
@@ -54,5 +51,4 @@ __all__ = [
     "find_proposer",
     "layouts_by_rule",
     "proposers",
-    "timed_proposal",
 ]

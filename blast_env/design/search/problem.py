@@ -3,11 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from time import perf_counter, process_time
-from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from pydantic import ConfigDict, Field
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastMeter, Case, Threat
@@ -306,32 +304,3 @@ class SamplingAgent(LayoutAgent, Protocol):
         self, scenario: Scenario, charge: AnyCharge | None = None, count: int = 8, seed: int = 0, /
     ) -> Sequence[Layout]:
         """Return `count` random layouts; some may be equal."""
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A proposed layout with the time and blasts spent on it, as a league stores it.
-
-    Attributes:
-        layout: Its cells or pieces.
-        seconds: Wall time of the proposal, in s.
-        blasts: Blasts spent on it, of the judging engine.
-        other_blasts: Blasts spent on it, of other engines that the method uses.
-        cpu_s: Processor time of this process, in s.
-    """
-
-    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-    layout: Layout
-    seconds: Annotated[float, Field(ge=0.0)]
-    blasts: Annotated[int, Field(ge=0)] = 0
-    other_blasts: Annotated[int, Field(ge=0)] = 0
-    cpu_s: Annotated[float, Field(ge=0.0)] = 0.0
-
-
-def timed_proposal(propose: Callable[[], Layout]) -> Proposal:
-    """Return a layout that needs no blast, with the time of its computation."""
-    began_s, began_cpu_s = perf_counter(), process_time()
-    layout = propose()
-    seconds, cpu_s = perf_counter() - began_s, process_time() - began_cpu_s
-    return Proposal(layout, seconds, cpu_s=cpu_s)
