@@ -1,19 +1,25 @@
 """The proposals of the package for a site: `blast_env.propose` and `blast_env.search`."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
+from blast_env.calibration import kingery_bulmash
 from blast_env.design.search.problem import LayoutProblem, Proposer, Report, SearchResult
 from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.envs.episode import find_realisations
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
 from blast_env.site.scene import Charge
+from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import reductions
 
 if TYPE_CHECKING:  # half a second to import
@@ -66,11 +72,29 @@ class Chosen:
         gain = reductions(*guesses.loads([layout, ()])).item()
         if not gain >= LEAST_GAIN:  # NaN: nothing arrives
             by = (
-                f"{by}: no layout has an expected reduction of {100.0 * LEAST_GAIN:g} %, "
-                f"the best one {100.0 * gain:.1f} %"
+                f"{by}: barriers bring little here, an expected reduction of {100.0 * gain:.1f} % "
+                f"at best (proposed from {100.0 * LEAST_GAIN:g} %); {_what_helps(problem)}"
             )
             layout, gain = (), 0.0
         return replace(result, method=PackageProposer.name, by=by, layout=layout, gain=gain)
+
+
+def _what_helps(problem: LayoutProblem) -> str:
+    """Return the stand-off that would halve the largest impulse, and the way to other help."""
+    structures = problem.scenario.structures
+    charges = [each.charge_against(problem.scenario, ()) for each in problem.threats]
+    scale = {each: float(np.cbrt(each.tnt_kg)) for each in charges}
+    now_m = {each: max(stand_off_m(structures, each.position_m), scale[each]) for each in charges}
+    worst = min(charges, key=lambda each: now_m[each] / scale[each])
+    further = np.linspace(1.0, 4.0, 301)
+    with suppress(BlastEnvError):  # beyond the range of the curves
+        impulse = kingery_bulmash("reflected_impulse", now_m[worst] * further, worst.tnt_kg)
+        half_m = now_m[worst] * further[int(np.argmax(impulse <= 0.5 * impulse[0]))]
+        return (
+            f"half the impulse takes a stand-off of {half_m:.0f} m instead of {now_m[worst]:.0f} m "
+            f"({worst.tnt_kg:g} kg, by Kingery and Bulmash); for glass see screen and advise"
+        )
+    return "for stand-off and glass see screen and advise"
 
 
 def _guesses(problem: LayoutProblem) -> "Guesses":
