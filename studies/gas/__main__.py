@@ -356,7 +356,7 @@ def judge(
         layouts += [random_layout(chosen, rng) for _ in range(random_layouts)]
         with progress_bar(f"gas blasts in {chosen.name}") as progress:
             found = judgement(chosen, layouts, drawn, seeds, processes, progress)
-    headers = ("preset", "mean (gas)", "overstated", "rank correlation", "by charge", "regret")
+    headers = ("preset", "mean (gas)", "overstated", "rank correlation", "regret")
     rows = [(preset, *_judgement_row(each)) for preset, each in found.items()]
     print_line(markdown_table(headers, rows))
 
@@ -367,7 +367,6 @@ def _judgement_row(found: Judgement) -> tuple[str, ...]:
         f"{100.0 * particle:.1f} % ({100.0 * gas:.1f} %)",
         f"{found.overstatement:.1f} times",
         f"{found.all_pairs:.2f}",
-        ", ".join(f"{each:.2f}" for each in found.rank_correlations),
         f"{100.0 * found.regret.value:.1f} points",
     )
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Final
 
@@ -37,12 +36,6 @@ class Judgement:
 
     particle: FloatArray
     gas: FloatArray
-
-    @cached_property
-    def rank_correlations(self) -> FloatArray:
-        """Rank correlation of the two reductions for each charge (charges,)."""
-        pairs = zip(self.particle.T, self.gas.T, strict=True)
-        return np.array([spearmanr(*pair).statistic for pair in pairs])
 
     @property
     def all_pairs(self) -> float:

@@ -146,7 +146,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.sure scaling": "guard_post",
     "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
     "python -m studies.gas corners": "--sizes 0.5",
-    "python -m studies.gas judge --random-layouts 18 --charges 2": (
+    "python -m studies.gas judge --random-layouts 18 --charges 1": (
         "--random-layouts 1 --charges 1 --seeds 1"
     ),
     "python -m studies.gas definition": "--scenario control_room --until 0.05",

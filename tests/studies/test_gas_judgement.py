@@ -11,7 +11,6 @@ def test_order_overstatement_and_regret() -> None:
     particle = np.array([[0.2, 0.8], [0.4, 0.6], [0.6, 0.4], [0.8, 0.2]])
     gas = np.array([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3], [0.4, 0.4]])
     found = Judgement(particle, gas)
-    assert found.rank_correlations == pytest.approx([1.0, -1.0])
     assert found.means == pytest.approx((0.5, 0.25))
     assert found.overstatement == pytest.approx(2.0)
     assert found.regret.value == pytest.approx(0.5 * (0.0 + 0.3))

@@ -42,8 +42,8 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
 _PROGRESS_CALLS: Final = 200
 
 PARTICLES_OVERRATE: Final = (
-    "The particle model overrates barriers: on 'courtyard' it predicted 5.1 times the reduction of"
-    " gas dynamics, with a rank correlation of 0.61 (docs/engineers/validity.md). Use engine"
+    "The particle model overrates barriers: on 'courtyard' it predicted 4.0 times the reduction of"
+    " gas dynamics, with a rank correlation of 0.56 (docs/engineers/validity.md). Use engine"
     " 'gas' for decisions."
 )
 """Caveat of every evaluation with particles; measured by `python -m studies.gas judge`."""
