@@ -258,7 +258,6 @@ CODE_OF_THE_BUILD: Final = {
 """Pages whose code `make docs` runs and `make test` compiles only, and why."""
 
 CODE_NOT_RUN: Final = {
-    ("docs/researchers/benchmark.md", 3): "needs Optuna, which the project does not have",
     ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
