@@ -26,6 +26,7 @@ from blast_env.response.glass import (
     drawn_conditions,
     glazing_responses,
 )
+from blast_env.response.sdof import impulses
 from blast_env.response.walls import DamageLevel, Panel, PanelResponses, panel_responses
 
 STOREY_M = 3.5
@@ -428,7 +429,9 @@ def respond(
 
     The suction that follows a blast can reduce the deflection inwards. To be conservative, each
     component is computed with and without suction, and the worse response counts. This agrees with
-    the practice of neglecting the negative phase unless it worsens the rebound.
+    the practice of neglecting the negative phase unless it worsens the rebound. Without suction, a
+    history ends at the maximum of its impulse: the positive phases of later echoes would add up for
+    as long as the run lasts.
 
     Args:
         bays: The bays.
@@ -446,7 +449,7 @@ def respond(
     walled = [index for index, each in enumerate(bays) if each.wall is not None]
     panes = _panes(bays)
     panels = _panels(bays)
-    pushed_pa = np.maximum(pressure_pa, 0.0)
+    pushed_pa = _pushes(time_s, pressure_pa)
     return FacadeResponse(
         bays=tuple(bays),
         time_s=time_s,
@@ -505,6 +508,13 @@ def drawn_levels(
     panel = _panel(filled.wall, filled.bay.height_m)
     damage = panel.drawn_damage(*history, (*loads, draws.resistance))
     return np.asarray(4 - np.minimum(damage, 4.0).astype(np.int64))
+
+
+def _pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
+    """Return the histories without suction, until the maximum of each one's impulse."""
+    last = impulses(time_s, pressure_pa).argmax(axis=-1)
+    counts = np.arange(len(time_s)) <= last[:, np.newaxis]
+    return np.where(counts, np.maximum(pressure_pa, 0.0), 0.0)
 
 
 def _panes(bays: Sequence[FilledBay]) -> list[Pane]:

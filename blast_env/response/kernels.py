@@ -139,7 +139,7 @@ def bend(
     """Integrate the bending of an unbroken pane, and find its breakage.
 
     Writes to `out` the largest deflection and the share of panes that break, then the time, the
-    deflection, the speed and the remaining positive impulse at breakage. Slopes are those of the
+    deflection, the speed and the largest impulse still to come at breakage. Slopes are those of the
     segments before the points; the damage to the power `exponent` is the risk B. The pane breaks at
     the risk `strength`; if that is 0, as the median of the panes that break.
     """
@@ -174,11 +174,12 @@ def bend(
         after = np.searchsorted(time_s, break_s, side="right")
         gone = (break_s - time_s[after - 1]) / (time_s[after] - time_s[after - 1])
         there = pressure_pa[after - 1] + gone * (pressure_pa[after] - pressure_pa[after - 1])
-        rest = max(there, 0.0) + max(pressure_pa[after], 0.0)
-        left = 0.5 * rest * (time_s[after] - break_s)
+        come = 0.5 * (there + pressure_pa[after]) * (time_s[after] - break_s)
+        left = max(come, 0.0)
         for upper in range(after + 1, len(time_s)):
-            rest = max(pressure_pa[upper - 1], 0.0) + max(pressure_pa[upper], 0.0)
-            left += 0.5 * rest * (time_s[upper] - time_s[upper - 1])
+            rest = pressure_pa[upper - 1] + pressure_pa[upper]
+            come += 0.5 * rest * (time_s[upper] - time_s[upper - 1])
+            left = max(left, come)
     out[0], out[1], out[2] = peak, share, break_s
     out[3], out[4], out[5] = track[1, broken], track[2, broken], left
 
