@@ -14,8 +14,8 @@ with the resistance of the bent pane as q:
 The resistance of heat-treated glass is larger by its glass type factor. Both panes of double
 glazing bend as one: the air between them cannot escape in the milliseconds of a blast.
 
-The fragments of a broken pane fly with its speed at breakage and the largest impulse to come, and fall
-freely from its middle, without drag. The place of their impact determines the performance
+The fragments of a broken pane fly with its speed at breakage and the largest impulse to come, and
+fall freely from its middle, without drag. The place of their impact determines the performance
 condition (GSA, Facilities Standards P100, table 8-1). The interlayer of laminated glass retains the
 fragments, as a stretched membrane, until it tears.
 """

@@ -144,7 +144,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.response_sites": "clinic_front",
     "python -m studies.sure draws": "guard_post",
     "python -m studies.sure scaling": "guard_post",
-    "python -m studies.gas kingery-bulmash": "--charges 20 --distances 4.3 --peak-cells 0.5",
+    "python -m studies.gas kingery-bulmash --charges 100": "--charges 20 --distances 4.3",
     "python -m studies.gas corners": "--sizes 0.5",
     "python -m studies.gas judge --random-layouts 18 --charges 1": (
         "--random-layouts 1 --charges 1 --seeds 1"
