@@ -259,18 +259,6 @@ def print_rules(results: Sequence[MeasuredSite]) -> None:
 
 def print_agreement(results: Sequence[MeasuredSite]) -> None:
     """Print the agreement between lines of sight and blasts."""
-    cut = np.array([each.cut for each in results])
-    reduction = np.array([each.reduction for each in results])
-    within = [np.corrcoef(*pair)[0, 1] for pair in zip(cut[:, 1:], reduction[:, 1:], strict=True)]
-    random_share = np.array([each.shares.random_share for each in results])
-    measured_random = reduction[:, 1:].mean(axis=1)
-    print_line(
-        "correlation of the share of lines of sight cut with the reduction:"
-        f" {np.corrcoef(cut.ravel(), reduction.ravel())[0, 1]:.2f} over all layouts,"
-        f" {np.median(within):.2f} among a site's random layouts (median);"
-        f" {np.corrcoef(cut[:, 0], reduction[:, 0])[0, 1]:.2f} over visibility layouts,"
-        f" {np.corrcoef(random_share, measured_random)[0, 1]:.2f} over the means of random ones"
-    )
     faults = ("", *dict.fromkeys(each.fault for each in results if each.fault))
     print_row("by lines of sight", *(fault or "worth solving by blasts" for fault in faults))
     print_line("|---" * (1 + len(faults)) + "|")

@@ -15,7 +15,6 @@ from scipy.integrate import solve_ivp
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import print_line, progress_bar, user_errors
-from blast_env.evaluation.consequences import side_on_impulse_pa_s, side_on_peak_pa
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.facade import (
@@ -141,21 +140,6 @@ def ductilities() -> Iterator[Row]:
     load = np.full((1, 2), 0.8 * cap)
     own = float(responses([system], np.array([0.0, 60.0 * system.period_s]), load).peak_m[0])
     yield "sudden load of 0.8 of the resistance that stays, by work", "2.50", f"{own / yield_m:.2f}"
-
-
-def side_on_values() -> Iterator[Row]:
-    """Yield one row per scaled distance: side-on values from reflected ones, over KB's values."""
-    for scaled in (3.0, 5.0, 7.0, 10.0, 15.0, 20.0):
-        peak, reflected, impulse, reflected_i = (
-            float(kingery_bulmash(quantity, scaled, 1.0, "hemispherical"))
-            for quantity in (
-                *("incident_overpressure", "reflected_overpressure"),
-                *("incident_impulse", "reflected_impulse"),
-            )
-        )
-        of_peak = side_on_peak_pa(np.array([reflected])).item() / peak
-        of_impulse = side_on_impulse_pa_s(np.array([reflected_i])).item() / impulse
-        yield f"{scaled:g}", f"{of_peak:.3f}", f"{of_impulse:.3f}"
 
 
 BEAM_LOAD: Final = (
@@ -343,8 +327,6 @@ def tables() -> None:
     print_line("\n" + markdown_table(charts, ductilities()))
     peaks = ("annealed pane, 60 Pa s", "break, 8 kPa", "break, 4 kPa")
     print_line("\n" + markdown_table(peaks, halved_peaks()))
-    side_on = ("m/kg^(1/3)", "side-on peak over the curve", "side-on impulse over the curve")
-    print_line("\n" + markdown_table(side_on, side_on_values()))
     beam = ("steel under the face", "strength over the static one", "deflection, mm")
     print_line("\n" + markdown_table((*beam, "over the test", "at, ms"), beam_rows()))
 

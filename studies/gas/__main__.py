@@ -34,8 +34,6 @@ from studies.gas.reference import free_field, wide_wall
 
 CELLS_M: Final = {20.0: 0.25, 100.0: 0.5, 1000.0: 0.5}
 """Side of the cells in comparisons with Kingery and Bulmash, by the mass of the charge in kg."""
-PEAK_CHARGE_KG: Final = 100.0
-PEAK_DISTANCE_M: Final = 12.5
 YARD: Final = "yard"
 
 Cell = Annotated[float, typer.Option(help="Side of a cell, m.")]
@@ -57,14 +55,10 @@ def kingery_bulmash(
     distances: Annotated[
         str, typer.Option(help="m/kg^(1/3), separated by commas.")
     ] = "1.7,2.15,2.7,3.45,4.3,5.4,8.6",
-    peak_cells: Annotated[
-        str, typer.Option(help="m, for 100 kg at 12.5 m; empty: leave that table out.")
-    ] = "1,0.5,0.25",
 ) -> None:
     """Compare the waves of charges on the ground with Kingery and Bulmash.
 
-    Peak specific impulses, arrivals and peaks over the curves; then the reflected impulse and peak
-    by the size of the cells.
+    Peak specific impulses, arrivals and peaks over the curves.
     """
     headers = ("charge (kg)", "cell (m)", "", "Z (m/kg^(1/3))", "impulse", "arrival", "peak")
     wanted, rows = _numbers(distances), []
@@ -79,14 +73,6 @@ def kingery_bulmash(
                     start = (f"{charge_kg:g}", f"{cell_m:g}", name, f"{ratio.z_m_kg:.2f}")
                     rows.append((*start, *(f"{value:.3f}" for value in values)))
         print_line(markdown_table(headers, rows))
-        of_sizes = []
-        for cell_m in _numbers(peak_cells):
-            ratio = wide_wall(PEAK_CHARGE_KG, PEAK_DISTANCE_M, cell_m)
-            cells = f"{cbrt(PEAK_CHARGE_KG) / cell_m:.1f}"
-            of_sizes.append((f"{cell_m:g}", cells, f"{ratio.impulse:.3f}", f"{ratio.peak:.3f}"))
-        if of_sizes:
-            columns = ("cell (m)", "cells per kg^(1/3)", "reflected impulse", "reflected peak")
-            print_line("\n" + markdown_table(columns, of_sizes))
 
 
 def _rule_layouts(scenario: Scenario) -> dict[str, Layout]:

@@ -205,7 +205,7 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.check_sites --sites 16 --random-layouts 12 --threats 4": (
         "--sites 2 --random-layouts 2 --threats 1"
     ),
-    "python -m studies.check_sites --family item_sites --random-layouts 3 --threats 1"
+    "python -m studies.check_sites --family item_sites --sites 12 --random-layouts 3 --threats 1"
     " --no-rejected --picture docs/pictures/item_sites.png": "--sites 2 --random-layouts 2",
     # docs/studies
     "blast-env bench --engine gas --processes 1 --no-environment --repeats 3"
