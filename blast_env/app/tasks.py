@@ -25,7 +25,7 @@ from blast_env.app.work import (
     write_status,
 )
 from blast_env.design.proposal import chosen_proposer
-from blast_env.design.search import LayoutProblem, Progress, find_proposer
+from blast_env.design.search import DesignProblem, Progress, find_proposer
 from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
 from blast_env.evaluation.engines import JUDGE
 from blast_env.geometry import Layout
@@ -117,7 +117,7 @@ def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[L
     if task.proposer != PACKAGED:
         return proposed(task.proposer, scenario, known), ""
     case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
-    problem = LayoutProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
+    problem = DesignProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
     report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
     found = chosen_proposer().propose(problem, report=report)
     return found.layout, found.expectation if found.layout else found.by
@@ -128,7 +128,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
     begin_with = placing.layout_from(scenario, task.begin_with)
     method = find_proposer(task.method, (begin_with,) if begin_with else ())
     engine = task.engine.found
-    problem = LayoutProblem(
+    problem = DesignProblem(
         BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
     )
     teller.tell(text="blasts without a barrier")

@@ -14,7 +14,6 @@ from blast_env.benchmark import (
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import engine_key
 from blast_env.design.search import (
-    LayoutProblem,
     Proposer,
     ProposerKind,
     find_proposer,
@@ -29,8 +28,7 @@ from blast_env.geometry import Layout
 
 def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
     """Return the layout of a proposer, within the budget of a problem."""
-    asked = LayoutProblem(problem.evaluator, problem.case, meter=problem.meter)
-    result = proposer.propose(asked, problem.budget, seed)
+    result = proposer.propose(problem, problem.most_blasts, seed)
     if result.interrupted:
         raise KeyboardInterrupt
     return result.layout

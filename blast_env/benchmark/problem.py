@@ -10,11 +10,11 @@ import numpy as np
 from blast_env.benchmark.definitions import BUDGETS, SEEDS, Definition, find_definition
 from blast_env.benchmark.references import ScoreReference, stored_references
 from blast_env.benchmark.space import LayoutSpace
+from blast_env.design.search import DesignProblem
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastCache,
     BlastEvaluator,
-    BlastMeter,
     BudgetError,
     Case,
     Threat,
@@ -22,7 +22,6 @@ from blast_env.evaluation import (
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
-from blast_env.site import Scenario
 from blast_env.values import whole_number
 
 
@@ -43,32 +42,25 @@ class Evaluated:
     blasts: int
 
 
-@dataclass(eq=False)
-class BenchmarkProblem:
+@dataclass(eq=False, kw_only=True)
+class BenchmarkProblem(DesignProblem):
     """A problem of the benchmark with a budget of gas blasts; see `make`.
+
+    A cached blast takes no time, but counts all the same. Methods may use the whole `case`, with
+    its charges.
 
     Attributes:
         definition: Definition of the problem.
-        budget: Most blasts of `evaluate`.
-        engine: Engine of the blasts.
-        cache: Folder or cache of blasts; a cached blast takes no time, but counts all the same.
-        meter: Counts the blasts: distinct pairs of layout and threat.
         history: Every evaluated layout, in order.
-
-    Raises:
-        BlastEnvError: If the budget is no whole number from 0 to the largest of `BUDGETS`.
     """
 
     definition: Definition
-    budget: int
-    engine: Engine
-    cache: str | Path | BlastCache | None = None
-    meter: BlastMeter = field(init=False)
     history: list[Evaluated] = field(default_factory=list, init=False)
 
-    def __post_init__(self) -> None:
-        whole_number("budget", self.budget, 0, BUDGETS[-1])
-        self.meter = BlastMeter(self.budget)
+    @property
+    def most_blasts(self) -> int:
+        """The budget, which a problem of the benchmark always has."""
+        return self.budget or 0
 
     @property
     def name(self) -> str:
@@ -91,18 +83,6 @@ class BenchmarkProblem:
         return range(SEEDS)
 
     @property
-    def scenario(self) -> Scenario:
-        """The site."""
-        return self.definition.scenario
-
-    @property
-    def case(self) -> Case:
-        """The case of `evaluate`; methods may use all of it, including the charges."""
-        practice = self.definition.case.practice
-        assert practice is not None
-        return practice
-
-    @property
     def reference(self) -> ScoreReference | None:
         """The best rule and the best known layout; `None` for a site of `secret_sites`."""
         return stored_references().get(self.name)
@@ -112,21 +92,10 @@ class BenchmarkProblem:
         """The layouts as vectors."""
         return LayoutSpace(self.scenario)
 
-    @cached_property
-    def evaluator(self) -> BlastEvaluator:
-        """The evaluator, which runs and caches the blasts."""
-        most = self.budget + len(self.case.threats)
-        return BlastEvaluator(self.scenario, self.engine, cache_size=most, cache=self.cache)
-
-    @property
-    def blasts(self) -> int:
-        """Blasts spent."""
-        return self.meter.blasts
-
     @property
     def blasts_left(self) -> int:
         """Blasts that remain in the budget."""
-        return self.budget - self.meter.blasts
+        return self.most_blasts - self.blasts
 
     @property
     def best(self) -> Evaluated | None:
@@ -170,7 +139,7 @@ class BenchmarkProblem:
             (checked, threat) for threat in self.case.threats[:count]
         ]
         try:
-            self.meter.add(pairs)
+            self.spend(pairs)
         except BudgetError:
             raise BudgetError(
                 f"{self.name}: {count} blasts asked for, {self.blasts_left} of the budget of "
@@ -251,4 +220,10 @@ def make(
             f"{definition.name}: the site or its charges have changed (digest {definition.digest}, "
             f"must be {known.digest}): a version never changes its content"
         )
-    return BenchmarkProblem(definition, budget, find_engine(engine, cell_m), cache)
+    practice = definition.case.practice
+    assert practice is not None
+    whole_number("budget", budget, 0, BUDGETS[-1])
+    most = budget + len(practice.threats)
+    found = find_engine(engine, cell_m)
+    evaluator = BlastEvaluator(definition.scenario, found, cache_size=most, cache=cache)
+    return BenchmarkProblem(evaluator, practice, budget=budget, definition=definition)

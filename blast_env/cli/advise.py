@@ -19,7 +19,7 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import ResultTable, print_cost, print_line, progress_bar, result_console
 from blast_env.cli.targets import PICTURES
-from blast_env.design.search import LayoutProblem
+from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import (
     MARGIN,
     Advice,
@@ -114,7 +114,7 @@ class AdviseCommand(ChargeOptions):
         threats = one_of_each_charge(fixed)
         engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
         judge = final_engine(JUDGE, [scenario], self.judge_cell_m, cells=self.judge_cells)
-        problem = LayoutProblem(
+        problem = DesignProblem(
             BlastEvaluator(scenario, engine), Case(scenario, threats), self.processes
         )
         if self.budget < len(threats):
@@ -246,7 +246,7 @@ class AdviseCommand(ChargeOptions):
 
 
 def _error(
-    problem: LayoutProblem, layout: Layout, judged: dict[Layout, Consequences], judge: Engine
+    problem: DesignProblem, layout: Layout, judged: dict[Layout, Consequences], judge: Engine
 ) -> GridError | None:
     """Return the error of the cells for a judged layout; the search's blasts serve it if they can.
 

@@ -30,7 +30,7 @@ from blast_env.cli.output import (
 )
 from blast_env.design.proposal import Chosen, chosen_proposer, problem_of
 from blast_env.design.rules import expected_charge
-from blast_env.design.search import LayoutProblem, Progress, SearchResult, layouts_by_rule
+from blast_env.design.search import DesignProblem, Progress, SearchResult, layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Comparison
 from blast_env.evaluation.engines import JUDGE, find_engine
@@ -108,7 +108,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
             )
         return charge
 
-    def _proposed(self, problem: LayoutProblem) -> tuple[Chosen, SearchResult]:
+    def _proposed(self, problem: DesignProblem) -> tuple[Chosen, SearchResult]:
         """Return the proposer and its proposal; print the time of one without blasts."""
         chosen = chosen_proposer()
         if self.budget is not None and not self.verify:
@@ -124,7 +124,7 @@ class ProposeCommand(ChargeOptions, ProcessOptions):
         words = "" if self.verify else " (--verify evaluates it)"
         return chosen, replace(result, by=f"{result.by}{words}, in {ms:,.0f} ms")
 
-    def _verify(self, problem: LayoutProblem, layout: Layout) -> None:
+    def _verify(self, problem: DesignProblem, layout: Layout) -> None:
         """Judge a proposal by gas dynamics beside no barrier and the rules, within the budget."""
         case, rules = problem.case, layouts_by_rule(problem.scenario, problem.told)
         layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}

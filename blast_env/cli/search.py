@@ -38,7 +38,7 @@ from blast_env.cli.output import (
     save_pictures,
 )
 from blast_env.design.search import (
-    LayoutProblem,
+    DesignProblem,
     Proposer,
     SearchResult,
     find_proposer,
@@ -175,7 +175,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
 
     def _run(self, method: Proposer, evaluator: BlastEvaluator) -> "SearchRun":
         case = self._practice(evaluator.scenario, evaluator.engine)
-        problem = LayoutProblem(evaluator, case, self.processes)
+        problem = DesignProblem(evaluator, case, self.processes)
         print_line(evaluator.engine.describe([evaluator.scenario]))
         turns = islice(cycle(case.threats), self.budget)
         print_cost((evaluator.engine, evaluator.scenario, each.charge) for each in turns)
@@ -198,7 +198,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
                 raise BlastEnvError(f"{flag} is for a visible threat: a hidden one is drawn")
         return practice_hidden(scenario, model.threats, realisations, self.seed, risk)
 
-    def _with_progress(self, method: Proposer, problem: LayoutProblem) -> SearchResult:
+    def _with_progress(self, method: Proposer, problem: DesignProblem) -> SearchResult:
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -253,7 +253,7 @@ class SearchRun:
         cache_hits: Number of its loads found in the cache.
     """
 
-    problem: LayoutProblem
+    problem: DesignProblem
     result: SearchResult
     seconds: float
     cache_hits: int
@@ -358,7 +358,7 @@ def _provenance(
     }
 
 
-def _risk_text(problem: LayoutProblem) -> str:
+def _risk_text(problem: DesignProblem) -> str:
     """Return the risk measure over the search's threats in words."""
     noun = problem.scenario.objective.noun
     words = f"{noun} of the protected structures"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.design.search.problem import LayoutProblem, Proposer, Report, SearchResult
+from blast_env.design.search.problem import DesignProblem, Proposer, Report, SearchResult
 from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.envs.episode import find_realisations
 from blast_env.errors import BlastEnvError
@@ -51,7 +51,7 @@ class Chosen:
 
     def propose(
         self,
-        problem: LayoutProblem,
+        problem: DesignProblem,
         seed: int = 0,
         report: Report | None = None,
     ) -> SearchResult:
@@ -79,7 +79,7 @@ class Chosen:
         return replace(result, method=PackageProposer.name, by=by, layout=layout, gain=gain)
 
 
-def _what_helps(problem: LayoutProblem) -> str:
+def _what_helps(problem: DesignProblem) -> str:
     """Return the stand-off that would halve the largest impulse, and the way to other help."""
     structures = problem.scenario.structures
     charges = [each.charge_against(problem.scenario, ()) for each in problem.threats]
@@ -97,7 +97,7 @@ def _what_helps(problem: LayoutProblem) -> str:
     return "for stand-off and glass see screen and advise"
 
 
-def _guesses(problem: LayoutProblem) -> "Guesses":
+def _guesses(problem: DesignProblem) -> "Guesses":
     # Imported here because the import takes half a second.
     from blast_env.design.surrogate import packaged_surrogate
     from blast_env.design.surrogate.search import Guesses, case_for
@@ -160,7 +160,7 @@ class PackageProposer:
     name: str = "package"
 
     def propose(
-        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+        self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         """Return the layout, with its source in `by`; it spends no blasts."""
         found = chosen_proposer().propose(problem, seed, report)
@@ -235,7 +235,7 @@ def search(
     else:
         realisations = find_realisations(None, "visible", evaluator.engine)
         case = practice_visible(found, charge, realisations, seed)
-    problem = LayoutProblem(evaluator, case, processes)
+    problem = DesignProblem(evaluator, case, processes)
     proposer = find_proposer(method, tuple(tuple(each) for each in initial))
     blasts = proposer_row(method).budget if budget is None else budget
     return proposer.propose(problem, blasts, seed, report)
@@ -246,7 +246,7 @@ def problem_of(
     charge: AnyCharge | None,
     processes: int = 1,
     engine: str | Engine = JUDGE,
-) -> LayoutProblem:
+) -> DesignProblem:
     """Return the problem of a proposal and its judgement: by default gas dynamics, unseen threats.
 
     A charge with a single possible place is known, whether it is given or not.
@@ -261,4 +261,4 @@ def problem_of(
     else:
         threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
         case = Case(found, one_of_each_charge(threats))
-    return LayoutProblem(BlastEvaluator(found, engine), case, processes)
+    return DesignProblem(BlastEvaluator(found, engine), case, processes)

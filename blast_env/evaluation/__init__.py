@@ -8,7 +8,7 @@ from blast_env.evaluation.comparison import (
     compare,
 )
 from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
-from blast_env.evaluation.evaluator import BlastEvaluator, BlastMeter, BudgetError, Evaluators
+from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError, Evaluators
 from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.report import (
     LayoutEvaluation,
@@ -32,7 +32,6 @@ __all__ = [
     "BlastEvaluator",
     "BlastKey",
     "BlastLoads",
-    "BlastMeter",
     "BudgetError",
     "Case",
     "Comparison",

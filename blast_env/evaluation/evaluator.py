@@ -2,7 +2,6 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -346,36 +345,3 @@ class Evaluators:
 
 class BudgetError(BlastEnvError):
     """A search requests more blasts than its budget allows."""
-
-
-@dataclass(eq=False)
-class BlastMeter:
-    """Counts distinct pairs of layout and threat, and refuses those beyond a budget.
-
-    It counts independently of the search.
-
-    Attributes:
-        budget: Maximum number of pairs.
-    """
-
-    budget: int
-    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
-
-    @property
-    def blasts(self) -> int:
-        """Number of distinct pairs requested."""
-        return len(self._asked)
-
-    def add(self, pairs: Iterable[tuple[Sequence[Element], Threat]]) -> None:
-        """Count pairs.
-
-        Raises:
-            BudgetError: If the total would exceed the budget; none is counted then.
-        """
-        asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
-        asked |= self._asked
-        if len(asked) > self.budget:
-            raise BudgetError(
-                f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
-            )
-        self._asked = asked

@@ -14,8 +14,8 @@ from blast_env.design.rules import (
     wall_near_charge,
 )
 from blast_env.design.search import (
+    DesignProblem,
     Layout,
-    LayoutProblem,
     ProposerKind,
     find_proposer,
     layouts_by_rule,
@@ -222,7 +222,7 @@ def test_individuals_and_their_children_are_layouts(name: str, seed: int) -> Non
 
 
 @pytest.fixture(scope="module")
-def problem() -> LayoutProblem:
+def problem() -> DesignProblem:
     """The yard of particles, in which a blast takes milliseconds, with few places for pieces."""
     scenario = yard(
         corner_m=(4.0, 4.5),
@@ -232,11 +232,11 @@ def problem() -> LayoutProblem:
         budget=7.0,
     ).model_copy(update={"calibration": CALIBRATION})
     case = visible_case(scenario, CHARGE, [1])
-    return LayoutProblem(BlastEvaluator(scenario, "event"), case)
+    return DesignProblem(BlastEvaluator(scenario, "event"), case)
 
 
 @pytest.mark.parametrize("method", ["random", "population_annealing", "genetic", "nsga2"])
-def test_searches_find_layouts_of_pieces(problem: LayoutProblem, method: str) -> None:
+def test_searches_find_layouts_of_pieces(problem: DesignProblem, method: str) -> None:
     result = find_proposer(method).propose(problem, 60, 0)
     assert Placement.of(problem.scenario, result.layout).layout == result.layout
     assert any(isinstance(each, Piece) and each.item == "wall" for each in result.layout)
@@ -246,7 +246,7 @@ def test_searches_find_layouts_of_pieces(problem: LayoutProblem, method: str) ->
     assert find_proposer(method).propose(problem, 60, 0).layout == result.layout
 
 
-def test_the_front_is_over_the_cost(problem: LayoutProblem) -> None:
+def test_the_front_is_over_the_cost(problem: DesignProblem) -> None:
     result = find_proposer("nsga2").propose(problem, 80, 1)
     costs = [each.cost for each in result.front]
     assert costs == sorted(set(costs))
@@ -266,12 +266,12 @@ def test_every_layout_of_pieces_is_found_once() -> None:
         items=[item("beam", 2, 1, 1.0, rotatable=False), item("post", 1, 1, 1.0)],
     ).model_copy(update={"calibration": CALIBRATION})
     case = visible_case(scenario, CHARGE, [1])
-    problem = LayoutProblem(BlastEvaluator(scenario, "event"), case)
+    problem = DesignProblem(BlastEvaluator(scenario, "event"), case)
     layouts = every_layout(problem)
     assert len(layouts) == len(set(layouts)) == 1 + 3 + 2 + 2
 
 
-def test_rules_by_name_propose_pieces(problem: LayoutProblem) -> None:
+def test_rules_by_name_propose_pieces(problem: DesignProblem) -> None:
     layout = find_proposer("ring_around_building").propose(problem, 0).layout
     assert layout == tuple(sorted(ring_around_building(problem.scenario, CHARGE)))
     layout = find_proposer("sight_lines").propose(problem, 0).layout

@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, save_scenario
 from blast_env.cli import app
-from blast_env.design.search import LayoutProblem, find_proposer
+from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.design.surrogate import packaged_surrogate, search_by
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import practice_hidden, practice_visible
@@ -51,7 +51,7 @@ def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_pa
     result = search("--method", "nsga2", "--scenario", site, *options)
     assert result.exit_code == 0, result.output
     evaluator = BlastEvaluator(load_scenario(site), "event")
-    problem = LayoutProblem(evaluator, practice_visible(evaluator.scenario, CHARGE, 2, 3))
+    problem = DesignProblem(evaluator, practice_visible(evaluator.scenario, CHARGE, 2, 3))
     expected = find_proposer("nsga2").propose(problem, 60, 3)
     assert load_layout(out / "layout.json", evaluator.scenario) == expected.layout
     assert f"{expected.blasts} of 60 blasts spent" in result.stdout
@@ -109,7 +109,7 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     assert provenance["result"]["held_out_threats"] == 0
     assert provenance["result"]["held_out_reduction"] is None
     case = practice_visible(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
-    problem = LayoutProblem(BlastEvaluator(scenario, "gas"), case)
+    problem = DesignProblem(BlastEvaluator(scenario, "gas"), case)
     expected = search_by(found).propose(problem, 1, 0)
     assert load_layout(out / "layout.json", scenario) == expected.layout != ()
 

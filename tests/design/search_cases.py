@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from blast_env import load_scenario
-from blast_env.design.search import Layout, LayoutProblem
+from blast_env.design.search import DesignProblem, Layout
 from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.cases import visible_case
@@ -36,16 +36,16 @@ def ballistic(name: str) -> Scenario:
 
 def small_problem(
     evaluator: BlastEvaluator | None = None, realisations: int = 2, processes: int = 1
-) -> LayoutProblem:
+) -> DesignProblem:
     """Return the problem of the small site's own charge: 299 layouts, 598 blasts."""
     evaluator = evaluator or BlastEvaluator(small_scenario(), "event")
     charge = evaluator.scenario.sample_charge(np.random.default_rng(0))
     seeds = np.random.default_rng(5).choice(2**31, realisations, replace=False)
     case = visible_case(evaluator.scenario, charge, seeds.tolist())
-    return LayoutProblem(evaluator, case, processes)
+    return DesignProblem(evaluator, case, processes)
 
 
-def every_layout(problem: LayoutProblem) -> list[Layout]:
+def every_layout(problem: DesignProblem) -> list[Layout]:
     """Return every legal layout, in ascending number of modules or pieces."""
     empty = Placement.empty(problem.scenario)
     actions = np.flatnonzero(empty.places(empty.usable)).tolist()

@@ -17,7 +17,7 @@ from blast_env.cli.search import SearchCommand
 from blast_env.design.proposal import problem_of
 from blast_env.design.rules import random_layout
 from blast_env.design.search import (
-    LayoutProblem,
+    DesignProblem,
     ProposerKind,
     Report,
     SearchResult,
@@ -125,11 +125,13 @@ def test_help_names_all_of_them() -> None:
 
 
 def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> None:
-    assert not {"rule ring_around_building", "search surrogate"} & set(offers.offered(hut()))
-    result = CliRunner().invoke(app, ["search", "--scenario", str(site), "--method", "surrogate"])
+    name = "ring_around_building"
+    assert f"rule {name}" not in offers.offered(hut())
+    result = CliRunner().invoke(app, ["search", "--scenario", str(site), "--method", name])
     assert result.exit_code == 2
-    assert "has no catalogue (build_zone.items): surrogate is of no use there" in " ".join(
-        result.stderr.split()
+    assert (
+        "has no catalogue (build_zone.items): ring_around_building is of no use there"
+        in " ".join(result.stderr.split())
     )
 
 
@@ -161,7 +163,7 @@ class Own:
 
     def propose(
         self,
-        problem: LayoutProblem,
+        problem: DesignProblem,
         budget: int,
         seed: int = 0,
         report: Report | None = None,

@@ -9,9 +9,9 @@ import pytest
 
 from blast_env.design.rules import wall_near_building, wall_near_charge
 from blast_env.design.search import (
+    DesignProblem,
     GeneticSearch,
     Layout,
-    LayoutProblem,
     ProposerKind,
     SearchResult,
     find_proposer,
@@ -42,19 +42,19 @@ SEEDS = range(2)
 
 
 @pytest.fixture(scope="module")
-def problem() -> LayoutProblem:
+def problem() -> DesignProblem:
     """The small problem; what one test has simulated costs the others no time."""
     return small_problem()
 
 
 @pytest.fixture(scope="module")
-def optimum(problem: LayoutProblem) -> Layout:
+def optimum(problem: DesignProblem) -> Layout:
     layouts = every_layout(problem)
     assert len(layouts) == 299
     return min(layouts, key=problem.load)
 
 
-def gap(problem: LayoutProblem, result: SearchResult, optimum: Layout) -> float:
+def gap(problem: DesignProblem, result: SearchResult, optimum: Layout) -> float:
     """Return what a result misses of the optimum, as a share of the impulse without a barrier."""
     return (problem.load(result.layout) - problem.load(optimum)) / problem.load(())
 
@@ -75,7 +75,7 @@ def gap(problem: LayoutProblem, result: SearchResult, optimum: Layout) -> float:
     ],
 )
 def test_gaps_to_the_optimum(
-    name: str, budget: int, most: float, problem: LayoutProblem, optimum: Layout
+    name: str, budget: int, most: float, problem: DesignProblem, optimum: Layout
 ) -> None:
     """Mean over seeds with a half and with a tenth of the blasts of all layouts.
 
@@ -88,14 +88,14 @@ def test_gaps_to_the_optimum(
 
 
 @pytest.mark.parametrize("name", DRAWN)
-def test_the_seed_decides_everything(name: str, problem: LayoutProblem) -> None:
+def test_the_seed_decides_everything(name: str, problem: DesignProblem) -> None:
     method = find_proposer(name)
     assert method.propose(problem, 20, 3) == method.propose(problem, 20, 3)
     histories = {method.propose(problem, 20, seed).history for seed in range(4)}
     assert len(histories) > 1
 
 
-def test_the_number_of_processes_changes_nothing(problem: LayoutProblem) -> None:
+def test_the_number_of_processes_changes_nothing(problem: DesignProblem) -> None:
     fresh = small_problem(processes=2)
     assert GeneticSearch().propose(fresh, 24, 1) == GeneticSearch().propose(problem, 24, 1)
 
@@ -113,7 +113,7 @@ def test_blasts_are_counted_and_never_exceed_the_budget(name: str, budget: int) 
 
 
 @pytest.mark.parametrize("name", DRAWN)
-def test_histories_say_what_was_best_when(name: str, problem: LayoutProblem) -> None:
+def test_histories_say_what_was_best_when(name: str, problem: DesignProblem) -> None:
     result = find_proposer(name).propose(problem, 60, 2)
     for earlier, later in pairwise(result.history):
         assert earlier.blasts < later.blasts
@@ -129,7 +129,7 @@ def test_histories_say_what_was_best_when(name: str, problem: LayoutProblem) -> 
 
 
 @pytest.mark.parametrize("name", DRAWN)
-def test_an_interruption_keeps_the_best_so_far(name: str, problem: LayoutProblem) -> None:
+def test_an_interruption_keeps_the_best_so_far(name: str, problem: DesignProblem) -> None:
     interrupted = find_proposer(name).propose(_interrupted_after(30), 100, 0)
     whole = find_proposer(name).propose(problem, 100, 0)
     assert interrupted.interrupted
@@ -146,7 +146,7 @@ def test_an_interruption_before_the_first_blast_leaves_the_empty_layout() -> Non
     assert result.interrupted
 
 
-def _interrupted_after(blasts: int) -> LayoutProblem:
+def _interrupted_after(blasts: int) -> DesignProblem:
     """Return the small problem; Ctrl-C comes when more blasts are asked for."""
     left = [blasts]
 
@@ -164,7 +164,7 @@ def test_layouts_are_legal_on_real_sites(method: str, name: str) -> None:
     """With keep-outs, a budget and an access way, against a hidden charge."""
     scenario = ballistic(name)
     evaluator = BlastEvaluator(scenario, "event")
-    problem = LayoutProblem(evaluator, practice_hidden(scenario, 3, 1, 0))
+    problem = DesignProblem(evaluator, practice_hidden(scenario, 3, 1, 0))
     result = find_proposer(method).propose(problem, 10, 0)
     assert Placement.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
 
@@ -207,7 +207,7 @@ def test_a_misspelt_method_is_told_the_nearest() -> None:
     [("wall_near_charge", wall_near_charge), ("wall_near_building", wall_near_building)],
 )
 def test_rules_spend_nothing(
-    name: str, rule: Callable[..., Layout], problem: LayoutProblem
+    name: str, rule: Callable[..., Layout], problem: DesignProblem
 ) -> None:
     result = find_proposer(name).propose(problem, 0, 0)
     assert result.blasts == 0
@@ -218,13 +218,13 @@ def test_rules_spend_nothing(
 def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = LayoutProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
+    problem = DesignProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
     middle = Charge((5.0, 15.0), 100.0)
     found = find_proposer("wall_near_charge").propose(problem, 0)
     assert found.layout == tuple(sorted(wall_near_charge(scenario, middle)))
 
 
-def test_the_front_is_near_the_true_one(problem: LayoutProblem, optimum: Layout) -> None:
+def test_the_front_is_near_the_true_one(problem: DesignProblem, optimum: Layout) -> None:
     """For each number of modules the gap to the best layout with at most as many."""
     result = find_proposer("nsga2").propose(problem, ALL_BLASTS // 2, 1)
     bare_pa_s = problem.load(())
@@ -246,7 +246,7 @@ def test_every_proposer_has_its_name_and_a_title_of_its_own() -> None:
     assert {*DRAWN, "best_rule"} == set(proposers(ProposerKind.SEARCH))
 
 
-def test_the_best_rule_is_chosen_by_a_blast_each(problem: LayoutProblem) -> None:
+def test_the_best_rule_is_chosen_by_a_blast_each(problem: DesignProblem) -> None:
     layouts = set(layouts_by_rule(problem.scenario, problem.told).values())
     result = find_proposer("best_rule").propose(problem, 100, 0)
     assert result.blasts == len(layouts) * len(problem.threats)
@@ -255,11 +255,11 @@ def test_the_best_rule_is_chosen_by_a_blast_each(problem: LayoutProblem) -> None
 
 
 @pytest.mark.parametrize("name", FROM_RULES)
-def test_what_begins_with_the_rules_is_never_worse(problem: LayoutProblem, name: str) -> None:
+def test_what_begins_with_the_rules_is_never_worse(problem: DesignProblem, name: str) -> None:
     """With as many blasts as tell all that is tried apart under one threat."""
     (threat, *_) = problem.threats
     case = replace(problem.case, threats=(threat,), realisations=1)
-    alone = LayoutProblem(problem.evaluator, case)
+    alone = DesignProblem(problem.evaluator, case)
     best = find_proposer("best_rule").propose(alone, 9, 0)
     found = find_proposer(name).propose(alone, 20, 0)
     assert found.method == name
@@ -281,7 +281,7 @@ class OneLayoutAgent:
         return [self.layout] * count
 
 
-def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: LayoutProblem) -> None:
+def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: DesignProblem) -> None:
     agent = OneLayoutAgent(((0, 0), (1, 0)))
     search = LearntSearch(agent=agent, digest="one")
     result = search.propose(problem, 60, 0)
@@ -299,7 +299,7 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
     better_pa_s = []
     for seed in (0, 1):
-        problem = LayoutProblem(evaluator, practice_hidden(scenario, 1, 2, seed))
+        problem = DesignProblem(evaluator, practice_hidden(scenario, 1, 2, seed))
         genetic, drawn = (
             problem.load(find_proposer(name).propose(problem, 100, seed).layout)
             for name in ("genetic", "random")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.design.search.problem import LayoutProblem
+from blast_env.design.search.problem import DesignProblem
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
@@ -22,12 +22,12 @@ WEST = Charge((5.0, 20.5), 100.0)
 
 
 @pytest.fixture(scope="module")
-def problem() -> LayoutProblem:
+def problem() -> DesignProblem:
     """The small problem with four threats; all tests share what it remembers."""
     return small_problem(realisations=4)
 
 
-def session(problem: LayoutProblem, budget: int, threats: int = 1) -> SearchSession:
+def session(problem: DesignProblem, budget: int, threats: int = 1) -> SearchSession:
     return SearchSession(problem, budget, Plan(threats, budget))
 
 
@@ -39,11 +39,11 @@ def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk)
     case = practice_hidden(scenario, 3, 2, 1, risk)
     layout = ((9, 0), (10, 0), (11, 0))
     expected = Objective(evaluator, case).assess(layout).impulse_pa_s
-    found = LayoutProblem(evaluator, case).load(layout)
+    found = DesignProblem(evaluator, case).load(layout)
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_pair_of_layout_and_threat_is_paid_for_once(problem: LayoutProblem) -> None:
+def test_a_pair_of_layout_and_threat_is_paid_for_once(problem: DesignProblem) -> None:
     """In whatever order the cells are named; further threats cost only what is new."""
     it = session(problem, 100)
     it.assess([((0, 0), (1, 0)), ((1, 0), (0, 0)), ((2, 0),)])
@@ -54,7 +54,7 @@ def test_a_pair_of_layout_and_threat_is_paid_for_once(problem: LayoutProblem) ->
     assert it.blasts == 4
 
 
-def test_what_a_cache_knows_is_paid_for_all_the_same(problem: LayoutProblem) -> None:
+def test_what_a_cache_knows_is_paid_for_all_the_same(problem: DesignProblem) -> None:
     """Otherwise a search would find more the second time."""
     for _ in range(2):
         it = session(problem, 2)
@@ -77,7 +77,7 @@ def test_the_budget_is_used_as_far_as_it_goes_and_no_farther(budget: int, threat
 _SHARED = small_problem(realisations=4)
 
 
-def test_it_ends_when_nothing_new_is_asked(problem: LayoutProblem) -> None:
+def test_it_ends_when_nothing_new_is_asked(problem: DesignProblem) -> None:
     it = session(problem, 100)
     asked = 0
 
@@ -92,7 +92,7 @@ def test_it_ends_when_nothing_new_is_asked(problem: LayoutProblem) -> None:
     assert asked < 100_000
 
 
-def test_a_layout_that_has_met_more_threats_goes_before(problem: LayoutProblem) -> None:
+def test_a_layout_that_has_met_more_threats_goes_before(problem: DesignProblem) -> None:
     """One that looks better under one threat does not replace one that has met two."""
     it = session(problem, 100)
     by_first = sorted(LAYOUTS, key=lambda each: it.assess([each])[0])
@@ -105,7 +105,7 @@ def test_a_layout_that_has_met_more_threats_goes_before(problem: LayoutProblem) 
     assert it.best.layout == min(best, worst, key=lambda each: it.assess([each], 2)[0])
 
 
-def test_the_lucky_one_is_found_out(problem: LayoutProblem) -> None:
+def test_the_lucky_one_is_found_out(problem: DesignProblem) -> None:
     """With blasts enough for all, the choice is the one by all threats, not by the first."""
     it = SearchSession(problem, 100, Plan(1, 12))
     it.run(lambda: _ask(it), it.confirm_best)
@@ -116,7 +116,7 @@ def test_the_lucky_one_is_found_out(problem: LayoutProblem) -> None:
     assert it.best.load == pytest.approx(min(impulses.values()))
 
 
-def test_what_is_held_back_is_not_explored_with(problem: LayoutProblem) -> None:
+def test_what_is_held_back_is_not_explored_with(problem: DesignProblem) -> None:
     it = SearchSession(problem, 10, Plan(1, 6))
     met = []
     it.run(lambda: _ask(it), lambda: met.append(it.blasts))
@@ -127,7 +127,7 @@ def _ask(it: SearchSession) -> None:
     it.assess(LAYOUTS)
 
 
-def test_the_front_is_the_front(problem: LayoutProblem) -> None:
+def test_the_front_is_the_front(problem: DesignProblem) -> None:
     it = session(problem, 100)
     pairs = [((0, 0), (1, 0)), ((1, 0), (2, 0)), ((2, 0), (3, 0))]
     it.assess([(), *LAYOUTS, *pairs])
@@ -138,7 +138,7 @@ def test_the_front_is_the_front(problem: LayoutProblem) -> None:
     assert front[1].load == it.assess(LAYOUTS).min()
 
 
-def test_it_reports_every_batch(problem: LayoutProblem) -> None:
+def test_it_reports_every_batch(problem: DesignProblem) -> None:
     told: list[tuple[int, int]] = []
     it = SearchSession(
         problem, 9, Plan(1, 9), lambda state: told.append((state.blasts, state.budget))
@@ -151,7 +151,7 @@ def test_it_reports_every_batch(problem: LayoutProblem) -> None:
 def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = LayoutProblem(evaluator, practice_hidden(scenario, 16, 1, 0))
+    problem = DesignProblem(evaluator, practice_hidden(scenario, 16, 1, 0))
     plans = [Plan.of(problem, budget) for budget in (1, 10, 50, 200, 1000, 100_000)]
     assert all(plan.exploring_blasts >= 1 for plan in plans)
     threats = [plan.threats for plan in plans]
@@ -180,7 +180,7 @@ def test_a_known_charge_has_its_realisations() -> None:
     assert threats != practice_visible(scenario, WEST, 3, seed=2).threats
 
 
-def test_reductions_refer_to_the_threats_that_were_met(problem: LayoutProblem) -> None:
+def test_reductions_refer_to_the_threats_that_were_met(problem: DesignProblem) -> None:
     it = session(problem, 100)
     for threats in (1, 4):
         it.assess([()], threats)
@@ -194,7 +194,7 @@ def test_reductions_refer_to_the_threats_that_were_met(problem: LayoutProblem) -
 )
 def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words: str) -> None:
     with pytest.raises(BlastEnvError, match=words):
-        LayoutProblem(
+        DesignProblem(
             BlastEvaluator(small_scenario(), "event"),
             Case(small_scenario(), threats, realisations=len(threats)),
         )
@@ -203,14 +203,14 @@ def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words:
 def test_a_site_without_a_build_zone_is_refused() -> None:
     scenario = small_scenario().model_copy(update={"build_zone": None})
     with pytest.raises(BlastEnvError, match="no build zone"):
-        LayoutProblem(BlastEvaluator(scenario, "event"), Case(scenario, (Threat(WEST, 1),)))
+        DesignProblem(BlastEvaluator(scenario, "event"), Case(scenario, (Threat(WEST, 1),)))
 
 
-def test_a_layout_that_does_not_fit_is_refused(problem: LayoutProblem) -> None:
+def test_a_layout_that_does_not_fit_is_refused(problem: DesignProblem) -> None:
     with pytest.raises(LayoutError, match="outside the build zone"):
         session(problem, 10).assess([((9, 9),)])
 
 
-def test_no_budget_is_refused(problem: LayoutProblem) -> None:
+def test_no_budget_is_refused(problem: DesignProblem) -> None:
     with pytest.raises(BlastEnvError, match="budget is 0 blasts, must be at least 1"):
         session(problem, 0)

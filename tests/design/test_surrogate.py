@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 import studies.surrogate
 from blast_env.design.rules import random_layout
-from blast_env.design.search import LayoutProblem
+from blast_env.design.search import DesignProblem
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.design.surrogate import walls
 from blast_env.design.surrogate.engine import SurrogateEngine
@@ -643,7 +643,7 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
 
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     """With blasts for all rules it is at least as good as the best of them."""
-    problem = LayoutProblem(BlastEvaluator(YARD, FAST), case())
+    problem = DesignProblem(BlastEvaluator(YARD, FAST), case())
     ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.told).values()}
     budget = 3 * len(ruled)
     method = LearntSearch(by_hand(), digest="digest", guesses=12, drawn=4)
@@ -662,8 +662,8 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     assert guided.load <= min(map(problem.load, Drawing().sample(YARD, problem.told, 3)))
 
 
-@dataclass(frozen=True, eq=False)
-class WrongBy(LayoutProblem):
+@dataclass(eq=False)
+class WrongBy(DesignProblem):
     """Blasts of which the surrogate is wrong by a factor of the layout, wherever the charge is."""
 
     met: dict[Layout, int] = field(default_factory=dict)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blast_env.cli.evaluation_report import print_means
-from blast_env.design.search import LayoutProblem
+from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats, evaluate_against
@@ -99,7 +99,7 @@ def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
     assert evaluation.load == max(loads)
     assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(bare))
     assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met
-    problem = LayoutProblem(evaluator, Case(evaluator.scenario, (NEAR, FAR)))
+    problem = DesignProblem(evaluator, Case(evaluator.scenario, (NEAR, FAR)))
     assert problem.load(WALL) == max(loads)
 
 
@@ -174,5 +174,5 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     _, _, _, _, info = env.step(env.placement.catalogue.finish)
     counted = info["impulse_pa_s"] - 100.0
     assert info["reward_terms"]["impulse"] == pytest.approx(-counted / PA_PER_PSI)
-    problem = LayoutProblem(BlastEvaluator(own, "gas"), Case(own, (NEAR,)))
+    problem = DesignProblem(BlastEvaluator(own, "gas"), Case(own, (NEAR,)))
     assert problem.load(WALL) == pytest.approx(walled)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import blast_env
-from blast_env.design.search import LayoutProblem, RandomSearch
+from blast_env.design.search import DesignProblem, RandomSearch
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator
@@ -113,7 +113,7 @@ def test_environment_and_search_take_it_where_it_pays() -> None:
     assert reward < 0.0
     evaluator = BlastEvaluator(scenario, SHORT)
     case = visible_case(scenario, scenario.sample_charge(np.random.default_rng(0)), [0])
-    found = RandomSearch().propose(LayoutProblem(evaluator, case), 30, 0)
+    found = RandomSearch().propose(DesignProblem(evaluator, case), 30, 0)
     assert found.layout
     assert AWAY not in found.layout
 

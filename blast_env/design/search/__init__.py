@@ -8,8 +8,8 @@ from blast_env.design.search.methods import (
 )
 from blast_env.design.search.problem import (
     Candidate,
+    DesignProblem,
     LayoutAgent,
-    LayoutProblem,
     Progress,
     Proposer,
     Report,
@@ -30,10 +30,10 @@ from blast_env.geometry import Layout
 __all__ = [
     "BestRuleSearch",
     "Candidate",
+    "DesignProblem",
     "GeneticSearch",
     "Layout",
     "LayoutAgent",
-    "LayoutProblem",
     "Need",
     "Nsga2Search",
     "Plan",

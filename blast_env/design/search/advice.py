@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from blast_env.design.search.moves import Moves, legal_part
-from blast_env.design.search.problem import LayoutProblem
+from blast_env.design.search.problem import DesignProblem
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastMeter, BudgetError
+from blast_env.evaluation import BudgetError
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import Placement
 from blast_env.layout.placement import met_by_blasts
@@ -161,7 +161,7 @@ def _items_of(scenario: Scenario, kind: MeasureKind) -> set[str]:
 
 
 def advise(
-    problem: LayoutProblem,
+    problem: DesignProblem,
     kind: MeasureKind,
     budget: int,
     seed: int = 0,
@@ -192,8 +192,7 @@ def advise(
             f"budget is {budget} blasts, must be at least {len(problem.threats)}: one per threat"
         )
     scenario, rng = only(problem.scenario, kind), generator(seed)
-    meter = BlastMeter(budget)
-    metered = replace(problem, meter=meter)
+    metered = replace(problem, budget=budget)
     best: dict[Layout, Tried] = {}
     tried: list[Tried] = []
     moves = Moves(scenario)
@@ -228,15 +227,15 @@ def advise(
             tried += choices
             best[key] = min(choices)
             if progress is not None:
-                progress(meter.blasts / budget)
+                progress(metered.blasts / budget)
     except BudgetError:
         pass
-    return Advice(kind, min(best.values()), meter.blasts, tuple(tried))
+    return Advice(kind, min(best.values()), metered.blasts, tuple(tried))
 
 
 def advise_until(
     judge: Callable[[Layout], AdviceVerdict],
-    problem: LayoutProblem,
+    problem: DesignProblem,
     kind: MeasureKind,
     budget: int,
     seed: int = 0,
@@ -310,7 +309,7 @@ def _changed(moves: Moves, layout: Layout, rng: np.random.Generator) -> Layout:
 
 
 def _hardened(
-    problem: LayoutProblem, scenario: Scenario, barrier: Layout, damage_below: float
+    problem: DesignProblem, scenario: Scenario, barrier: Layout, damage_below: float
 ) -> list[Tried]:
     """Return a barrier with each choice of measures that the rest of the zone's budget pays for.
 
@@ -337,7 +336,7 @@ def _hardened(
     return found
 
 
-def _worst_damage(problem: LayoutProblem, layout: Layout) -> float:
+def _worst_damage(problem: DesignProblem, layout: Layout) -> float:
     """Return the worst damage over all threats, from the blasts that were run before."""
     loads = problem.evaluator.loads_of_many((layout, threat) for threat in problem.threats)
     return worst(each.worst_damage or 0.0 for load in loads for each in load.protected)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from blast_env.design.search.problem import Candidate, LayoutProblem, SearchResult
+from blast_env.design.search.problem import Candidate, DesignProblem, SearchResult
 from blast_env.geometry import layout_counts
 from blast_env.plots.plan import QUIET_INK
 from blast_env.plots.site_plan import write_heading
@@ -26,7 +26,7 @@ _COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#0072B2")
 _BEST = "#0072B2"
 
 
-def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
+def search_figure(result: SearchResult, problem: DesignProblem) -> Figure:
     """Return a figure of a search.
 
     Args:
@@ -54,7 +54,7 @@ def search_figure(result: SearchResult, problem: LayoutProblem) -> Figure:
     return figure
 
 
-def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> None:
+def _draw_history(axes: Axes, result: SearchResult, problem: DesignProblem) -> None:
     """Draw the best reduction over the blasts spent, in a colour for each number of threats."""
     history = result.history
     ends = [*(each.blasts for each in history[1:]), max(result.blasts, history[-1].blasts)]
@@ -88,7 +88,7 @@ def _draw_history(axes: Axes, result: SearchResult, problem: LayoutProblem) -> N
     axes.legend(loc="lower right", fontsize=9, frameon=False)
 
 
-def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) -> None:
+def _draw_front(axes: Axes, front: Sequence[Candidate], problem: DesignProblem) -> None:
     """Draw the reduction over the number of modules or, with a catalogue, over the cost."""
     prices = [problem.price(each.layout) for each in front]
     reduction = [problem.reduction(each) for each in front]
@@ -103,7 +103,7 @@ def _draw_front(axes: Axes, front: Sequence[Candidate], problem: LayoutProblem) 
     _set_reduction_axis(axes, problem)
 
 
-def _set_reduction_axis(axes: Axes, problem: LayoutProblem) -> None:
+def _set_reduction_axis(axes: Axes, problem: DesignProblem) -> None:
     low = min(0.0, axes.get_ylim()[0])
     axes.set_ylim(low, 1.0)
     axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))

@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.design.rules import random_layout
 from blast_env.design.search.moves import Draw, Moves, random_walls
-from blast_env.design.search.problem import LayoutProblem
+from blast_env.design.search.problem import DesignProblem
 from blast_env.design.search.registry import rule_layouts
 from blast_env.design.search.session import Plan, Search, SearchSession
 from blast_env.geometry import Layout
@@ -135,7 +135,7 @@ class BestRuleSearch(Search):
 
     name: str = "best_rule"
 
-    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+    def plan(self, problem: DesignProblem, budget: int) -> Plan:
         """Plan as many threats per layout as the budget pays for, at least one."""
         layouts = len(rule_layouts(problem))
         return Plan(max(1, min(len(problem.threats), budget // layouts)), budget)

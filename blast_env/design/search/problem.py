@@ -1,18 +1,19 @@
 """The contract of proposers (rules, searches and trained agents): problem, progress and result."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BlastMeter, Case, Threat
+from blast_env.evaluation import BlastEvaluator, BudgetError, Case, Threat
 from blast_env.evaluation.cases import check_distinct
 from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.geometry import Element, Layout, layout_text
 from blast_env.layout import Placement
+from blast_env.layout.placement import met_by_blasts
 from blast_env.runner import check_workers
 from blast_env.site import AnyCharge, Scenario
 from blast_env.statistics import reductions
@@ -21,16 +22,16 @@ if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
 
 
-@dataclass(frozen=True, eq=False)
-class LayoutProblem:
-    """A case to search a layout for, and the evaluator that runs its blasts.
+@dataclass(eq=False)
+class DesignProblem:
+    """A case to search a layout for, the evaluator that runs its blasts, and their budget.
 
     Attributes:
         evaluator: Runs the blasts and caches their loads.
         case: The scenario and the threats, and how their loads combine into one number. A search
             may use only the first few threats, so different charges should come first.
         processes: Worker processes; results do not depend on their number.
-        meter: Counts the blasts requested; `None` counts none.
+        budget: Most blasts, each a distinct pair of layout and threat; `None` for any number.
 
     Raises:
         BlastEnvError: If a threat is repeated, the scenario has no build zone, or `processes` is
@@ -40,7 +41,8 @@ class LayoutProblem:
     evaluator: BlastEvaluator
     case: Case
     processes: int = 1
-    meter: BlastMeter | None = None
+    budget: int | None = None
+    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_distinct(self.case.threats)
@@ -77,35 +79,36 @@ class LayoutProblem:
         known = set(self.case.charges)
         return known.pop() if len(known) == 1 else None
 
-    def metered(self, budget: int) -> "LayoutProblem":
-        """Return the same problem with a budget of blasts.
-
-        The loads without a barrier, `unprotected`, are not charged to the budget.
-        """
-        return replace(self, meter=BlastMeter(budget))
-
     @property
-    def blasts_run(self) -> int:
-        """Blasts requested from the meter, or blasts simulated by the evaluator if those are more.
+    def blasts(self) -> int:
+        """Blasts spent, whether cached or not; those of `unprotected` are free."""
+        return len(self._asked)
 
-        Those of `unprotected` are excluded. The evaluator must be new and keep all loads.
+    def spend(self, pairs: Iterable[tuple[Layout, Threat]]) -> None:
+        """Count blasts that have not been spent before.
+
+        Raises:
+            BudgetError: If the total would exceed the budget; none is counted then.
         """
-        free = len(self.threats) if "unprotected" in vars(self) else 0
-        asked = 0 if self.meter is None else self.meter.blasts
-        return max(asked, self.evaluator.blasts - free)
+        asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
+        asked |= self._asked
+        if self.budget is not None and len(asked) > self.budget:
+            raise BudgetError(
+                f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
+            )
+        self._asked = asked
 
     def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
         """Return the load of each blast, in the unit of the scenario's objective.
 
         Raises:
-            BudgetError: If the problem is metered and the blasts exceed its budget.
+            BudgetError: If the blasts exceed the budget.
             LayoutError: If a layout does not fit the build zone.
         """
-        if self.meter is not None:
-            self.meter.add(pairs)
-        return self._unmetered(pairs)
+        self.spend(pairs)
+        return self._free(pairs)
 
-    def _unmetered(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+    def _free(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
         loads = self.evaluator.loads_of_many(pairs, self.processes)
         return [each.load(self.scenario.objective) for each in loads]
 
@@ -128,7 +131,7 @@ class LayoutProblem:
         Raises:
             BlastEnvError: If nothing arrives: there is nothing to reduce.
         """
-        bare = self._unmetered([((), threat) for threat in self.threats])
+        bare = self._free([((), threat) for threat in self.threats])
         check_something_arrives([self.case], np.array(bare))
         return tuple(bare)
 
@@ -266,7 +269,7 @@ class Proposer(Protocol):
         """Name in tables and on the command line."""
 
     def propose(
-        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+        self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         """Return a layout, for instance as `SearchResult(layout)`.
 

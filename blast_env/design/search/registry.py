@@ -10,7 +10,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, Final
 
-from blast_env.design.search.problem import LayoutProblem, Proposer, Report, SearchResult
+from blast_env.design.search.problem import DesignProblem, Proposer, Report, SearchResult
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout
@@ -205,7 +205,7 @@ class RuleProposer:
 
     def propose(
         self,
-        problem: LayoutProblem,
+        problem: DesignProblem,
         budget: int = 0,
         seed: int = 0,
         report: Report | None = None,  # noqa: ARG002
@@ -236,6 +236,6 @@ def layouts_by_rule(scenario: AnyScenario, charge: AnyCharge | None = None) -> d
     return layouts
 
 
-def rule_layouts(problem: LayoutProblem) -> tuple[Layout, ...]:
+def rule_layouts(problem: DesignProblem) -> tuple[Layout, ...]:
     """Return the distinct layouts of the rules for a problem."""
     return tuple(dict.fromkeys(layouts_by_rule(problem.scenario, problem.told).values()))

@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.design.search.problem import Candidate, LayoutProblem, Progress, Report, SearchResult
+from blast_env.design.search.problem import Candidate, DesignProblem, Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
 from blast_env.layout.placement import met_by_blasts
@@ -46,7 +46,7 @@ class Plan:
         return max(1, self.exploring_blasts // self.threats)
 
     @classmethod
-    def of(cls, problem: LayoutProblem, budget: int) -> "Plan":
+    def of(cls, problem: DesignProblem, budget: int) -> "Plan":
         """Return the plan for a budget.
 
         The load of a layout varies less between realisations of fan and air than between layouts.
@@ -67,7 +67,7 @@ class Plan:
         return cls(threats, budget - held_back)
 
     @classmethod
-    def thorough(cls, problem: LayoutProblem, budget: int) -> "Plan":
+    def thorough(cls, problem: DesignProblem, budget: int) -> "Plan":
         """Return the plan that assesses every layout under all threats at once."""
         return cls(len(problem.threats), budget)
 
@@ -104,7 +104,7 @@ class SearchSession:
 
     def __init__(
         self,
-        problem: LayoutProblem,
+        problem: DesignProblem,
         budget: int,
         plan: Plan,
         report: Report | None = None,
@@ -340,7 +340,7 @@ class Search(ABC):
         """Return the functions that explore a session and make the final choice."""
         return partial(self.explore, session), partial(self.choose, session)
 
-    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+    def plan(self, problem: DesignProblem, budget: int) -> Plan:
         """Return the division of the blasts."""
         return Plan.of(problem, budget)
 
@@ -348,7 +348,7 @@ class Search(ABC):
     """Whether the result includes the front of load and price."""
 
     def propose(
-        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+        self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         """Return the best layout found; see `Proposer`."""
         session = SearchSession(problem, budget, self.plan(problem, budget), report, seed)

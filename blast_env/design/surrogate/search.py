@@ -11,7 +11,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.design.search.moves import Moves
 from blast_env.design.search.problem import (
-    LayoutProblem,
+    DesignProblem,
     Progress,
     Report,
     SamplingAgent,
@@ -178,7 +178,7 @@ class LearntSearch(Search):
             raise BlastEnvError("there is neither a surrogate nor an agent, must be one or both")
 
     def propose(
-        self, problem: LayoutProblem, budget: int, seed: int = 0, report: Report | None = None
+        self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         """Return the best layout by blasts or, with a budget of 0, by predictions.
 
@@ -228,7 +228,7 @@ class LearntSearch(Search):
         guesses.loads([tuple(sorted(each)) for each in (proposed, *drawn)])
         return guesses.ranked()[0]
 
-    def plan(self, problem: LayoutProblem, budget: int) -> Plan:
+    def plan(self, problem: DesignProblem, budget: int) -> Plan:
         """Divide the blasts; with a surrogate and a hidden charge, favour threats over layouts."""
         plan = Plan.of(problem, budget)
         most = len(problem.threats)
