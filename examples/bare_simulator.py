@@ -4,7 +4,8 @@ import gymnasium as gym
 
 import blast_env
 
-env = gym.make("BlastSimulator-v0", scenario="courtyard", layout=[(12, 0), (13, 0)])
+WALL = [(12, 0), (13, 0)]
+env = gym.make("BlastSimulator-v0", scenario="courtyard", layout=WALL, engine="event")
 observation, info = env.reset(seed=0)
 ended = False
 while not ended:
@@ -12,8 +13,8 @@ while not ended:
     ended = terminated or truncated
 print({key: value for key, value in info.items() if isinstance(value, int | float)})
 
-result = blast_env.simulate("courtyard", layout=[(12, 0), (13, 0)], seed=0)  # the same in one call
+result = blast_env.simulate("courtyard", layout=WALL, engine="event")  # the same in one call
 print(result.collisions.head())
-bare = blast_env.simulate("courtyard", seed=0)
+bare = blast_env.simulate("courtyard", engine="event")
 walled_pa_s, bare_pa_s = (each.impulse("building").pa_s for each in (result, bare))
 print(f"two modules take {1.0 - walled_pa_s / bare_pa_s:.1%} off {bare_pa_s:.0f} Pa s")

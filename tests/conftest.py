@@ -5,8 +5,9 @@ import multiprocessing
 import os
 from collections.abc import Iterator
 
-import hypothesis  # noqa: F401  # looks for what refers to it, which is not found once frozen
+import hypothesis  # looks for what refers to it, which is not found once frozen
 import pytest
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 # The modules that tests import, and the tests, all stay: it would look through them for nothing,
 # which takes a third of their time. Afterwards most of what becomes garbage needs no collector.
@@ -26,11 +27,34 @@ os.environ.pop("COLUMNS", None)
 multiprocessing.get_start_method()
 
 
+hypothesis.settings.register_profile("quick", max_examples=30)
+hypothesis.settings.load_profile("quick")
+
+
 @pytest.fixture(autouse=True, scope="session")
 def _nothing_here_outlives_a_power_failure() -> Iterator[None]:
     """Spare the tests the waiting for disks; processes that they start and kill still do wait."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda _: None)
+        yield
+
+
+LAY_OUT = ConstrainedLayoutEngine.execute
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _figures_are_laid_out_in_no_time() -> Iterator[None]:
+    """Leave the parts of figures where they begin, unless a test asks for `laid_out`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConstrainedLayoutEngine, "execute", lambda *_: None)
+        yield
+
+
+@pytest.fixture(scope="package")
+def laid_out() -> Iterator[None]:
+    """Lay figures out: for tests that look at where things come to lie."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ConstrainedLayoutEngine, "execute", LAY_OUT)
         yield
 
 

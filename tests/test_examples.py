@@ -21,7 +21,3 @@ def test_an_example_runs_and_prints_a_result(
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_fits_on_a_screen(path: Path) -> None:
     assert len(path.read_text(encoding="utf-8").splitlines()) <= _MOST_LINES
-
-
-def test_there_are_examples() -> None:
-    assert len(EXAMPLES) >= 5

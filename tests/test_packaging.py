@@ -24,7 +24,7 @@ CALIBRATIONS = (
     "collisional_kb_20kg",
 )
 
-OTHERS = """
+COMMANDS = """
 import json, sys
 from typer.testing import CliRunner
 from blast_env.cli import app
@@ -34,19 +34,15 @@ for arguments in json.loads(sys.argv[1]):
 import blast_env.particles.event.engine, blast_env.gas.engine, agents
 print(agents.Agent)
 """
-"""Runs commands without their extras, and sees what the engines leave of another's package."""
-
-
-def started(*command: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run a command that finds nothing of the checkout through the environment."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    return subprocess.run(
-        [str(part) for part in command], cwd=cwd, env=environment, capture_output=True, text=True
-    )
+"""Runs commands, and sees what the engines leave of another's package."""
 
 
 def call(*command: str | Path, cwd: Path) -> str:
-    done = started(*command, cwd=cwd)
+    """Run a command that finds nothing of the checkout through the environment."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [str(part) for part in command], cwd=cwd, env=environment, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -94,23 +90,23 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
     python = clean / "bin" / "python"
     # An engine that need not be compiled in every environment anew, and thin air.
     save_scenario(BALLISTIC_COURTYARD, tmp_path / "thin.toml")
-    command: tuple[str | Path, ...] = (python, "-m", "blast_env", "search", "--engine", "pymunk")
-    command += ("--scenario", "thin.toml", "--budget", "4", "--held-out", "2")
-    done = started(*command, "--method", "random", "--out", "found", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
-    assert "pip install blast-env[render]" in done.stderr  # no picture, and no blast lost for it
-    # One process for the others: its imports take longer than they do.
-    others = [
-        [*map(str, command[3:]), "--method", "genetic"],
+    search = ["search", "--engine", "pymunk", "--scenario", "thin.toml", "--budget", "4"]
+    search += ["--held-out", "2"]
+    # One process for all: its imports take longer than they do.
+    commands = [
+        [*search, "--method", "random", "--out", "found"],
+        [*search, "--method", "genetic"],
         ["train", "--run", "run"],
     ]
-    told = call(python, "-c", OTHERS, json.dumps(others), cwd=tmp_path).splitlines()
-    genetic, training = map(json.loads, told[:2])
+    told = call(python, "-c", COMMANDS, json.dumps(commands), cwd=tmp_path).splitlines()
+    drawn, genetic, training = map(json.loads, told[:3])
+    assert drawn[0] == 0, drawn[1]
+    assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
+    assert "pip install blast-env[render]" in drawn[1]  # no picture, and no blast lost for it
     assert genetic[0] == training[0] == 2
     assert "'pymoo': pip install blast-env[search]" in genetic[1]
     assert "'torch': pip install blast-env[agents,render]" in training[1]
-    assert told[2] == "<class 'agents.Agent'>"
+    assert told[3] == "<class 'agents.Agent'>"
 
 
 def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None:

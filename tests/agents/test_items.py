@@ -29,10 +29,9 @@ from blast_env.geometry import Piece
 from blast_env.layout import Placement
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
-from blast_env.sites import Visibility, visibility_layout
 from tests.agents.sites import site
 from tests.catalogue_sites import ITEMS, item, yard
-from tests.design.search_cases import CALIBRATION, every_layout
+from tests.design.search_cases import CALIBRATION
 
 CHARGE = Charge((2.0, 6.0), 5.0)
 
@@ -255,31 +254,3 @@ def test_the_front_is_over_the_cost(problem: DesignProblem) -> None:
     assert result.front_table()["cost"].tolist() == costs
     impulses = [each.load for each in result.front]
     assert impulses == sorted(impulses, reverse=True)
-
-
-def test_every_layout_of_pieces_is_found_once() -> None:
-    """Of a post and a beam on 1 x 3 cells: nothing, 3 posts, 2 beams, 2 of both."""
-    scenario = yard(
-        corner_m=(4.0, 5.5),
-        rows=1,
-        columns=3,
-        items=[item("beam", 2, 1, 1.0, rotatable=False), item("post", 1, 1, 1.0)],
-    ).model_copy(update={"calibration": CALIBRATION})
-    case = visible_case(scenario, CHARGE, [1])
-    problem = DesignProblem(BlastEvaluator(scenario, "event"), case)
-    layouts = every_layout(problem)
-    assert len(layouts) == len(set(layouts)) == 1 + 3 + 2 + 2
-
-
-def test_rules_by_name_propose_pieces(problem: DesignProblem) -> None:
-    layout = find_proposer("ring_around_building").propose(problem, 0).layout
-    assert layout == tuple(sorted(ring_around_building(problem.scenario, CHARGE)))
-    layout = find_proposer("sight_lines").propose(problem, 0).layout
-    assert Placement.of(yard(), layout).layout == layout
-
-
-def test_the_visibility_layout_cuts_lines_by_whole_pieces() -> None:
-    lines = Visibility.of(yard())
-    placement = Placement.of(yard(), visibility_layout(yard(), lines))
-    assert placement.layout
-    assert lines.cut_share(placement.cells) > 0.9

@@ -61,7 +61,7 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     found = consequences(blasted.scenario, (*WALL, GLASS), [threat.charge], find_engine("gas"))
     facade = found.responses[0].facade
     assert after.panes == f"{facade.broken_panes:.1f} of {facade.panes}"
-    assert after.condition == facade.worst_condition.label
+    assert after.condition == facade.worst_condition.words
     on_cells = found.responses[0].on_cells.level_of_protection
     assert on_cells > facade.level_of_protection
     words = f"{facade.level_of_protection.label}; {on_cells.label} on the cells"

@@ -3,17 +3,14 @@
 Every step on the disk of every job takes minutes (`tests/attack/kills.py`); here is one of them.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import pytest
 
 from blast_env.errors import BlastEnvError
 from tests.attack import kills
 from tests.attack.kills import JOBS, Job, in_process, outcome_after_kill, steps_and_outcome
-from tests.attack.run import problem_with, spread
 
 
 def _two_files(folder: Path) -> None:
@@ -48,31 +45,3 @@ def test_training_goes_on_and_what_does_not_is_noticed(
         outcome_after_kill("refused", tmp_path / "no", 0)
     with pytest.raises(RuntimeError, match="refused: no is of no use"):
         steps_and_outcome("refused", tmp_path / "no")
-
-
-def _raising(error: Exception) -> Callable[[], Any]:
-    def attacked() -> Any:
-        raise error
-
-    return attacked
-
-
-@pytest.mark.parametrize(
-    ("attacked", "problem"),
-    [
-        (lambda: [1, 2], ""),
-        (lambda: [1], "another result"),
-        (_raising(RuntimeError("cannot go on")), "RuntimeError: cannot go on"),
-        (_raising(BlastEnvError("is damaged")), "BlastEnvError: is damaged"),
-        (_raising(FileNotFoundError("gone")), "FileNotFoundError: gone"),
-    ],
-)
-def test_a_job_that_does_not_come_to_its_result_is_told(
-    attacked: Callable[[], Any], problem: str
-) -> None:
-    assert problem_with(attacked, [1, 2]) == problem
-
-
-def test_attacks_are_spread_over_all_steps() -> None:
-    assert spread(908, 4) == [0, 303, 605, 908]
-    assert spread(2, 40) == [0, 1, 2]

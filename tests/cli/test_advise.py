@@ -92,22 +92,12 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     )
     assert load_layout(out) is not None
     assert picture.stat().st_size > 1000
-    charge = ("--tnt-kg", "1")
-    page = ("--cells", "0.5", "0.5", "--no-items", "--stills", "0", "--places", "1")
-    for command, *words in (
-        ("draw", site, "--layout", out, "--out", tmp_path / "plan.svg"),
-        ("assess", site, "--layout", out, "--charges", "1", "--cell", 0.5, *charge),
-        ("evaluate", "--scenario", site, "--layout", out, "--seeds", "1", "--cell", 0.5, *charge),
-        ("report", site, "--layout", out, "--charge", "2,6,1", *page, "--out", tmp_path / "a.html"),
-    ):
-        done = CliRunner().invoke(app, [command, *map(str, words)])
-        assert done.exit_code == 0, done.output
 
 
 def test_rings_are_the_points_of_their_layouts_where_both_have_the_same_cells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of panes alone, too: a wall panel that is worse does not count there."""
+    """Of panes alone: a wall panel that is worse does not count there."""
     shown = []
 
     def keep(*arguments: Any) -> Figure:
@@ -115,15 +105,13 @@ def test_rings_are_the_points_of_their_layouts_where_both_have_the_same_cells(
         return Figure()
 
     monkeypatch.setattr("blast_env.plots.cost_level.cost_level_figure", keep)
-    for measure in ("damage", "glazing"):
-        site = tmp_path / f"{measure}.toml"
-        blast_env.save_scenario(glazed_yard(charges="mean", measure=measure), site)
-        options = ("--tnt-kg", "1", "--budget", "3", "--judge-cell", "0.5", "--rounds", "1")
-        run(site, *options, "--target", "low", "--picture", tmp_path / "cost.png")
-        assert shown[-1]
-        for point, ring in shown[-1]:
-            assert ring == pytest.approx(point, rel=1e-6)
-    assert shown[0] != shown[1]
+    site = tmp_path / "yard.toml"
+    blast_env.save_scenario(glazed_yard(charges="mean", measure="glazing"), site)
+    options = ("--tnt-kg", "1", "--budget", "2", "--judge-cell", "0.5", "--rounds", "1")
+    run(site, *options, "--target", "low", "--picture", tmp_path / "cost.png")
+    assert shown[-1]
+    for point, ring in shown[-1]:
+        assert ring == pytest.approx(point, rel=1e-6)
 
 
 def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:

@@ -69,7 +69,7 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
 
     def watched(self: GasEngine, *arguments: Any) -> Any:
         used.add(self.cells)
-        return start_on(self, *arguments)
+        return start_on(GasEngine(COARSE), *arguments)
 
     monkeypatch.setattr(GasEngine, "start_on", watched)
     small = ("n_steps=4", "batch_size=4", "n_epochs=1", "evaluation_cases=2")

@@ -100,13 +100,6 @@ def test_where_a_command_writes_is_known_from_its_options() -> None:
     ]
 
 
-def test_a_picture_that_cannot_be_written_is_refused_before_the_work() -> None:
-    result = run("a.toml", "--picture", "a.bmp")
-    assert result.exit_code == 2
-    assert "--picture a.bmp: suffix is '.bmp', must be one of .png, .svg" in result.stderr
-    assert made == []
-
-
 @pytest.mark.parametrize(
     "words",
     [

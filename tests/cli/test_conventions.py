@@ -14,15 +14,14 @@ from rich.console import Console
 from typer.core import TyperGroup
 from typer.testing import CliRunner, Result
 
-from blast_env import load_scenario, save_scenario
+from blast_env import save_scenario
 from blast_env.cli import app
 from blast_env.cli.command import LazyCommand
 from blast_env.cli.output import ResultTable
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
-from blast_env.layout import LayoutFile, load_layout
+from blast_env.layout import LayoutFile
 from blast_env.particles.event.engine import EventRun
 from blast_env.particles.pymunk.engine import PymunkRun
-from blast_env.sites import Visibility, visibility_layout
 from tests.agents.training_runs import scenario_file
 from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut
@@ -182,15 +181,6 @@ def test_the_mass_of_a_charge_is_given_once(site: Path) -> None:
     assert "--charge is '5,1_9', must be two or three numbers as X,Y[,KG]" in result.stderr
 
 
-def test_a_fixed_charge_has_one_blast_of_gas_dynamics(hut_file: Path, tmp_path: Path) -> None:
-    wall = tmp_path / "wall.json"
-    wall.write_text("[[1, 0], [2, 0]]")
-    given = ("--scenario", hut_file, "--layout", wall, "--seeds", 3, "--cell", 0.5)
-    shown = run("evaluate", *given, "--charge", "2,3.5", "--tnt-kg", 4).stdout
-    assert "4 kg TNT at (2.00, 3.50) m" in shown
-    assert "2 blasts run" in shown
-
-
 def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
     given = ("--scenario", site)
     for arguments in (
@@ -205,19 +195,6 @@ def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
 def test_the_steps_of_the_event_engine_are_events(site: Path) -> None:
     assert " events, " in run("simulate", site, "--engine", "event").stdout
     assert " steps, " in run("simulate", site, "--engine", "pymunk").stdout
-
-
-def test_sight_lines_are_a_method_of_search(site: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    options = ("--method", "sight_lines", "--held-out", 1, "--engine", "event", "--out", out)
-    result = run("search", "--scenario", site, *options)
-    assert result.exit_code == 0, result.output
-    scenario = load_scenario(site)
-    (source,) = scenario.charge
-    expected = visibility_layout(scenario, Visibility.of(scenario))
-    assert source.kind == "point"
-    assert set(load_layout(out / "layout.json", scenario)) == set(expected)
-    assert "0 of 200 blasts spent" in result.stdout
 
 
 # JSON.

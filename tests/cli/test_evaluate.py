@@ -31,14 +31,6 @@ def evaluate(*arguments: str | Path | int) -> Result:
     return CliRunner().invoke(app, ["evaluate", "--engine", "event", *words])
 
 
-def test_it_has_help_and_is_listed() -> None:
-    help_text = CliRunner().invoke(app, ["--help"]).stdout
-    assert "evaluate" in help_text
-    result = evaluate("--help")
-    assert result.exit_code == 0
-    assert "row, column" in result.stdout
-
-
 def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: Path) -> None:
     out = tmp_path / "a" / "b"
     options = ("--seeds", "3", "--first-seed", "7", "--processes", "2", "--out", out)
@@ -124,19 +116,6 @@ def test_bad_input_is_one_clear_message(
     assert result.exit_code == 2
     assert words in result.stderr
     assert "Traceback" not in result.output
-    assert list(tmp_path.iterdir()) == [layout]
-
-
-def test_an_interruption_leaves_nothing_half_written(
-    layout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(self: EventRun, until_s: float) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(EventRun, "advance", interrupted)
-    result = evaluate("--layout", layout, "--seeds", "2", "--out", tmp_path / "out")
-    assert result.exit_code == 130
-    assert "interrupted" in result.stderr
     assert list(tmp_path.iterdir()) == [layout]
 
 

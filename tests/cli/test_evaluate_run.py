@@ -15,8 +15,7 @@ from blast_env.cli import app
 from blast_env.evaluation import SeedRange, draw_threats, evaluate_layout
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutFile, load_layout, write_layout
-from blast_env.site import PointSource, save_scenario
-from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
+from tests.agents.training_runs import hyperparameters, scenario_file, settings
 
 CELLS = ((1, 0), (2, 0))
 
@@ -173,17 +172,3 @@ def test_bad_input_is_one_clear_message(
     assert words in " ".join(result.stderr.split())
     assert "Traceback" not in result.output
     assert [path.name for path in tmp_path.iterdir()] == ["layout.json"]
-
-
-def test_fixed_charges_count_once_each_and_are_named(tmp_path: Path) -> None:
-    places = ((2.0, 5.0), (2.0, 7.0), (2.0, 9.0))
-    points = tuple(PointSource(kind="point", position_m=each, tnt_kg=100.0) for each in places)
-    site = tmp_path / "points.toml"
-    save_scenario(small_scenario().model_copy(update={"charge": points}), site)
-    train(settings(site, steps=16), hyperparameters(), tmp_path / "run")
-    result = evaluate("--run", tmp_path / "run", "--seeds", 3, "--out", tmp_path / "out")
-    assert result.exit_code == 0, result.output
-    met = pd.read_csv(tmp_path / "out" / "cases.csv")[["charge_x_m", "charge_y_m"]]
-    assert {*met.itertuples(index=False, name=None)} == {*places}
-    note = "note: the site has 3 fixed charges, which all count here; training may have met them"
-    assert note in " ".join(result.stdout.split())

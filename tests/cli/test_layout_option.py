@@ -7,7 +7,6 @@ from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario, write_layout
 from blast_env.cli import app
-from blast_env.layout import load_layout
 
 CELLS = [(9, 0), (10, 0), (11, 0)]
 
@@ -39,13 +38,3 @@ def test_a_layout_is_for_its_site_also_with_another_preset(layout: Path) -> None
         result = run("simulate", "courtyard", "--layout", layout, *options)
         assert result.exit_code == 0, result.output
         assert "3 barrier modules" in result.stdout
-
-
-@pytest.mark.parametrize("command", ["simulate", "evaluate"])
-def test_a_cell_that_cannot_be_used_is_named_with_the_file(command: str, layout: Path) -> None:
-    layout.write_text("[[9, 0], [9, 0]]")
-    chosen = ("courtyard",) if command == "simulate" else ("--scenario", "courtyard")
-    result = run(command, *chosen, "--layout", layout)
-    assert result.exit_code == 2
-    assert f"{layout}: cell (9, 0) is repeated" in result.stderr
-    assert load_layout(layout) == ((9, 0), (9, 0))

@@ -62,14 +62,10 @@ def gap(problem: DesignProblem, result: SearchResult, optimum: Layout) -> float:
 @pytest.mark.parametrize(
     ("name", "budget", "most"),
     [
-        ("random", ALL_BLASTS // 2, 0.005),
-        ("population_annealing", ALL_BLASTS // 2, 0.01),
-        ("genetic", ALL_BLASTS // 2, 0.005),
-        ("nsga2", ALL_BLASTS // 2, 0.02),  # also looks for layouts with fewer modules
         ("random", ALL_BLASTS // 10, 0.02),
         ("population_annealing", ALL_BLASTS // 10, 0.02),
         ("genetic", ALL_BLASTS // 10, 0.025),
-        ("nsga2", ALL_BLASTS // 10, 0.035),
+        ("nsga2", ALL_BLASTS // 10, 0.035),  # also looks for layouts with fewer modules
         ("wall_near_charge", 0, 0.04),
         ("wall_near_building", 0, 0.045),
     ],
@@ -77,7 +73,7 @@ def gap(problem: DesignProblem, result: SearchResult, optimum: Layout) -> float:
 def test_gaps_to_the_optimum(
     name: str, budget: int, most: float, problem: DesignProblem, optimum: Layout
 ) -> None:
-    """Mean over seeds with a half and with a tenth of the blasts of all layouts.
+    """Mean over seeds with a tenth of the blasts of all layouts.
 
     The optimum takes 86 % off the impulse; one random layout after the other would do too on 299.
     """
@@ -294,18 +290,15 @@ def test_a_search_from_a_policy_ends_no_worse_than_it_and_the_rules(problem: Des
 
 
 def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
-    """At equal cost, over two charges: what makes it a baseline worth beating."""
+    """At equal cost: what makes it a baseline worth beating."""
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
-    better_pa_s = []
-    for seed in (0, 1):
-        problem = DesignProblem(evaluator, practice_hidden(scenario, 1, 2, seed))
-        genetic, drawn = (
-            problem.load(find_proposer(name).propose(problem, 100, seed).layout)
-            for name in ("genetic", "random")
-        )
-        better_pa_s.append(drawn - genetic)
-    assert sum(better_pa_s) > 0.0
+    problem = DesignProblem(evaluator, practice_hidden(scenario, 1, 1, 0))
+    genetic, drawn = (
+        problem.load(find_proposer(name).propose(problem, 100, 0).layout)
+        for name in ("genetic", "random")
+    )
+    assert genetic < drawn
 
 
 @pytest.mark.parametrize("share", [0.5, 0.0])

@@ -4,7 +4,6 @@ import json
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -33,7 +32,6 @@ from blast_env.design.surrogate.fitting import (
     load_errors,
 )
 from blast_env.design.surrogate.network import (
-    MESSAGE,
     SHAPES,
     Check,
     Fit,
@@ -43,7 +41,7 @@ from blast_env.design.surrogate.network import (
     load_surrogate,
     packaged_surrogate,
 )
-from blast_env.design.surrogate.relations import RELATIONS, relations
+from blast_env.design.surrogate.relations import relations
 from blast_env.design.surrogate.search import (
     Guesses,
     LearntSearch,
@@ -53,7 +51,6 @@ from blast_env.design.surrogate.walls import (
     FEATURES,
     INPUTS,
     MOST_POINTS,
-    Memory,
     WallPoints,
     site_of,
 )
@@ -205,15 +202,6 @@ def is_inside(points_m: np.ndarray, solids: np.ndarray) -> bool:
     return bool((inside & (y < solids[:, 3]) & (z < solids[:, 4])).any())
 
 
-def test_points_above_each_other_are_told_what_each_is_told_alone() -> None:
-    point_m = np.array([[20.0, y, z] for y in (-1.0, 2.0) for z in (0.5, 1.5, 2.5)])
-    solids = np.array([wall(5.0, -2.0, 2.0, 3.0), wall(9.0, 0.0, 4.0, 1.0)])
-    together = Ways.between(CHARGE_M, point_m, 100.0, NOTHING).shares(solids)
-    alone = [Ways.between(CHARGE_M, each[np.newaxis], 100.0, NOTHING) for each in point_m]
-    assert (together == np.vstack([each.shares(solids) for each in alone])).all()
-    assert (np.diff(together[:3, 0]) > 0.0).all()
-
-
 def test_points_stand_for_the_walls_that_count() -> None:
     structure = load_scenario("visitor_entrance").structures[0]
     points = WallPoints.on([structure], 3.5)
@@ -237,32 +225,6 @@ def test_a_guess_is_the_same_alone_and_among_others() -> None:
     for number, (layout, charge) in enumerate(zip(layouts, charges, strict=True)):
         alone = surrogate.guess(site_of(YARD), [layout], [charge])
         assert alone.impulse_pa_s[0] == pytest.approx(together.impulse_pa_s[number], rel=1e-5)
-
-
-@pytest.mark.parametrize("points", [0, 1, 2, 63, 64, 65, 66, 128, 129, 400])
-def test_networks_say_of_each_of_many_points_what_their_layers_are(points: int) -> None:
-    networks = packaged_surrogate().impulse
-    rng = np.random.default_rng(points)
-    features = rng.normal(size=(points, FEATURES))
-    related = rng.normal(size=(3, points, RELATIONS))
-    messages = networks.messages(related.reshape(-1, RELATIONS)).reshape(5, 3, points, MESSAGE)
-    said = networks(features, messages.sum(axis=1))
-    assert said.shape == (len(networks.members), points)
-    for number, member in enumerate(networks.members):
-        sent = silu(np.einsum("spr,rk->spk", related, member.send) + member.send_bias)
-        told = silu(np.einsum("spk,km->spm", sent, member.message) + member.message_bias)
-        hidden = np.hstack((features, told.sum(axis=0)))
-        for weights, bias in (
-            (member.first, member.first_bias),
-            (member.second, member.second_bias),
-        ):
-            hidden = silu(np.einsum("pi,io->po", hidden, weights) + bias)
-        alone = hidden @ member.last[:, 0] + member.last_bias
-        np.testing.assert_allclose(said[number], alone, rtol=1e-4, atol=1e-4)
-
-
-def silu(values: np.ndarray) -> np.ndarray:
-    return np.asarray(values / (1.0 + np.exp(-values)))
 
 
 OUTWARD = np.array([[-0.6, 0.8]])
@@ -303,41 +265,6 @@ def test_mirrors_and_quarter_turns_change_no_relation(
     turned = (solids * (1.0, -1.0, 1.0, -1.0, 1.0))[:, [3, 0, 1, 2, 4]]
     turned_to = {"points_m": np.array([[0.0, 20.0, 1.5]]), "outward": OUTWARD[:, ::-1] * (-1, 1)}
     assert related(*turned.tolist(), **turned_to) == pytest.approx(found, abs=1e-9)
-
-
-def test_a_guess_is_made_of_messages_from_all_that_stands_there() -> None:
-    """What is remembered of pieces changes nothing, whether it has room or not."""
-    surrogate, charge = by_hand(), Charge((1.5, 4.0), 5.0)
-    site, forgetful = site_of(PEAKS), site_of(PEAKS, most_bytes=0)
-    approach = site.approach(charge)
-    for number in range(4):
-        layout = random_layout(YARD, np.random.default_rng(number)) if number else ()
-        barrier = site.barrier(layout)
-        where = np.concatenate((approach.solids, approach.relations(barrier)))
-        solids, points, _ = where.shape
-        assert solids == len(YARD.structures) + len(layout)
-        told = surrogate.impulse.messages(surrogate.related(where.reshape(-1, RELATIONS)))
-        heard = told.reshape(-1, solids, points, MESSAGE).sum(axis=1)
-        over = surrogate.impulse(surrogate.scaled(approach.features(barrier)), heard)
-        loads = np.exp(approach.log_impulse + over) @ approach.area_m2 / approach.area_m2.sum()
-        alone = np.exp(np.log(loads).mean())
-        for each in (site, site, forgetful):
-            guess = surrogate.guess(each, [layout], [charge])
-            assert guess.impulse_pa_s.item() == pytest.approx(alone, rel=1e-5)
-            assert guess.peak_pa is not None
-
-
-def test_a_full_memory_forgets_and_makes_anew() -> None:
-    made = []
-
-    def make(number: int) -> np.ndarray:
-        made.append(number)
-        return np.full(20, number, dtype=np.float32)
-
-    memory = Memory(200)
-    for number in (1, 2, 1, 2, 3, 3, 1):
-        assert memory.of(number, partial(make, number))[0] == number
-    assert made == [1, 2, 3, 1]  # two of 80 bytes have room, a third does not
 
 
 def test_large_walls_have_few_points_that_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,10 +86,3 @@ def test_no_page_has_the_phrase(phrase: str) -> None:
     words = r"\s+".join(phrase.split())
     pattern = re.compile(rf"(?<![\w-]){words}(?![\w-])", re.IGNORECASE)
     assert [(page, found) for page, text in prose() for found in pattern.findall(text)] == []
-
-
-def test_texts_are_taken_without_code() -> None:
-    source = '"""A page."""\n\nNAME = "what # what"  # what for\n\n\ndef go():\n    """Go."""\n'
-    assert [*docstrings(source), *comments(source)] == ["A page.", "Go.", "# what for"]
-    assert counts(["What is what?"]) == {"what": 2, "is": 1}
-    assert _CODE.sub("", "A `what`.\n```python\nwhat\n```\nEnd.") == "A .\n\nEnd."

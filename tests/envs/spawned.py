@@ -1,20 +1,14 @@
 """What other processes do with environments, apart from what takes them long to import."""
 
-import multiprocessing
 from typing import Any
 
 import gymnasium as gym
 
-from tests.envs.small import ThinEngine, play, small_scenario
-from tests.scenarios import BALLISTIC_COURTYARD
+from tests.envs.small import ThinEngine, small_scenario
 
 
 def barrier_arguments() -> dict[str, Any]:
     return {"scenario": small_scenario(), "engine": ThinEngine(), "observation": "features"}
-
-
-def play_in_process(queue: "multiprocessing.Queue[list]") -> None:
-    queue.put(play(gym.make("blast_env:BlastBarrier-v0", **barrier_arguments()), 3))
 
 
 def watch(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float], dict]:
@@ -27,8 +21,3 @@ def watch(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float]
         observations.append(observation)
         rewards.append(float(reward))
     return observations, rewards, info
-
-
-def digest_in_process(queue: "multiprocessing.Queue[str]") -> None:
-    env = gym.make("blast_env:BlastSimulator-v0", scenario=BALLISTIC_COURTYARD, step_s=0.1)
-    queue.put(watch(env, 3)[2]["digest"])

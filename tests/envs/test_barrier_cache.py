@@ -1,6 +1,5 @@
 """What environments, evaluations and searches remember of each other's blasts."""
 
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -60,14 +59,6 @@ def test_sites_that_the_memory_has_let_go_are_still_in_the_cache(tmp_path: Path)
         env.reset(seed=seed)
         info = env.step(FINISH)[4]
     assert info["cache_hit_rate"] >= 0.5
-
-
-def test_a_pickled_environment_keeps_its_folder(tmp_path: Path) -> None:
-    env = make(cache=tmp_path / "blasts")
-    env.reset(seed=3)
-    twin = pickle.loads(pickle.dumps(env))
-    assert env.step(FINISH)[4]["blasts"] == 1
-    assert twin.step(FINISH)[4]["blasts"] == 0
 
 
 def test_environments_in_processes_share_a_folder(tmp_path: Path) -> None:

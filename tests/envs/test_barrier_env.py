@@ -189,7 +189,7 @@ def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
 
 @pytest.mark.parametrize("reward", ["terminal", "incremental"])
 @pytest.mark.parametrize("threat", ["visible", "hidden"])
-@pytest.mark.parametrize("limit", [1, 2, 3])
+@pytest.mark.parametrize("limit", [1, 3])
 def test_to_be_cut_off_never_pays_better_than_to_finish(
     reward: str, threat: str, limit: int
 ) -> None:
@@ -209,20 +209,6 @@ def test_to_be_cut_off_never_pays_better_than_to_finish(
             assert cut_off == pytest.approx(finished, rel=1e-12)
         else:
             assert cut_off < finished
-
-
-def test_a_limit_of_gymnasium_s_make_cuts_off_alike() -> None:
-    env = gym.make(
-        "BlastBarrier-v0",
-        max_episode_steps=2,
-        scenario=small_scenario(),
-        engine=ThinEngine(),
-        realisations=1,
-    )
-    env.reset(seed=1)
-    steps = [env.step(cell) for cell in (0, 1)]
-    assert [step[2:4] for step in steps] == [(False, False), (False, True)]
-    assert sum(float(step[1]) for step in steps) < 0.0
 
 
 class PayPerModule:

@@ -17,7 +17,7 @@ SCENARIOS = {
         if (scenario := load_scenario(name)).build_zone is not None and not scenario.zone.items
     },
 }
-EPISODES = 20
+EPISODES = 5
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

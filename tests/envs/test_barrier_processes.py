@@ -1,7 +1,6 @@
 """The barrier environment in vectors, other processes, and pickles."""
 
 import copy
-import multiprocessing
 import pickle
 from typing import Any
 
@@ -11,22 +10,12 @@ import pytest
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from tests.envs.small import make, play, same
-from tests.envs.spawned import barrier_arguments, play_in_process
+from tests.envs.small import make, same
+from tests.envs.spawned import barrier_arguments
 
 pytestmark = pytest.mark.slow
 
 FINISH = 40
-
-
-def test_works_by_module_name_in_a_spawned_process_with_the_same_rollout() -> None:
-    context = multiprocessing.get_context("spawn")
-    queue: multiprocessing.Queue[list] = context.Queue()
-    process = context.Process(target=play_in_process, args=(queue,))
-    process.start()
-    steps = queue.get(timeout=120)
-    process.join()
-    assert same(steps, play(gym.make("BlastBarrier-v0", **barrier_arguments()), 3))
 
 
 @pytest.mark.parametrize(
@@ -80,11 +69,3 @@ def test_a_copy_in_mid_episode_goes_on_identically(again: Any, observation: str)
         assert same(env.step(action), twin.step(action))
     assert same(env.reset(), twin.reset())
     assert same(env.step(FINISH), twin.step(FINISH))
-
-
-def test_a_copy_is_independent() -> None:
-    env = make()
-    env.reset(seed=2)
-    twin = copy.deepcopy(env)
-    twin.step(3)
-    assert env.placement.cells == ()

@@ -1,6 +1,5 @@
 """The bare simulator as an environment."""
 
-import multiprocessing
 import pickle
 from math import fsum
 from typing import Any
@@ -17,7 +16,7 @@ from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.site import Scenario, ScenarioError
-from tests.envs.spawned import digest_in_process, watch
+from tests.envs.spawned import watch
 from tests.scenarios import BALLISTIC_COURTYARD
 
 pytestmark = pytest.mark.slow
@@ -125,30 +124,6 @@ def test_without_a_seed_blasts_follow_from_the_first_seed() -> None:
     assert len(set(seeds[0])) == 3
 
 
-def test_works_by_module_name_in_a_spawned_process_with_the_same_digest() -> None:
-    context = multiprocessing.get_context("spawn")
-    queue: multiprocessing.Queue[str] = context.Queue()
-    process = context.Process(target=digest_in_process, args=(queue,))
-    process.start()
-    digest = queue.get(timeout=120)
-    process.join()
-    assert digest == watch(make(step_s=0.1), 3)[2]["digest"]
-
-
-def test_vector_environments_run_it() -> None:
-    envs = gym.make_vec(
-        "BlastSimulator-v0",
-        num_envs=2,
-        vectorization_mode="async",
-        scenario=BALLISTIC_COURTYARD,
-        step_s=0.05,
-    )
-    observation, _ = envs.reset(seed=3)
-    assert observation["time_s"].shape == (2, 1)
-    envs.step(np.zeros(2, dtype=np.int64))
-    envs.close()
-
-
 def test_the_charge_can_be_placed() -> None:
     env = make()
     _, info = env.reset(seed=0, options={"charge_position_m": (8.0, 15.0)})
@@ -194,11 +169,6 @@ def test_stepping_before_reset_and_after_the_end_is_refused() -> None:
     watch(env, 0)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(0)
-
-
-def test_an_environment_that_is_not_running_pickles() -> None:
-    copy = pickle.loads(pickle.dumps(make(step_s=0.1)))
-    assert watch(copy, 3)[2]["digest"] == watch(make(step_s=0.1), 3)[2]["digest"]
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "event"])

@@ -1,9 +1,7 @@
 """The cache in a folder gives back what was put in, or nothing: never anything else."""
 
-import json
 import multiprocessing
 import os
-import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
@@ -58,24 +56,6 @@ def test_loads_come_back_to_the_last_bit_also_for_another_object(tmp_path: Path)
     cache = DiskCache(tmp_path / "a" / "b")
     assert same(cache.get(key(3)), loads(3))
     assert len(cache) == 1
-
-
-@pytest.mark.parametrize(
-    "other",
-    [
-        key(0)._replace(scenario_hash="other"),
-        key(0)._replace(layout=((1, 2),)),
-        key(0)._replace(charge=Charge((0.1, 0.7), 1.0)),
-        key(0)._replace(seed=1),
-        key(0)._replace(engine="other"),
-        key(0)._replace(calibration="other"),
-        key(0)._replace(code="other"),
-    ],
-)
-def test_every_part_of_the_key_counts(other: BlastKey, tmp_path: Path) -> None:
-    cache = DiskCache(tmp_path)
-    cache.add(key(0), loads(0))
-    assert cache.get(other) is None
 
 
 def test_any_flipped_byte_and_any_cut_is_noticed_and_the_file_goes(tmp_path: Path) -> None:
@@ -189,26 +169,6 @@ def test_worker_processes_leave_the_writing_to_the_parent(tmp_path: Path) -> Non
     assert again.blasts == 0
 
 
-def test_a_pickled_cache_uses_the_same_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A worker may run in another directory."""
-    monkeypatch.chdir(tmp_path)
-    evaluator = BlastEvaluator(COURTYARD, "event", cache="blasts", cache_size=0)
-    evaluator.loads(*PAIRS[0])
-    copy = pickle.loads(pickle.dumps(evaluator))
-    monkeypatch.chdir("/")
-    copy.loads(*PAIRS[0])
-    assert (copy.blasts, copy.cache_hits) == (1, 1)
-
-
-def test_loads_from_the_folder_cannot_be_changed_either(tmp_path: Path) -> None:
-    for _ in range(2):
-        found = BlastEvaluator(COURTYARD, "event", cache=tmp_path).loads(*PAIRS[0])
-        with pytest.raises(ValueError, match="read-only"):
-            found.module_impulse_sim[0] = 0.0
-
-
 def test_evaluations_share_a_folder_or_a_cache(tmp_path: Path) -> None:
     first = evaluate_layout(COURTYARD, FEW, (0, 1), engine="event", cache=tmp_path)
     shared = LoadsCache(100)
@@ -313,17 +273,6 @@ def test_entries_that_others_own_are_left_alone(
     assert foreign.exists()
     assert 2 < len(cache) < 20
     assert same(cache.get(key(39)), loads(39))
-
-
-def test_a_folder_in_the_place_of_an_entry_costs_a_warning(tmp_path: Path) -> None:
-    cache = DiskCache(tmp_path, most_bytes=0)
-    name = cache._store._path(json.dumps(key(0))).name
-    (tmp_path / name).mkdir()
-    with pytest.warns(RuntimeWarning, match="a blast is not kept: .* is a folder"):
-        cache.add(key(0), loads(0))
-    assert cache.get(key(0)) is None
-    cache.add(key(1), loads(1))  # tidies up, past the folder
-    assert (tmp_path / name).is_dir()
 
 
 def test_loads_of_gas_dynamics_are_kept_too(tmp_path: Path) -> None:

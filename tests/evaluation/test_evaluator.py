@@ -13,7 +13,6 @@ from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
 from blast_env.geometry import Cell
-from blast_env.particles.calibration import model as stored_module
 from blast_env.particles.run import BlastRun
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.scene import Scene
@@ -142,20 +141,6 @@ def test_an_evaluator_works_in_a_spawned_process_and_keeps_what_it_remembers() -
     assert (there, 1) == protected_impulse(evaluator)
     copy = pickle.loads(pickle.dumps(evaluator))
     assert protected_impulse(copy) == (there, 1)
-
-
-def test_progress_ends_at_one(evaluator: BlastEvaluator) -> None:
-    shares: list[float] = []
-    BlastEvaluator(COURTYARD).loads_of_many([((), THREATS[0]), (FEW, THREATS[0])], 1, shares.append)
-    assert shares == [0.5, 1.0]
-
-
-def test_the_calibration_is_read_once() -> None:
-    """Reading and checking the file costs more than converting a load."""
-    stored_module._of_the_package.cache_clear()
-    evaluator = BlastEvaluator(COURTYARD)
-    evaluator.loads_of_many([((), threat) for threat in THREATS[:2]])
-    assert stored_module._of_the_package.cache_info().misses == 1
 
 
 def test_scenarios_that_no_calibration_fits_are_refused_at_once() -> None:

@@ -1,5 +1,7 @@
 """`blast-env bench`, and what it measures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -11,6 +13,7 @@ from blast_env.evaluation import speed
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.speed import (
     Crowd,
+    SiteCost,
     blast_cost,
     crowd,
     environment_cost,
@@ -98,9 +101,13 @@ def test_a_street_keeps_its_proportions() -> None:
     assert heavy_kg == pytest.approx(8.0 * light_kg)
 
 
-def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told() -> None:
+@pytest.fixture(scope="module")
+def cost() -> SiteCost:
+    return site_cost(street(20.0), GasEngine())
+
+
+def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told(cost: SiteCost) -> None:
     engine, scenario = GasEngine(), street(20.0)
-    cost = site_cost(scenario, engine)
     assert (cost.site, cost.cells) == ("street_20_m", "uniform")
     assert 1e-6 * cost.cell_updates / cost.cpu_s > 1.0
     assert 100.0 < cost.memory_mb < 1000.0
@@ -108,7 +115,13 @@ def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told() -> None:
     assert 0.5 < cost.told.steps / cost.steps < 2.0
 
 
-def test_the_command_prints_a_row_for_each_site_and_way_of_growing() -> None:
+def test_the_command_prints_a_row_for_each_site_and_way_of_growing(
+    cost: SiteCost, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def known(scenario: Scenario, engine: GasEngine) -> SiteCost:
+        return replace(cost, site=scenario.name, cells=str(engine.cells))
+
+    monkeypatch.setattr("blast_env.cli.bench.site_cost", known)
     own = ("--site", "large", "--length", "20", "--site", "visitor_entrance")
     result = CliRunner().invoke(app, ["bench", *own, "--cells", "coarse"])
     assert result.exit_code == 0, result.output

@@ -135,8 +135,8 @@ def test_a_mirrored_site_has_the_mirrored_loads() -> None:
 
 
 def test_a_blast_on_growing_cells_has_about_the_loads_of_uniform_ones() -> None:
-    """On a street of 60 m, against cells that are small to the end; for a part of the work."""
-    site = street(60.0)
+    """On a street of 50 m, against cells that are small to the end; for a part of the work."""
+    site = street(50.0)
     small, growing = (GasBlast(site, engine=GasEngine(cells=cells)).run() for cells in CELLS[:2])
     assert isinstance(growing.run.solver, DoublingSolver)
     assert growing.run.solver.current.grid.cell_m == 1.0

@@ -224,7 +224,7 @@ KEYS = st.fixed_dictionaries(
 
 
 @given(st.one_of((JSON | KEYS).map(json.dumps).map(str.encode), st.binary(max_size=40)))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 def test_any_layout_file_gives_cells_or_the_layout_error(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:

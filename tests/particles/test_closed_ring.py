@@ -50,7 +50,7 @@ def ring(cavity_modules: int, thickness: int, shift_m: float = 0.0) -> Scenario:
             "structures": structures,
             "simulation": {
                 "preset": "ballistic",
-                "overrides": {"stepping": {"time_limit_s": 0.5}},
+                "overrides": {"stepping": {"time_limit_s": 0.25}},
             },
         },
         "ring",
@@ -60,7 +60,7 @@ def ring(cavity_modules: int, thickness: int, shift_m: float = 0.0) -> Scenario:
 @pytest.mark.parametrize("engine", ["pymunk", "event"])
 @pytest.mark.parametrize(
     ("cavity_modules", "thickness", "shift_m", "seed"),
-    [(4, 1, 0.0, 0), (8, 1, 0.0, 0), (4, 2, 0.0, 1), (5, 1, 0.25, 0)],
+    [(4, 1, 0.0, 0), (5, 1, 0.25, 0)],
 )
 def test_a_closed_ring_is_closed(
     engine: str, cavity_modules: int, thickness: int, shift_m: float, seed: int

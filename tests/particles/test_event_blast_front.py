@@ -27,10 +27,9 @@ def test_an_elastic_blast_is_sedov_s() -> None:
     assert 1.3 < trace.compression.min() < trace.compression.max() < 3.0  # 3 in a sharp front
 
 
-@pytest.mark.parametrize("restitution", [0.1, 0.3])
-def test_an_inelastic_blast_is_a_snowplough(restitution: float) -> None:
+def test_an_inelastic_blast_is_a_snowplough() -> None:
     """It reaches t^(1/3) only slowly, because the swept air is hot at first."""
-    case = FrontCase(restitution=restitution, side_spacings=120, ball_count=100)
+    case = FrontCase(restitution=0.3, side_spacings=120, ball_count=100)
     trace = inelastic_front(case, np.geomspace(22.0, 50.0, 8).tolist(), seed=0)
     assert trace.ratio == pytest.approx(1.0, abs=0.05)
     assert trace.exponent == pytest.approx(1.0 / 3.0, abs=0.06)

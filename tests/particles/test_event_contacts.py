@@ -105,15 +105,6 @@ def test_a_line_of_twenty_that_is_hit_moves_on_together(
     assert after.velocity[-1, 0] > 0.0
 
 
-def test_restitution_0_leaves_two_balls_together() -> None:
-    """They move on side by side in touch, which is no second collision."""
-    pair = balls([AIR, AIR], [(50.0, 150.0), (60.0, 150.7)], [(300.0, 0.0), (0.0, 0.0)], [1.0, 2.0])
-    after, steps = run_to(0.2, pair, rules(0.0), (FAR_WALL,))
-    normal = after.velocity[1] / np.hypot(*after.velocity[1])
-    assert steps == 1
-    assert (after.velocity[1] - after.velocity[0]) @ normal == pytest.approx(0.0, abs=1e-9)
-
-
 def test_balls_in_touch_at_the_start_collide_once_and_part() -> None:
     pair = balls([AIR, AIR], [(50.0, 150.0), (52.0, 150.0)], [(300.0, 0.0), (0.0, 0.0)])
     after, steps = run_to(0.1, pair, rules(1.0), (FAR_WALL,))
@@ -153,27 +144,6 @@ def test_two_balls_at_the_very_same_place_pass_through_each_other(
     assert after.velocity.tolist() == pair.velocity.tolist()
 
 
-def test_balls_at_rest_do_nothing() -> None:
-    """One is on its way, so that the run goes on; the others overlap, touch, or stand alone."""
-    rest = balls(
-        [AIR] * 5,
-        [(30.0, 30.0), (31.0, 30.0), (99.0, 99.0), (50.0, 50.0), (20.0, 150.0)],
-        [(0.0, 0.0)] * 4 + [(10.0, 0.0)],
-    )
-    after, steps = run_to(0.5, rest, rules(0.5))
-    assert steps == 0
-    assert after.position[:4].tolist() == rest.position[:4].tolist()
-
-
-def test_a_ball_that_touches_another_in_passing_changes_nothing() -> None:
-    """Exactly 2 radii aside, in numbers that are exact: neither hit nor shrunk."""
-    pair = balls([EXPLOSIVE, AIR], [(140.0, 150.0), (160.0, 152.0)], [(512.0, 0.0), (0.0, 0.0)])
-    settings = parameters()
-    after, steps = run_to(0.05, pair, settings, (FAR_WALL,))
-    assert steps == 0
-    assert after.radius.tolist() == [1.0, 1.0]
-
-
 @pytest.mark.parametrize("aside", [1e-15, 1e-12, 1e-9])
 def test_a_ball_that_hardly_touches_another_is_hardly_moved(aside: float) -> None:
     """Depth d gives a normal velocity of v sqrt(d), whose momentum is kept."""
@@ -192,17 +162,6 @@ def test_a_ball_flies_through_a_gap_of_its_own_diameter() -> None:
     after, steps = run_to(0.2, one, rules(1.0), SLOT)
     assert steps == 0
     assert after.position[0] == pytest.approx([101.0, 130.0])
-
-
-@pytest.mark.parametrize("along", [0.0, 50.0])
-@pytest.mark.parametrize("at_module", [0.0, 0.5, 0.9])
-def test_a_ball_that_rattles_in_such_a_gap_comes_to_rest(at_module: float, along: float) -> None:
-    """Left and right at the very same instant, again and again: it is wedged."""
-    one = balls([AIR], [(101.0, 80.0)], [(10.0, along)])
-    after, steps = run_to(0.2, one, rules(1.0, at_module), SLOT)
-    assert steps <= 20
-    assert after.velocity[0, 0] == 0.0
-    assert after.position[0, 0] == 101.0
 
 
 @pytest.mark.parametrize("aside", [0.0, 1e-12, 1e-6, 1e-3, 0.1])
@@ -258,15 +217,6 @@ def test_gaps_of_one_module_in_a_barrier_do_not_stop_a_blast() -> None:
         )
         assert result.end_reason is not EndReason.EVENT_LIMIT
         assert result.steps < 10_000
-
-
-def test_a_narrow_gap_is_left_after_a_few_bounces() -> None:
-    """A thousandth of a unit of play: each bounce takes half of the speed across."""
-    one = balls([AIR], [(101.0, 80.0)], [(10.0, 50.0)], radius=0.9995)
-    after, steps = run_to(0.2, one, rules(1.0, 0.5), SLOT)
-    assert 5 < steps < 30
-    assert abs(after.velocity[0, 0]) < 0.1
-    assert after.velocity[0, 1] == 50.0
 
 
 @pytest.mark.parametrize(("presses", "together"), [(_PRESSED, True), (_PRESSED - 1, False)])

@@ -1,9 +1,6 @@
 """A run is the same to the last bit: in any process or thread, with any cells, in any slices."""
 
-import multiprocessing
-import pickle
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from hashlib import sha256
@@ -12,7 +9,6 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import ParticleEngine
 from blast_env.evaluation.engines.particles import EventEngine
@@ -155,41 +151,6 @@ def test_more_collisions_than_one_batch_of_records_holds() -> None:
     assert len(hits) > 10_000
     assert hits["earlier_collisions"].tolist() == list(range(len(hits)))
     assert np.diff(hits["time_s"])[1:] == pytest.approx(0.03 / 1000.0, rel=1e-6)
-
-
-def test_four_threads_at_once_give_what_one_gives() -> None:
-    kinds = [*SCENES] * 2
-    with ThreadPoolExecutor(4) as threads:
-        together = list(threads.map(digest, kinds))
-    assert together == [digest(kind) for kind in kinds]
-
-
-def simulated_digest(seed: int) -> str:
-    return simulate(load_scenario("courtyard"), LAYOUT, seed=seed, engine="event").digest
-
-
-def test_a_spawned_process_gives_the_same_digests() -> None:
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.apply(simulated_digest, (7,)) == simulated_digest(7)
-        assert pool.apply(digest, ("random",)) == digest("random")
-
-
-def test_one_seed_gives_one_digest_and_another_seed_another() -> None:
-    assert simulated_digest(7) == simulated_digest(7) != simulated_digest(8)
-
-
-def test_a_run_does_not_depend_on_the_runs_before_it() -> None:
-    first = digest("friction")
-    digest("touching")
-    assert digest("friction") == first
-
-
-def test_the_engine_survives_pickling() -> None:
-    """With its settings: it travels to other processes with a blast."""
-    engine = EventEngine(cell_units=7.0)
-    copy = pickle.loads(pickle.dumps(engine))
-    assert copy == engine
-    assert digest("random", copy) == digest("random", engine)
 
 
 def test_a_scene_is_not_changed_by_running_it() -> None:

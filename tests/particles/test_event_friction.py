@@ -96,12 +96,6 @@ def test_balls_slide_or_stick_by_coulomb_s_law(coefficient: float, inertia_facto
     assert (abs(slip) < 1e-9 * 80.0) == (sticking <= coefficient * normal)
 
 
-def test_both_regimes_of_coulomb_s_law_occur_above() -> None:
-    """A test of the test: with f = 0.5 balls stick from a coefficient of 0.081 on."""
-    limit = 80.0 / (1.0 + 2.0) / ((1.0 + RESTITUTION) * 200.0)
-    assert 0.05 < limit < 0.2
-
-
 def test_a_ball_that_sticks_to_a_wall_rolls_and_then_brakes_at_the_opposite_wall() -> None:
     """Solid disc: v_t falls to 2/3, with w r = v_t. At the other wall the spin is the wrong way
     round: the slip is 2 v_t, and v_t falls to a third.
@@ -135,11 +129,3 @@ def test_a_ball_slides_along_a_wall_by_coulomb_s_law(coefficient: float) -> None
     assert run.balls().velocity[0] == pytest.approx([-RESTITUTION * 500.0, 90.0 - push])
     # The record is that of the normal: friction is no part of it.
     assert run.log.to_array()["transferred_impulse"] == pytest.approx((1 + RESTITUTION) * 1250.0)
-
-
-def test_spins_fade_in_no_other_way_than_by_contacts() -> None:
-    """A ball keeps its spin while it flies, and through contacts that do not rub it."""
-    run = WorldRun(brushing(settings(5.0), (0.4, 1.5), (0.8, 1.3)))
-    early = run.balls_at(0.06)["spin"].copy()
-    assert (early != 0.0).all()
-    assert (run.balls_at(0.3)["spin"] == early).all()

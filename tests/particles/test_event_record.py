@@ -1,7 +1,5 @@
 """The record of the event engine: every column, checked against what can be known of it."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,6 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, Blast
 from blast_env.evaluation.engines.particles import find_particle_engine
 from blast_env.particles.run import COLLISION_DTYPE, incidence_angle_rad
-from tests.particles.scenes import EVENT, KEEP_MASS, closed_box, hot_cloud, parameters
 
 COURTYARD = load_scenario("courtyard")
 
@@ -50,48 +47,6 @@ def test_the_record_has_the_columns_of_every_engine() -> None:
             assert part.first_hit_s is None
 
 
-def test_earlier_collisions_are_those_of_a_recount() -> None:
-    """Slice by slice through a hot cloud in a box: a ball that has collided moves otherwise.
-
-    As many balls must move otherwise as the collisions of the slice have partners; a ball that
-    collided twice in one slice, which makes them fewer, is left out from then on.
-    """
-    of_ball = {"elasticity": 1.0}
-    contact = {**KEEP_MASS, "module_restitution": 0.9}
-    settings = parameters(air=of_ball, explosive=of_ball, contact=contact)
-    run = EVENT.start(hot_cloud(settings, closed_box((58.0, 66.0), (24, 18))))
-    counted = np.zeros(len(run.scene.balls), dtype=int)
-    is_sure = np.ones(len(counted), dtype=bool)
-    before, compared = run.balls(), 0
-    for time_s in np.arange(0.0, 0.04, 4e-6):
-        logged, steps = len(run.log), run.steps
-        run.advance(float(time_s))
-        if run.steps == steps:
-            continue
-        after, hits = run.balls(), run.log.to_array(logged)
-        changed = (after.velocity != before.velocity).any(axis=1)
-        if changed.sum() < 2 * (run.steps - steps) - len(hits):
-            is_sure[changed] = False
-        ball: Any = hits["ball"]  # as what it is, it takes mypy seconds to index with
-        for hit in hits[is_sure[ball]]:
-            assert hit["earlier_collisions"] == counted[hit["ball"]]
-            compared += 1
-        counted[changed] += 1
-        before = after
-    assert compared > 50
-
-
-def test_every_engine_starts_from_the_same_state() -> None:
-    starts = [
-        Blast(COURTYARD, [(4, 0)], seed=3, engine=name).start() for name in CALIBRATED_ENGINES
-    ]
-    reference, *others = [run.balls() for run in starts]
-    for states in others:
-        for field in ("index", "kind", "position", "velocity", "mass", "radius"):
-            assert (getattr(states, field) == getattr(reference, field)).all()
-    assert {len(run.log) for run in starts} == {0}
-
-
 def test_both_engines_agree_on_a_blast_without_air() -> None:
     """Without collisions among balls nothing is chaotic: hit by hit the same, but for the steps."""
     sparse = COURTYARD.with_simulation("ballistic", {"air": {"spacing_units": 0.0}})
@@ -110,9 +65,3 @@ def test_both_engines_agree_on_a_blast_without_air() -> None:
     same_module = stepped["module"] == exact["module"]
     assert same_module.mean() > 0.95
     assert stepped["impulse"] == pytest.approx(exact["impulse"], rel=1e-9)
-
-
-def test_every_engine_of_the_package_has_the_name_that_it_is_found_by() -> None:
-    assert [find_particle_engine(name).name for name in CALIBRATED_ENGINES] == list(
-        CALIBRATED_ENGINES
-    )

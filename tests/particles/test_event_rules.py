@@ -12,7 +12,6 @@ from tests.particles.scenes import (
     EXPLOSIVE,
     KEEP_MASS,
     balls,
-    momentum,
     parameters,
     scene,
     states_at,
@@ -118,21 +117,6 @@ def test_a_ball_is_removed_at_the_collision_that_takes_it_below_r_min() -> None:
     assert run.steps == 4
     assert run.balls().velocity[3, 0] > 100.0
     assert run.balls().velocity[4].tolist() == [0.0, 0.0]
-
-
-def test_the_base_impulse_acts_along_the_line_of_centres() -> None:
-    """Also when the balls meet at an angle, and on top of what restitution and masses give."""
-    start = balls((AIR, AIR), [(80.0, 80.0), (90.0, 81.2)], [(100.0, 7.0), (0, 0)], [1.0, 2.0])
-    at_contact = states_at(scene(start, [FAR_WALL], parameters()), 0.2)
-    plain, pushed = (
-        states_at(scene(start, [FAR_WALL], parameters(contact={"base_impulse": i})), 0.2)
-        for i in (0.0, 12.0)
-    )
-    assert at_contact.velocity.tolist() == plain.velocity.tolist()
-    gained = (pushed.velocity - plain.velocity) * pushed.mass[:, None]
-    normal = plain.velocity[1] / np.hypot(*plain.velocity[1])  # it was at rest: pushed along it
-    assert gained == pytest.approx(np.array([-12.0 * normal, 12.0 * normal]), abs=1e-12)
-    assert momentum(pushed) == pytest.approx(momentum(start), rel=1e-13)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])

@@ -55,50 +55,15 @@ def test_a_wide_gif_is_made_narrower(blast: Blast, tmp_path: Path) -> None:
         assert film.size[0] == 640
 
 
-@pytest.mark.parametrize("name", ["blast.mp4", "blast.gif"])
-@pytest.mark.parametrize("stop_at", [0.1, 0.6])
-def test_ctrl_c_leaves_nothing_behind(
-    blast: Blast, tmp_path: Path, name: str, stop_at: float
-) -> None:
+def test_ctrl_c_leaves_nothing_behind(blast: Blast, tmp_path: Path) -> None:
     def stop(share: float) -> None:
-        if share > stop_at:
+        if share > 0.3:
             raise KeyboardInterrupt
 
+    few: dict[str, Any] = {"frames_per_s": 5.0, "slow_motion": 20.0, "width_px": 320}
     with pytest.raises(KeyboardInterrupt):
-        write_film(
-            blast, tmp_path / name, frames_per_s=10.0, slow_motion=60.0, width_px=400, progress=stop
-        )
+        write_film(blast, tmp_path / "blast.mp4", progress=stop, **few)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_earlier_film_survives_a_failure(blast: Blast, tmp_path: Path) -> None:
-    path = tmp_path / "blast.mp4"
-    path.write_bytes(b"earlier")
-    with pytest.raises(BlastEnvError, match="width_px"):
-        write_film(blast, path, width_px=100)
-    assert path.read_bytes() == b"earlier"
-
-
-@pytest.mark.parametrize("name", ["blast.avi", "blast"])
-def test_another_suffix_is_refused(blast: Blast, tmp_path: Path, name: str) -> None:
-    suffix = Path(name).suffix
-    with pytest.raises(BlastEnvError, match=rf"suffix '{suffix}', must be .mp4 or .gif"):
-        write_film(blast, tmp_path / name)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_progress_rises_to_one(blast: Blast, tmp_path: Path) -> None:
-    shares: list[float] = []
-    write_film(
-        blast,
-        tmp_path / "blast.gif",
-        frames_per_s=5.0,
-        slow_motion=20.0,
-        width_px=320,
-        progress=shares.append,
-    )
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
 
 
 def test_a_film_lasts_about_ten_seconds_with_a_factor_of_few_digits(result: BlastResult) -> None:

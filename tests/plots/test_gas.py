@@ -20,7 +20,6 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.gas.probes import GroundMap
 from blast_env.particles.calibration.references import kingery_bulmash
-from blast_env.plots.figures import save_figure
 from blast_env.plots.film import plan_until
 from blast_env.plots.gas import facades, full_load, gauge_history
 from blast_env.plots.ground_map import (
@@ -310,11 +309,6 @@ def test_the_free_field_is_kingery_bulmashs_at_the_gauges_distance(bare: GasResu
     assert words.startswith("Kingery-Bulmash, free field, incident at 3.8 m: peak ")
     with pytest.raises(UnknownNameError, match="did you mean 'front'"):
         gauge_history(bare, "frost")
-
-
-def test_figures_can_be_saved(walled: GasResult, tmp_path: Path) -> None:
-    path = save_figure(gauge_history(walled, "front"), tmp_path / "front.png")
-    assert path.stat().st_size > 10_000
 
 
 # Films.

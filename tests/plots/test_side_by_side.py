@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from imageio.plugins import ffmpeg
-from PIL import Image
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
@@ -84,30 +83,9 @@ def test_the_barrier_is_in_its_own_half_alone(barrier_blast: Blast, both: Writte
     assert np.abs(left - right).max() > 50  # a black edge beside the ground
 
 
-def test_ctrl_c_leaves_nothing_behind(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
-    def stop(share: float) -> None:
-        if share > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write(blast, barrier_blast, tmp_path / "both.mp4", progress=stop)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_progress_rises_to_one(both: Written) -> None:
-    assert both.shares == sorted(both.shares)
-    assert both.shares[-1] == 1.0
-
-
 def test_what_is_no_film_of_two_is_refused(blast: Blast, tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match=r"suffix '.avi', must be .mp4 or .gif"):
         write(blast, blast, tmp_path / "film.avi")
     with pytest.raises(BlastEnvError, match="width_px is 300, must be 320"):
         write(blast, blast, tmp_path / "film.mp4", width_px=600)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_two_blasts_are_in_a_gif_too(blast: Blast, barrier_blast: Blast, tmp_path: Path) -> None:
-    write(blast, barrier_blast, tmp_path / "both.gif")
-    with Image.open(tmp_path / "both.gif") as film:
-        assert film.size[0] == WIDTH_PX

@@ -13,14 +13,11 @@ import pytest
 import blast_env
 from blast_env.design.rules import random_layout, wall_near_charge
 from blast_env.design.search import layouts_by_rule
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Evaluators, Threat, draw_threats
 from blast_env.io.export import LayoutPlan
 from blast_env.layout import LayoutFile, Placement, check_layout, usable_cells
-from blast_env.site import ScenarioError, scenario_hash
 from blast_env.site.scene import Charge
 from blast_env.sites import SiteMeasures, turned
-from tests.scenarios import BALLISTIC_COURTYARD
 
 NAME = "courtyard"
 COURTYARD = blast_env.load_scenario(NAME)
@@ -119,42 +116,8 @@ def test_name_path_and_scenario_mean_the_same(call: Callable[[Any], Any], tmp_pa
     assert call(NAME) == call(str(path)) == call(path) == call(plain) == call(COURTYARD)
 
 
-def test_blasts_and_evaluations_of_a_path(tmp_path: Path) -> None:
-    path = tmp_path / "thin.toml"
-    blast_env.save_scenario(BALLISTIC_COURTYARD, path)
-    wall = [(10, 0), (11, 0)]
-    expected = blast_env.simulate(BALLISTIC_COURTYARD, wall, seed=5, engine="event").digest
-    assert blast_env.simulate(path, wall, seed=5, engine="event").digest == expected
-    blasts = [blast_env.Blast(str(path), wall, seed, "event") for seed in (5, 6)]
-    assert blast_env.simulate_many(blasts)[0].digest == expected
-    evaluations = [
-        blast_env.evaluate_layout(each, wall, seeds=(5,), engine="event")
-        for each in (path, BALLISTIC_COURTYARD)
-    ]
-    assert evaluations[0].to_dict() == evaluations[1].to_dict()
-
-
-def test_layout_files_for_a_name(tmp_path: Path) -> None:
-    path = blast_env.write_layout(tmp_path / "wall.json", NAME, [(1, 1)])
-    assert blast_env.load_layout(path, NAME) == blast_env.load_layout(path, COURTYARD) == ((1, 1),)
-
-
 def test_a_blast_stays_as_it_was_made() -> None:
     blast = blast_env.Blast(NAME)
     assert replace(blast, seed=2).scenario is blast.scenario
     with pytest.raises(FrozenInstanceError):
         blast.scenario = COURTYARD  # type: ignore[misc]
-
-
-@pytest.mark.parametrize("make", [scenario_hash, blast_env.Blast, blast_env.simulate])
-def test_a_misspelt_name_is_answered_with_the_nearest(make: Callable[[str], object]) -> None:
-    with pytest.raises(ScenarioError, match="did you mean 'courtyard'"):
-        make("courtyrad")
-
-
-@pytest.mark.parametrize("make", [scenario_hash, blast_env.Blast, blast_env.simulate])
-def test_anything_else_is_no_scenario(make: Callable[[Any], object]) -> None:
-    with pytest.raises(BlastEnvError, match="scenario is 3, must be a name, a path or a Scenario"):
-        make(3)
-    with pytest.raises(TypeError, match="missing 1 required positional argument"):
-        make()  # type: ignore[call-arg]

@@ -1,6 +1,5 @@
-"""Damaged scenario files, well over a thousand: each a clear error, none a traceback."""
+"""Damaged scenario files, hundreds: each a clear error, none a traceback."""
 
-import tomllib
 from copy import deepcopy
 from difflib import get_close_matches
 from typing import Any
@@ -113,7 +112,7 @@ def wrong_values(value: Any) -> st.SearchStrategy[Any]:
 
 
 @given(st.data())
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_misspelt_key_is_named_with_the_nearest_one(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(KEYS))
     key = str(path[-1])
@@ -129,14 +128,15 @@ def test_misspelt_key_is_named_with_the_nearest_one(data: st.DataObject) -> None
         assert f"{written(path)}: missing" in message
 
 
-@pytest.mark.parametrize("case", range(len(REQUIRED)))
-def test_deleted_key_is_named(case: int) -> None:
-    document, path = REQUIRED[case]
-    assert f"{SOURCE}: {written(path)}: missing" in error_of_document(without(document, path))
+def test_deleted_key_is_named() -> None:
+    """Each key of each kind of table once."""
+    kinds = {tuple(k for k in case[1] if isinstance(k, str)): case for case in REQUIRED}
+    for document, path in kinds.values():
+        assert f"{SOURCE}: {written(path)}: missing" in error_of_document(without(document, path))
 
 
 @given(st.data())
-@settings(max_examples=125, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     document, path = data.draw(st.sampled_from(CASES))
     wrong = data.draw(wrong_values(value_at(document, path)))
@@ -154,7 +154,7 @@ def test_value_of_the_wrong_type_is_named(data: st.DataObject) -> None:
     | st.integers(1, 4000).map(lambda exponent: -(10**exponent))
     | st.integers(13, 4000).map(lambda exponent: 10**exponent),
 )
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None, derandomize=True)
 def test_number_out_of_bounds_is_named(case: tuple[Document, KeyPath], wrong: float) -> None:
     document, path = case
     message = error_of_document(changed(document, path, wrong))
@@ -164,7 +164,7 @@ def test_number_out_of_bounds_is_named(case: tuple[Document, KeyPath], wrong: fl
 
 
 @given(st.data())
-@settings(max_examples=75, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_overlapping_structures_are_both_named(data: st.DataObject) -> None:
     document = deepcopy(data.draw(st.sampled_from(all_documents())))
     index = data.draw(st.integers(0, len(document["structures"]) - 1))
@@ -180,7 +180,7 @@ def test_overlapping_structures_are_both_named(data: st.DataObject) -> None:
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 def test_structure_outside_the_site_is_named(data: st.DataObject) -> None:
     document = deepcopy(data.draw(st.sampled_from(all_documents())))
     index = data.draw(st.integers(0, len(document["structures"]) - 1))
@@ -194,7 +194,7 @@ def test_structure_outside_the_site_is_named(data: st.DataObject) -> None:
 
 
 @given(st.sampled_from(TEXTS), st.floats(0.0, 1.0))
-@settings(max_examples=75, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_truncated_file_is_an_error(text: str, share: float) -> None:
     # Without any structure, whatever else is there is no scenario.
     end = text.index("[[structures]]") if "[[structures]]" in text else text.index("structures = ")
@@ -202,7 +202,7 @@ def test_truncated_file_is_an_error(text: str, share: float) -> None:
 
 
 @given(st.sampled_from(TEXTS), st.integers(0, 10**6), st.text(min_size=1, max_size=10))
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 def test_edited_file_is_a_scenario_or_an_error(text: str, place: int, inserted: str) -> None:
     place %= len(text)
     edited = text[:place] + inserted + text[place + len(inserted) :]
@@ -215,7 +215,7 @@ def test_edited_file_is_a_scenario_or_an_error(text: str, place: int, inserted: 
 
 
 @given(st.binary(max_size=200))
-@settings(max_examples=75, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 def test_random_bytes_are_an_error(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:
@@ -235,7 +235,7 @@ TOP_KEYS = sorted(set(Scenario.model_fields))
 
 
 @given(st.dictionaries(st.sampled_from(TOP_KEYS) | st.text(max_size=10), TOML_VALUES, max_size=8))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 def test_any_other_toml_is_an_error(document: Document) -> None:
     error_of_document(document)
 
@@ -263,9 +263,3 @@ def test_any_other_toml_is_an_error(document: Document) -> None:
 def test_monstrous_file_is_an_error(text: str) -> None:
     message = error_of(text)
     assert max(map(len, message.split("\n"))) < 400
-
-
-def test_the_files_are_valid_before_they_are_damaged() -> None:
-    for text in TEXTS:
-        assert parse_scenario(text, SOURCE).structures
-        assert tomllib.loads(text)

@@ -1,7 +1,6 @@
 """Build zones with a catalogue: what a file says, what pieces cover, and where they may stand."""
 
 import json
-import pickle
 import re
 from pathlib import Path
 from typing import Any
@@ -17,8 +16,6 @@ from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutFile, Placement, load_layout, write_layout
 from blast_env.layout.build_scene import build_scene, build_site
 from blast_env.site import (
-    Item,
-    ObjectiveSection,
     Scenario,
     ScenarioError,
     load_scenario,
@@ -26,7 +23,7 @@ from blast_env.site import (
     stock_barriers,
 )
 from tests.catalogue_sites import ITEMS, WALL, item, yard, yard_document
-from tests.site.documents import REPOSITORY, Document
+from tests.site.documents import Document
 from tests.site.zones import buildable, catalogue_documents, pieces_may_stand
 
 
@@ -38,14 +35,6 @@ def lines_for(**zone: Any) -> list[str]:
 
 
 # --- The file.
-
-
-def test_a_catalogue_survives_saving(tmp_path: Path) -> None:
-    scenario = yard(cost_areas=[{**AREA, "cost_factor": 2.0}])
-    save_scenario(scenario, tmp_path / "yard.toml")
-    assert load_scenario(tmp_path / "yard.toml") == scenario
-    assert Scenario.from_document(scenario.model_dump(), "yard") == scenario
-    assert scenario.zone.stock == 9
 
 
 AREA: Document = {"corner_m": (3.5, 2.5), "size_m": (1.0, 1.0), "reason": "duct"}
@@ -298,19 +287,6 @@ def test_what_is_no_layout_is_refused(layout: Any, words: str) -> None:
         Placement.of(yard(), layout)
 
 
-def test_a_piece_is_no_cell() -> None:
-    with pytest.raises(LayoutError, match=r"^layout\[0\]: has 4 values, must be a pair of integ"):
-        Placement.of(load_scenario("courtyard"), WALL)
-
-
-def test_numpy_values_become_plain_ones() -> None:
-    given: Any = (np.int64(5), np.uint8(1), np.str_("wall"), np.bool_(True))
-    placement = Placement.empty(yard()).place(given)
-    assert placement.layout == (WALL[0],)
-    assert [type(value) for value in placement.layout[0]] == [int, int, str, bool]
-    assert pickle.loads(pickle.dumps(placement)) == placement
-
-
 # --- Layout files.
 
 
@@ -455,22 +431,6 @@ def test_what_the_stock_list_needs_beside_the_name_is_the_stock() -> None:
     assert lines_for(items=[{"from_catalogue": "planter"}])[0] == (
         "yard: build_zone.items[0].stock: missing"
     )
-
-
-def test_the_description_of_the_format_has_the_stock_list() -> None:
-    text = (REPOSITORY / "docs" / "reference" / "catalogue.md").read_text(encoding="utf-8")
-    for name, each in stock_barriers().items():
-        size = (each.length_modules * 0.5, each.thickness_modules * 0.5, each.height_m)
-        row = " x ".join(f"{side:g}" for side in size)
-        turns = "yes" if each.rotatable else "no"
-        assert f"| `{name}` | {row} | {each.cost:g} | {turns} | {each.description} |" in text
-        assert each.stops_vehicles  # as the text says of all
-
-
-def test_the_description_of_the_format_names_every_key_of_items_and_objective() -> None:
-    for section, page in ((Item, "catalogue.md"), (ObjectiveSection, "scenario_format.md")):
-        text = (REPOSITORY / "docs" / "reference" / page).read_text(encoding="utf-8")
-        assert not [key for key in section.model_fields if f"`{key}`" not in text]
 
 
 def test_the_catalogue_of_a_changed_zone_is_its_own() -> None:

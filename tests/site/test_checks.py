@@ -187,7 +187,7 @@ SOURCE = st.one_of(
 
 
 @given(SOURCE, POINT, SIZE)
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 def test_distance_is_that_of_the_nearest_place_of_the_charge(
     source: PointSource | SegmentSource | RectangleSource,
     corner: tuple[float, float],

@@ -1,7 +1,5 @@
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -71,15 +69,6 @@ def test_gap_of_the_gate_stays_open() -> None:
     assert lane.left <= south.left
 
 
-@pytest.mark.parametrize("name", bundled_scenarios())
-def test_bundled_scenario_survives_saving(tmp_path: Path, name: str) -> None:
-    scenario = load_scenario(name)
-    save_scenario(scenario, tmp_path / "copy.toml")
-    copy = load_scenario(tmp_path / "copy.toml")
-    assert copy == scenario
-    assert scenario_hash(copy) == scenario_hash(scenario)
-
-
 def texts(least: int, most: int) -> st.SearchStrategy[str]:
     text = st.text(min_size=least, max_size=most)
     return text.filter(lambda each: STEERING.search(each) is None)
@@ -98,7 +87,7 @@ def texts(least: int, most: int) -> st.SearchStrategy[str]:
         }
     )
 )
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_any_scenario_survives_saving(
     tmp_path_factory: pytest.TempPathFactory, values: Document
 ) -> None:
@@ -135,21 +124,6 @@ def test_order_of_keys_does_not_change_the_hash() -> None:
         assert scenario_hash(first) == scenario_hash(second)
 
 
-@pytest.mark.parametrize("hash_seed", ["0", "4711"])
-def test_hash_is_the_same_in_every_process(hash_seed: str) -> None:
-    code = (
-        "from blast_env.site import *;"
-        "print(*(scenario_hash(load_scenario(name)) for name in bundled_scenarios()))"
-    )
-    environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
-    printed = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-    )
-    expected = [scenario_hash(load_scenario(name)) for name in bundled_scenarios()]
-    assert printed.stdout.split() == expected
-    assert len(set(expected)) == len(expected)
-
-
 @pytest.mark.parametrize(
     ("name_or_path", "words"),
     [
@@ -168,11 +142,6 @@ def test_hash_is_the_same_in_every_process(hash_seed: str) -> None:
 def test_unknown_scenario_is_a_clear_error(name_or_path: str, words: str) -> None:
     with pytest.raises(ScenarioError, match=re.escape(words)):
         load_scenario(name_or_path)
-
-
-def test_folder_is_no_scenario(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="is a folder, must be a file"):
-        load_scenario(tmp_path)
 
 
 def test_name_means_the_bundled_scenario_wherever_one_is(
@@ -229,10 +198,6 @@ def test_all_problems_of_a_file_are_found_at_once(tmp_path: Path) -> None:
     }
 
 
-def test_sound_scenario_has_no_problems() -> None:
-    assert find_problems("courtyard") == ()
-
-
 def test_unreadable_file_is_a_problem_too(tmp_path: Path) -> None:
     (problem,) = find_problems(tmp_path / "missing.toml")
     assert (problem.key, problem.message) == ("", "there is no such file")
@@ -255,21 +220,6 @@ def test_scenario_is_saved_only_where_it_can_be_loaded(tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match="there is no folder"):
         save_scenario(scenario, tmp_path / "missing" / "f.toml")
     assert os.listdir(tmp_path) == []
-
-
-def test_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "f.toml"
-    save_scenario(load_scenario("courtyard"), path)
-    before = path.read_bytes()
-
-    def fail(*arguments: object, **options: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_text", fail)
-    with pytest.raises(BlastEnvError, match="cannot be written: No space left"):
-        save_scenario(load_scenario("free_field"), path)
-    assert path.read_bytes() == before
-    assert os.listdir(tmp_path) == ["f.toml"]
 
 
 def test_example_of_the_format_description_loads() -> None:

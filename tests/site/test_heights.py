@@ -1,7 +1,5 @@
 """Heights, faces, gauges, buildings and georeferences."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 
 from blast_env.layout import usable_cells
 from blast_env.layout.build_scene import build_scene, build_site, draw_charge
-from blast_env.site import Scenario, ScenarioError, bundled_scenarios, load_scenario, save_scenario
+from blast_env.site import Scenario, ScenarioError, bundled_scenarios, load_scenario
 from blast_env.site.scene import WALLS, Charge, Gauge
 from tests.site.documents import (
     Document,
@@ -28,14 +26,6 @@ from tests.site.documents import (
 
 def scenario_from(document: Document) -> Scenario:
     return Scenario.from_document(document, "f.toml")
-
-
-def test_scenario_with_heights_survives_saving(tmp_path: Path) -> None:
-    scenario = scenario_from(tall_document())
-    save_scenario(scenario, tmp_path / "copy.toml")
-    copy = load_scenario(tmp_path / "copy.toml")
-    assert copy == scenario
-    assert copy.content_hash == scenario.content_hash
 
 
 @pytest.mark.parametrize("document", all_documents(), ids=lambda document: document["name"])
@@ -306,7 +296,7 @@ def test_air_is_6_m_higher_than_anything_and_at_least_12_m(
 
 
 @given(st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 20.0), st.floats(0.0, 14.0)))
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_gauge_is_refused_just_where_there_is_no_air_within_half_a_metre(
     position_m: tuple[float, float, float],
 ) -> None:

@@ -68,35 +68,6 @@ def test_bad_value_is_named_with_its_bound(path: KeyPath, value: object, line: s
     assert all(each.startswith("f.toml: ") for each in lines)
 
 
-@pytest.mark.parametrize(
-    ("path", "line"),
-    [
-        (("site", "widht_m"), "f.toml: site.widht_m: unknown key, did you mean 'width_m'?"),
-        (("srtuctures",), "f.toml: srtuctures: unknown key, did you mean 'structures'?"),
-        (
-            ("charge", 1, "strat_m"),
-            "f.toml: charge[1].strat_m: unknown key, did you mean 'start_m'?",
-        ),
-        (
-            ("simulation", "overrides", "air", "spacing_unit"),
-            "f.toml: simulation.overrides.air.spacing_unit: unknown key,"
-            " did you mean 'spacing_units'?",
-        ),
-        (
-            ("simulation", "overrides", "exlosive"),
-            "f.toml: simulation.overrides.exlosive: unknown key, did you mean 'explosive'?",
-        ),
-        (("site", "zzz"), "f.toml: site.zzz: unknown key; known: width_m, height_m, air_height_m"),
-        (
-            ("site", "a b\n"),
-            "f.toml: site.'a b\\n': unknown key; known: width_m, height_m, air_height_m",
-        ),
-    ],
-)
-def test_unknown_key_is_answered_with_the_nearest_one(path: KeyPath, line: str) -> None:
-    assert lines_for(changed(full_document(), path, {})) == [line]
-
-
 def test_misspelt_required_key_gives_both_lines() -> None:
     document = changed(without(minimal_document(), ("site", "width_m")), ("site", "widht_m"), 3.0)
     assert lines_for(document) == [

@@ -233,25 +233,6 @@ def test_modules_keep_clear_of_the_entries_so_that_it_can_always_enter() -> None
     assert worst.places_m[0] == (1.0, 4.0)
 
 
-@settings(max_examples=30)
-@given(cells=st.frozensets(st.tuples(st.integers(0, 15), st.integers(0, 3)), max_size=16))
-def test_more_modules_never_let_it_nearer_and_its_square_is_always_clear(
-    cells: frozenset[tuple[int, int]],
-) -> None:
-    scenario = gate_site()
-    source, zone = vehicle_of(scenario), scenario.zone
-    layout = sorted(cells)
-    worst = worst_places(scenario, source, layout)
-    fewer = worst_places(scenario, source, layout[:-1])
-    assert worst.stand_off_m >= fewer.stand_off_m - 1e-9
-    solid = [zone.cell_rectangle_m(cell) for cell in layout]
-    solid += [each.rectangle_m for each in scenario.structures]
-    for x_m, y_m in worst.places_m:
-        square = Rectangle(x_m - 1.0, y_m - 1.0, x_m + 1.0, y_m + 1.0)
-        assert scenario.site.rectangle_m.contains(square)
-        assert not any(square.overlaps(each) for each in solid)
-
-
 def test_what_does_not_stop_it_is_driven_over_but_holds_no_charge() -> None:
     scenario = gate_site()
     source = vehicle_of(scenario)

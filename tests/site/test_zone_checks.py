@@ -3,12 +3,9 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
 
-from blast_env.layout import Placement
-from blast_env.site import load_scenario, save_scenario
 from tests.site.documents import Document, lines_for
-from tests.site.zones import area, buildable, structure, zone_document, zone_documents
+from tests.site.zones import area, structure, zone_document
 
 
 def way(width_m: float, between: str = "left_right") -> Document:
@@ -105,17 +102,3 @@ def test_two_problems_of_a_zone_are_both_named() -> None:
     document = zone_document(access_way=way(9.0), budget=0.5, stock=65)
     keys = [line.split(": ")[1] for line in lines_for(document)]
     assert keys == ["build_zone.stock", "build_zone.access_way.width_m", "build_zone.budget"]
-
-
-@given(zone_documents())
-@settings(max_examples=40, deadline=None, derandomize=True)
-def test_conditions_survive_saving(
-    tmp_path_factory: pytest.TempPathFactory, document: Document
-) -> None:
-    scenario = buildable(document)
-    path = tmp_path_factory.getbasetemp() / "zone.toml"
-    save_scenario(scenario, path)
-    copy = load_scenario(path)
-    assert copy == scenario
-    assert copy.content_hash == scenario.content_hash
-    assert (Placement.empty(copy).free == Placement.empty(scenario).free).all()

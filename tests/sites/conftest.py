@@ -8,5 +8,5 @@ from blast_env.sites import generate_site
 
 @pytest.fixture(scope="session")
 def sites() -> tuple[Scenario, ...]:
-    """The first 200 sites."""
-    return tuple(generate_site(seed) for seed in range(200))
+    """The first sites."""
+    return tuple(generate_site(seed) for seed in range(80))

@@ -97,15 +97,15 @@ def test_the_first_sites_are_what_they_were(sites: tuple[Scenario, ...]) -> None
 PROPERTIES: dict[str, tuple[Callable[[Scenario], object], int]] = {
     "side of the threat": (lambda site: site.description.rsplit("along the ", 1)[1], 4),
     "kind of threat": (lambda site: type(site.charge[0]), 2),
-    "place of the threat": (threat_of, 100),
-    "charge": (lambda site: site.charge[0].tnt_kg, 50),
+    "place of the threat": (threat_of, 60),
+    "charge": (lambda site: site.charge[0].tnt_kg, 30),
     "least distance": (lambda s: distance_m(s.charge[0], s.structures[0].rectangle_m), 10),
     "rows of the building": (lambda site: site.structures[0].rows, 10),
     "columns of the building": (lambda site: site.structures[0].columns, 10),
-    "place of the building": (lambda site: site.structures[0].corner_m, 100),
+    "place of the building": (lambda site: site.structures[0].corner_m, 60),
     "neighbours": (lambda site: len(site.structures), 2),
     "places of neighbours": (lambda site: [s.corner_m for s in site.structures[1:]], 30),
-    "place of the zone": (lambda site: site.zone.corner_m, 60),
+    "place of the zone": (lambda site: site.zone.corner_m, 40),
     "path": (lambda site: kept_out(site, "path"), 2),
     "hydrant": (lambda site: kept_out(site, "hydrant"), 2),
     "trees": (lambda site: kept_out(site, "tree"), 4),
@@ -117,12 +117,11 @@ PROPERTIES: dict[str, tuple[Callable[[Scenario], object], int]] = {
 }
 
 
-@pytest.mark.parametrize("name", PROPERTIES)
-def test_every_property_varies(sites: tuple[Scenario, ...], name: str) -> None:
-    value_of, least = PROPERTIES[name]
-    values = [value_of(site) for site in sites]
-    assert len({repr(value) for value in values}) >= least
-    assert max(map(values.count, values)) < 0.85 * len(values)
+def test_every_property_varies(sites: tuple[Scenario, ...]) -> None:
+    for name, (value_of, least) in PROPERTIES.items():
+        values = [value_of(site) for site in sites]
+        assert len({repr(value) for value in values}) >= least, name
+        assert max(map(values.count, values)) < 0.85 * len(values), name
 
 
 def test_what_is_drawn_lies_within_the_ranges(sites: tuple[Scenario, ...]) -> None:
@@ -180,7 +179,7 @@ def test_sites_meet_the_criterion_and_most_meet_it_at_once(sites: tuple[Scenario
     assert not any(criterion.objection(site) for site in sites)
     at_once = [
         criterion.objection(draw_site(np.random.default_rng(seed), RANGES, "x")) is None
-        for seed in range(100)
+        for seed in range(40)
     ]
     # Much less, and a seed would take long; all, and the criterion would do nothing.
     assert 0.4 < np.mean(at_once) < 0.95

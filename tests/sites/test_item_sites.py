@@ -37,7 +37,7 @@ RANGES = ItemSiteRanges()
 
 @pytest.fixture(scope="module")
 def item_sites() -> tuple[Scenario, ...]:
-    return tuple(generate_site(seed, RANGES) for seed in range(16))
+    return tuple(generate_site(seed, RANGES) for seed in range(12))
 
 
 def test_a_seed_is_a_site_and_the_old_family_keeps_its_seeds(
@@ -153,7 +153,7 @@ def test_the_criterion_is_kept(item_sites: tuple[Scenario, ...]) -> None:
 
 def test_large_sites_of_a_side_share_the_spaces_and_keep_the_criterion() -> None:
     source = SiteSource.held_out(ranges=FAMILIES[LARGE_SITES])
-    for seed in range(3):
+    for seed in range(1):
         site = source.site(seed)
         check_size(site, source.representative)
         assert (site.site.width_m, site.site.height_m) == (60.0, 60.0)
@@ -171,9 +171,9 @@ def test_stand_offs_grow_with_large_sites(side_m: float) -> None:
         assert 0.4 * side_m <= site.vehicle_ground(source).entry_stand_off_m <= 0.7 * side_m
 
 
-@pytest.mark.parametrize("side_m", [16.0, 18.5, 24.0])
+@pytest.mark.parametrize("side_m", [16.0, 24.0])
 def test_threats_are_closer_on_close_sites(side_m: float) -> None:
-    for seed in range(4):
+    for seed in range(2):
         site = generate_site(seed, close_ranges(side_m))
         assert site.site.width_m == site.site.height_m == side_m
         assert ITEM_CRITERION.objection(site) is None

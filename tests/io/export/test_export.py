@@ -14,7 +14,7 @@ from ezdxf.filemanagement import readfile
 from ezdxf.layouts.layout import Modelspace
 
 from blast_env import load_scenario
-from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.errors import BlastEnvError
 from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout, export_layouts
 from blast_env.io.export.bill import MODULE_COLUMNS
 from blast_env.layout import LayoutFile, load_layout
@@ -174,11 +174,6 @@ def test_a_folder_gets_every_layout_in_every_form(tmp_path: Path) -> None:
     }
     assert all(path.stat().st_size > 0 for path in written)
     assert load_layout(tmp_path / "a" / "b" / "two.json", COURTYARD) == ((0, 0),)
-
-
-def test_a_layout_that_does_not_fit_is_refused() -> None:
-    with pytest.raises(LayoutError, match=r"\(99, 0\)"):
-        plan(layout=((99, 0),))
 
 
 @pytest.mark.parametrize(

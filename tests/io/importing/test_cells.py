@@ -20,7 +20,7 @@ MASKS = arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9)))
 
 
 @given(MASKS)
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 def test_rectangles_are_the_cells_and_none_lies_over_another(cells: np.ndarray) -> None:
     count = np.zeros(cells.shape, dtype=int)
     for each in CellRectangle.each(rectangles_of(cells)):

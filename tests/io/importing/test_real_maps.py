@@ -338,6 +338,7 @@ def retitled(scenario: Scenario) -> Scenario:
     return Scenario.from_document(document, "retitled")
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_labels_of_real_names_do_not_lie_on_each_other(tmp_path: Path) -> None:
     names = [f"Государственное бюджетное учреждение культуры № {k}" for k in range(8)]
     row = [

@@ -1,8 +1,5 @@
 """The free-field study: resumable, parallel, summed up with intervals."""
 
-import json
-import sys
-from dataclasses import asdict
 from pathlib import Path
 
 import pandas as pd
@@ -111,39 +108,6 @@ def test_bad_studies_are_refused(
 ) -> None:
     with pytest.raises(BlastEnvError, match=words):
         FreeFieldStudy(SMALL, distances, seeds)
-
-
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({"impulse_sim": -1.0}, "impulse_sim is -1.0: .* greater than or equal to 0"),
-        ({"impulse_sim": "much"}, "impulse_sim is 'much': .* number"),
-        ({"first_hit_s": 10**5000}, "1000.* has 5001 digits"),
-        ({"seed": 1.5}, "seed is 1.5: .* integer"),
-        ({"more": 1}, "more is 1: "),
-        ({"distance_m": [[[[1.0]]]]}, "distance_m is an array: .* number"),
-    ],
-)
-def test_a_run_that_is_none_is_refused_with_its_key_and_bound(
-    changed: dict, words: str, tmp_path: Path
-) -> None:
-    run = asdict(FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
-    sys.set_int_max_str_digits(10_000)
-    line = json.dumps(run | changed)
-    sys.set_int_max_str_digits(4300)
-    (tmp_path / "runs.jsonl").write_text(f"{line}\n")
-    with pytest.raises(BlastEnvError, match=f"runs.jsonl: line 1: {words}"):
-        Journal(tmp_path / "runs.jsonl", FreeFieldRun).read()
-
-
-def test_a_run_with_the_key_of_another_is_refused(tmp_path: Path) -> None:
-    """Its distance would stand in the table beside the impulse of another."""
-    study = FreeFieldStudy(SMALL, (8.0,), (5,))
-    study.run(store=tmp_path / "runs.jsonl")
-    text = (tmp_path / "runs.jsonl").read_text()
-    (tmp_path / "runs.jsonl").write_text(text.replace('"distance_m": 8.0', '"distance_m": 9.0'))
-    with pytest.raises(BlastEnvError, match=r"9 m with seed 5 has the key of one at 8 m"):
-        study.run(store=tmp_path / "runs.jsonl")
 
 
 def test_a_store_that_is_none_is_refused_with_its_line(tmp_path: Path) -> None:

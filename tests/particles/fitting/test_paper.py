@@ -22,7 +22,6 @@ from blast_env.particles.paper import (
     PaperLaw,
     comparative_table,
     comparison_table,
-    deviations,
     metrics_row,
 )
 from blast_env.plots.calibration_figures import figure_5
@@ -96,11 +95,6 @@ def test_the_printed_columns_are_the_paper_s() -> None:
             decimals = {len(text.partition(".")[2]) for text in printed_cells(law, cell)}
             assert decimals == {law.decimals[list(OURS).index(cell)]}
         assert law.table_4 == tuple(float(text) for text in TABLE_4[law.name])
-
-
-def test_deviations_count_in_units_of_the_last_digit() -> None:
-    table = pd.DataFrame([[30.0, 1.234, 0.5, 7.0, 1.23, 0.52, 9.0]])
-    assert deviations(table, (2, 2, 0)) == pytest.approx(np.array([[0.4, -2.0, -2.0]]))
 
 
 def test_the_coefficients_of_the_text_contradict_the_tables() -> None:

@@ -45,48 +45,6 @@ def test_the_same_result_gives_the_same_bytes(blast: BlastResult, tmp_path: Path
     assert first.read_bytes() == second.read_bytes()
 
 
-@pytest.mark.parametrize("name", ["run.xlsx", "run", "run.parquet.gz"])
-def test_another_suffix_is_refused_by_name(blast: BlastResult, tmp_path: Path, name: str) -> None:
-    suffix = Path(name).suffix
-    with pytest.raises(BlastEnvError, match=rf"suffix {suffix!r}, must have '\.parquet'"):
-        write_parquet(blast, tmp_path / name)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_missing_folder_is_named(blast: BlastResult, tmp_path: Path) -> None:
-    with pytest.raises(BlastEnvError, match="nowhere"):
-        write_parquet(blast, tmp_path / "nowhere" / "run.parquet")
-
-
-@pytest.mark.parametrize(
-    ("error", "raised"),
-    [(OSError(28, "No space left on device"), BlastEnvError), (KeyboardInterrupt(), None)],
-)
-def test_a_failure_in_the_middle_keeps_what_was_there(
-    blast: BlastResult,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    error: BaseException,
-    raised: type[BaseException] | None,
-) -> None:
-    def write_half(table: pa.Table, where: Path) -> None:
-        where.write_bytes(b"PAR1 half")
-        raise error
-
-    path = tmp_path / "run.parquet"
-    path.write_bytes(b"old")
-    monkeypatch.setattr(pq, "write_table", write_half)
-    with pytest.raises(raised or type(error), match="No space left" if raised else None):
-        write_parquet(blast, path)
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_reading_a_file_that_does_not_exist(tmp_path: Path) -> None:
-    with pytest.raises(BlastEnvError, match=r"gone\.parquet: there is no such file"):
-        read_parquet(tmp_path / "gone.parquet")
-
-
 @pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
 def test_reading_a_truncated_file(blast: BlastResult, tmp_path: Path, kept: float) -> None:
     path = blast.to_parquet(tmp_path / "run.parquet")

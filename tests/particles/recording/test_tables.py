@@ -1,7 +1,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from blast_env.evaluation.engines import BlastResult
@@ -138,18 +137,3 @@ def test_a_module_is_destroyed_beyond_its_capacity_not_at_it() -> None:
     post.register(0.2, 0.5, 0.0)
     assert structure_table(obstacles)["modules_destroyed"].tolist() == [0, 1]
     assert module_table(obstacles)["destroyed"].tolist() == [False, False, True]
-
-
-def test_the_three_tables_of_a_blast_agree(blast: BlastResult) -> None:
-    for name in ("impulse_sim", "transferred_impulse_sim"):
-        by_collision = blast.collisions.groupby("module_id")[name].sum()
-        by_module = blast.modules.set_index("module_id")[name]
-        pd.testing.assert_series_equal(
-            by_collision, by_module[by_module > 0.0].sort_index(), rtol=1e-12
-        )
-        by_structure = blast.modules.groupby("structure", sort=False)[name].sum()
-        assert by_structure.tolist() == pytest.approx(blast.structures[name].tolist())
-    assert blast.structures["hits"].sum() == len(blast.collisions)
-    first = blast.collisions.groupby("module_id")["time_s"].min()
-    in_modules = blast.modules.set_index("module_id")["first_hit_s"].dropna().sort_index()
-    assert first.tolist() == in_modules.tolist()
