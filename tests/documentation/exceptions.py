@@ -132,7 +132,6 @@ SMALLER: Final[dict[str, str]] = {
     "python -m tests.attack.run kills": "--most 1",
     "python -m tests.attack.run disks": "--most 1",
     # docs/engineers/gas.md, docs/howto/pictures.md
-    "blast-env simulate courtyard --engine gas --cell 0.25 --excel loads.xlsx": "--cell 0.5",
     "blast-env search --scenario my_site.toml --engine gas --cells coarse --out found": (
         "--budget 2 --held-out 1"
     ),
