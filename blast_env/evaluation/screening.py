@@ -506,8 +506,11 @@ def _by_threat(scenario: Scenario, named: Sequence[NamedMass]) -> dict[str, tupl
         }
     found: dict[str, tuple[AnySource, ...]] = {}
     for source in scenario.charge:
+        mass = f"{source.tnt_kg:g} kg"
         high = f", {source.height_m:g} m high" if source.height_m else ""
-        name = f"{source.tnt_kg:g} kg{high}"
+        alike = {each.tnt_kg for each in scenario.charge if each.threat == source.threat}
+        called = source.threat or mass
+        name = f"{called}{high}" if len(alike) == 1 or called == mass else f"{called}, {mass}{high}"
         found[name] = (*found.get(name, ()), source)
     return found
 

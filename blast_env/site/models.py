@@ -313,6 +313,7 @@ class Scenario(Section):
             _omit_defaults(content["objective"], self.objective, "objective")
         for key in ("charge", "structures"):
             for table, section in zip(content[key], getattr(self, key), strict=True):
+                table.pop("threat", None)
                 _omit_defaults(table, section, key)
         default_m = default_air_height_m(self.structures, self.build_zone)
         if self.site.air_height_m in (None, default_m):

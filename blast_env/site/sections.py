@@ -29,6 +29,7 @@ from blast_env.errors import type_word
 from blast_env.geometry import Cell, Rectangle
 from blast_env.response.facade import BAY_M, STOREY_M, Bay
 from blast_env.site.parameters import PRESETS, SimulationParameters, preset, with_overrides
+from blast_env.site.presets import CHARGE_PRESETS, TNT_EQUIVALENTS, tnt_equivalent_kg
 from blast_env.site.problems import (
     Problem,
     ScenarioError,
@@ -117,14 +118,34 @@ class ChargeSource(Section):
     """Base of the sources of a charge.
 
     Attributes:
-        tnt_kg: TNT-equivalent mass of a charge from this source.
+        threat: Its name for readers, as `car`; no result depends on it. A preset of
+            `blast_env.site.presets` gives the mass, if `tnt_kg` is missing.
+        tnt_kg: TNT-equivalent mass of a charge from this source; a document may have `mass_kg` and
+            `explosive` instead.
         weight: Probability of this source, relative to the others.
         height_m: Height of the charge's centre above the ground; at 0 it lies on the ground.
     """
 
+    threat: Name | None = None
     tnt_kg: Annotated[StrictFloat, Field(ge=0.01, le=100_000.0)]
     weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
     height_m: Coordinate = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_mass(cls, given: Any) -> Any:
+        """Add the mass of a preset, or that equivalent to another explosive."""
+        if not isinstance(given, Mapping) or "tnt_kg" in given:
+            return given
+        rest = {key: value for key, value in given.items() if key not in ("mass_kg", "explosive")}
+        preset_kg, _ = CHARGE_PRESETS.get(str(given.get("threat")), (None, ""))
+        mass_kg, explosive = given.get("mass_kg"), given.get("explosive")
+        if mass_kg is None or explosive is None:
+            return given if preset_kg is None else {**given, "tnt_kg": preset_kg}
+        if not isinstance(mass_kg, int | float) or explosive not in TNT_EQUIVALENTS:
+            known = ", ".join(TNT_EQUIVALENTS)
+            raise ValueError(f"must have a mass_kg in kg and an explosive of {known}")
+        return {**rest, "tnt_kg": tnt_equivalent_kg(float(mass_kg), explosive)}
 
 
 class PointSource(ChargeSource):

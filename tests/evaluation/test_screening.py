@@ -131,3 +131,24 @@ def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
     assert found.threats[0].name == "car"
     assert found.threats[0].condition is None
     assert found.threats[0].may_breach
+
+
+def test_a_charge_of_a_file_takes_its_mass_from_a_preset_or_an_explosive() -> None:
+    document = yard().model_dump(mode="json", exclude_none=True)
+    place = {"kind": "point", "position_m": [10.0, 20.0]}
+    document["charge"] = [
+        place | {"threat": "car"},
+        place | {"threat": "parcel", "mass_kg": 2.0, "explosive": "c4"},
+    ]
+    site = Scenario.from_document(document, "yard")
+    assert [each.tnt_kg for each in site.charge] == [227.0, pytest.approx(2.74)]
+    assert [each.name for each in screen(site).threats] == ["car", "parcel"]
+    unnamed = [{**each.model_dump(), "threat": None} for each in site.charge]
+    bare = Scenario.from_document(site.model_dump() | {"charge": unnamed}, "yard")
+    assert bare.content_hash == site.content_hash
+    document["charge"] = [place | {"mass_kg": 2.0, "explosive": "c5"}]
+    with pytest.raises(BlastEnvError, match="must have a mass_kg in kg and an explosive of tnt"):
+        Scenario.from_document(document, "yard")
+    document["charge"] = [place]
+    with pytest.raises(BlastEnvError, match="tnt_kg"):
+        Scenario.from_document(document, "yard")
