@@ -12,6 +12,7 @@ from blast_env.cli.options import (
     FINAL_CELL_HELP,
     FINAL_CELLS,
     MASS_ERROR_HELP,
+    REQUIRE_HELP,
     SCENARIO_HELP,
     TARGET_HELP,
     ChargeOptions,
@@ -50,6 +51,7 @@ from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
+from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.scene import Charge
 from blast_env.tables import write_csv
@@ -92,6 +94,7 @@ class AssessCommand(ChargeOptions):
     without_fallen: bool = option(
         False, "Remove pieces that overturn before the blast is over, and run it again."
     )
+    require: tuple[str, ...] = option((), REQUIRE_HELP)
     picture: Path | None = option(
         None, "Picture of the facades under the worst charge: .png, .svg, .pdf.", writes=PICTURES
     )
@@ -109,6 +112,7 @@ class AssessCommand(ChargeOptions):
         """Run the blasts, and print the verdict."""
         scenario = load_scenario(self.scenario)
         target = wanted_level(self.target, scenario, LevelOfProtection.LOW)
+        required = [Requirement.parsed(each) for each in self.require]
         layouts: dict[str, Layout] = {"no barrier": ()}
         if self.layout is not None:
             layout = tuple(load_layout(self.layout, scenario))
@@ -139,6 +143,10 @@ class AssessCommand(ChargeOptions):
                         without_fallen=self.without_fallen,
                     )
         self._print_verdict(scenario, found, target)
+        for each in required:
+            for name, judged in reversed(found.items()):
+                kept = all(each.kept_by(response.facade) for response in judged.responses)
+                print_line(f"{each.words}, {name}: {verdict_word(kept, judged.is_flagged).lower()}")
         error = _grid_error(scenario, layouts, found, coarse, coarser)
         uncertainty = Uncertainty.of(self.mass_error, error)
         for name, judged in reversed(found.items()):

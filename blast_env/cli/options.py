@@ -71,6 +71,10 @@ MASS_ERROR_HELP: Final = (
     "Half the width of the 95 % interval of the charges' masses, as a share, for the probability "
     "of the level."
 )
+REQUIRE_HELP: Final = (
+    "Requirement beside or instead of the level: a level of protection, 'gsa 3a', 'iso D', "
+    "'peak KPA' or 'impulse PA_S'. May be repeated."
+)
 CVAR_HELP: Final = "Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
 
 

@@ -5,7 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from blast_env.cli.command import Command, argument, option
-from blast_env.cli.options import CELLS_HELP, FINAL_CELL_HELP, FINAL_CELLS, SCENARIO_HELP
+from blast_env.cli.options import (
+    CELLS_HELP,
+    FINAL_CELL_HELP,
+    FINAL_CELLS,
+    REQUIRE_HELP,
+    SCENARIO_HELP,
+)
 from blast_env.cli.output import (
     ResultTable,
     print_cost,
@@ -55,11 +61,7 @@ class ScreenCommand(Command):
         f"NAME=KG[,EXPLOSIVE] with {', '.join(TNT_EQUIVALENTS)}; else the site's own. May be "
         "repeated.",
     )
-    require: tuple[str, ...] = option(
-        (),
-        "Requirement: a level of protection, 'gsa 3a', 'iso D', 'peak KPA' or 'impulse PA_S'; else "
-        "the scenario's level, else low. May be repeated.",
-    )
+    require: tuple[str, ...] = option((), REQUIRE_HELP)
     glazing: str | None = option(
         None, "Windows of protected structures that have no facade, a component."
     )

@@ -6,8 +6,10 @@ from typing import Final
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import level_by_glass
+from blast_env.response.damage import level_of
+from blast_env.response.facade import FacadeResponse, level_by_glass
 from blast_env.response.glass import GlazingCondition
+from blast_env.response.sdof import impulses
 from blast_env.units import PA_PER_KPA
 from blast_env.values import plain_number
 
@@ -36,6 +38,16 @@ class Requirement:
     glass_only: bool = False
     peak_pa: float = inf
     impulse_pa_s: float = inf
+
+    def kept_by(self, found: FacadeResponse) -> bool:
+        """Return whether every bay of a facade keeps it."""
+        glass, walls = found.glazing.hazard.max(initial=0.0), found.walls.damage.max(initial=0.0)
+        impulse_pa_s = impulses(found.time_s, found.pressure_pa).max(initial=0.0)
+        return bool(
+            level_of(float(glass if self.glass_only else max(glass, walls))) >= self.level
+            and found.pressure_pa.max(initial=0.0) <= self.peak_pa
+            and impulse_pa_s <= self.impulse_pa_s
+        )
 
     @classmethod
     def of_level(cls, level: LevelOfProtection) -> "Requirement":

@@ -138,6 +138,9 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env evaluate --layout wall.json --scenario my_site.toml --engine gas --seeds 8": (
         "--seeds 1 --cell 0.5"
     ),
+    # docs/engineers/screening.md
+    "blast-env screen site.toml --glazing window_laminated_6 --wall brick_215 --mass backpack --gas"
+    " --cells coarse": "--cells uniform --cell 1",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites": "clinic_front",

@@ -9,6 +9,7 @@ from blast_env.particles.calibration.references import kingery_bulmash, oblique
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import damage_number, level_of, under_triangle
+from blast_env.response.facade import Bay, FilledBay, respond
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
 from blast_env.site.presets import NamedMass, tnt_equivalent_kg
@@ -109,6 +110,12 @@ def test_requirements_name_one_scale() -> None:
     assert Requirement.parsed("gsa 3a").level is LevelOfProtection.LOW
     assert Requirement.parsed("iso C").level is LevelOfProtection.MEDIUM
     assert not Requirement.parsed("very low").glass_only
+    bay = FilledBay(Bay("hut", "west", 1, 1, 0.0, 3.0, 0.0, 3.5), wall=catalogue()["brick_215"])  # type: ignore[arg-type]
+    pushed = respond([bay], np.array([0.0, 0.02]), np.array([[200e3, 0.0]]))
+    kept = ("gsa 1", "peak 201", "impulse 2001")
+    assert all(Requirement.parsed(each).kept_by(pushed) for each in kept)
+    broken = ("low", "peak 199", "impulse 1999")
+    assert not any(Requirement.parsed(each).kept_by(pushed) for each in broken)
     for wrong in ("gsa 4", "peak -1", "meduim"):
         with pytest.raises(BlastEnvError):
             Requirement.parsed(wrong)
