@@ -246,8 +246,6 @@ def test_files_have_the_tables(bare: GasResult, tmp_path: Path) -> None:
 
 
 def test_bad_input_is_named(bare: GasResult) -> None:
-    with pytest.raises(BlastEnvError, match="'gas' has no collisions: loads are in"):
-        _ = bare.collisions
     with pytest.raises(UnknownNameError, match="'front'"):
         bare.history("frnt")
     with pytest.raises(UnknownNameError, match="'hut'"):

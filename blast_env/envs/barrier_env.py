@@ -161,7 +161,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 that state heights. `"event"` and `"pymunk"` run the particle model: for studying
                 it, for cheap tests of learning methods, for a first look. `"gas"` is the basis for
                 decisions: no calibration, one realisation per charge, a second or more per blast;
-                `impulse_sim` is NaN there. `"surrogate"` approximates gas dynamics.
+                there is no `impulse_sim`. `"surrogate"` approximates gas dynamics.
             cell_m: Side of the cells of gas dynamics; default 0.5 m.
             cache: Store of blasts beside the memory of the environment: a folder, which other
                 processes and later runs may use too, or a `BlastCache`.

@@ -232,7 +232,6 @@ class Episode:
         case = self.objective.case
         seeds = [threat.seed for threat in case.threats]
         return {
-            "impulse_sim": protected.impulse_sim,
             "impulse_psi_s": protected.impulse_psi_s,
             "impulse_pa_s": protected.impulse_pa_s,
             "unprotected_impulse_pa_s": unprotected.impulse_pa_s,
@@ -253,7 +252,9 @@ class Episode:
 
 
 def _where_known(protected: Assessment, unprotected: Assessment) -> dict[str, Any]:
-    """Return peaks, if the engine has them, and the facade response, if the objective has it."""
+    """Return simulation units or peaks by the engine, and the response, if the objective has it."""
+    if protected.impulse_sim is not None:
+        return {"impulse_sim": protected.impulse_sim}
     if isnan(unprotected.peak_pa):
         return {}
     peaks = {"peak_pa": protected.peak_pa, "unprotected_peak_pa": unprotected.peak_pa}

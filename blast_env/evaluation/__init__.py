@@ -7,7 +7,7 @@ from blast_env.evaluation.comparison import (
     Objective,
     compare,
 )
-from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
+from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad, StructureLoad
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError, Evaluators
 from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.report import (
@@ -42,6 +42,7 @@ __all__ = [
     "LayoutEvaluation",
     "LoadsCache",
     "Objective",
+    "ParticleLoad",
     "SeedRange",
     "StructureLoad",
     "Threat",

@@ -49,7 +49,8 @@ class Assessment:
 
     Attributes:
         impulse_pa_s: Weighted sum of the impulses per area of the protected buildings, Pa*s.
-        impulse_sim: Weighted sum of the impulses of the protected structures, simulation units.
+        impulse_sim: Weighted sum of the impulses of the protected structures, simulation units;
+            `None` of an engine without particles.
         peak_pa: The largest overpressure on the walls of these structures, Pa; NaN for particles.
         load: The objective value: Pa s for impulses, Pa for peaks, dimensionless for both, for a
             response and with a target.
@@ -59,7 +60,7 @@ class Assessment:
     """
 
     impulse_pa_s: float
-    impulse_sim: float
+    impulse_sim: float | None
     peak_pa: float
     load: float
     in_range: bool
@@ -101,9 +102,10 @@ class Objective:
         if key not in self._assessed:
             loads, combined = self.loads(layout), self.case.combined
             counts = self.case.scenario.objective
+            sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
             self._assessed[key] = Assessment(
                 impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
-                impulse_sim=combined([each.protected_impulse_sim for each in loads]),
+                impulse_sim=combined(sums) if len(sums) == len(loads) else None,
                 peak_pa=combined([each.protected_peak_pa for each in loads]),
                 load=self.case.counted([each.load(counts) for each in loads], layout),
                 level=min(each.level for each in loads) if counts.kind == "response" else None,

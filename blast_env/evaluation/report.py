@@ -20,7 +20,13 @@ from blast_env.evaluation.comparison import (
     loads_of_both,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad, on_buildings
+from blast_env.evaluation.engines.contract import (
+    SIM_NAMES,
+    BlastLoads,
+    ParticleLoad,
+    StructureLoad,
+    on_buildings,
+)
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.grid_error import GridError, LoadOf, final_engine, grid_error
 from blast_env.evaluation.store import BlastCache
@@ -72,6 +78,9 @@ STRUCTURE_COLUMNS: Final = (
     Column("threats_in_range", "", "threats that the calibration was made for"),
 )
 
+_OF_PARTICLES: Final = (*SIM_NAMES, *(f"unprotected_{name}" for name in SIM_NAMES))
+"""Columns that only particle engines have."""
+
 MODULE_COLUMNS: Final = (
     Column("module_id", "", "name of the module, made from its centre in metres"),
     Column("structure", "", "structure that the module is part of"),
@@ -116,7 +125,8 @@ def _structure_row(
         "reduction_high": reduction.high,
         "threats_in_range": sum(load.in_range for load in loads),
     }
-    for name in ("impulse_pa_s", "impulse_sim", "transferred_impulse_sim"):
+    sums = SIM_NAMES if isinstance(first, ParticleLoad) else ()
+    for name in ("impulse_pa_s", *sums):
         for column, each in ((name, loads), (f"unprotected_{name}", bare)):
             row[column] = float(np.mean([getattr(load, name) for load in each]))
     off, walled_off, bare_off = np.nan, np.nan, np.nan
@@ -380,7 +390,8 @@ class LayoutEvaluation:
             _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
             for number, both in enumerate(zip(loads, bare, strict=True))
         ]
-        return table_of(rows, STRUCTURE_COLUMNS)
+        absent = () if isinstance(self.loads[0].structures[0], ParticleLoad) else _OF_PARTICLES
+        return table_of(rows, [each for each in STRUCTURE_COLUMNS if each.name not in absent])
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":

@@ -26,7 +26,7 @@ from blast_env.app.threats import NamedThreat
 from blast_env.app.work import ReportTask, read_task, write_task
 from blast_env.cluster import address_of
 from blast_env.evaluation.engines import simulate
-from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
+from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad
 from blast_env.evaluation.free_field import FreeFieldRun
 from blast_env.evaluation.store import BlastKey, DiskCache
 from blast_env.io.importing import ImportOptions, import_site
@@ -178,8 +178,9 @@ def _front(folder: Path) -> Format:
 def _loads(folder: Path) -> Format:
     cache = DiskCache(folder / "cache")
     key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
-    load = StructureLoad(
-        *("building", True, 1.0, 5.0, 2.0, 0.01, None, 0.0, True), ("a note",), "building"
+    sums = {"impulse_sim": 5.0, "transferred_impulse_sim": 2.0}
+    load = ParticleLoad(
+        *("building", True, 1.0, 0.01, None, 0.0, True), ("a note",), "building", **sums
     )
     cache.add(key, BlastLoads((load,), np.arange(8.0)))
     (path,) = cache.folder.iterdir()

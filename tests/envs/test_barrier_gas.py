@@ -30,7 +30,7 @@ def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
     assert info["reduction"] == pytest.approx(expected.mean_reduction)
     assert reward == pytest.approx(-info["impulse_psi_s"])
     assert info["calibration"] == "none"
-    assert np.isnan(info["impulse_sim"])
+    assert "impulse_sim" not in info
     assert info["blasts"] == 2
     picture = env.render()
     assert isinstance(picture, np.ndarray)

@@ -18,7 +18,7 @@ from blast_env.evaluation import (
     BlastLoads,
     DiskCache,
     LoadsCache,
-    StructureLoad,
+    ParticleLoad,
     draw_threats,
     evaluate_layout,
 )
@@ -37,9 +37,8 @@ def key(seed: int) -> BlastKey:
 def loads(seed: int) -> BlastLoads:
     """Loads with numbers that need every bit."""
     notes = ("far", "b\n")
-    house = StructureLoad(
-        "haus ß", True, 2.0, 0.1 + 0.2, 1.0 / 3.0, 1e-300, 0.7, 2.0, False, notes, "b"
-    )
+    sums = {"impulse_sim": 0.1 + 0.2, "transferred_impulse_sim": 1.0 / 3.0}
+    house = ParticleLoad("haus ß", True, 2.0, 1e-300, 0.7, 2.0, False, notes, "b", **sums)
     structures = (house, replace(house, name="b", notes=()))
     return BlastLoads(structures, np.array([0.0, float(seed), np.pi, 1e300]))
 

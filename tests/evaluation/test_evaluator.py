@@ -10,7 +10,7 @@ import pytest
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import CalibrationError
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, StructureLoad, Threat
+from blast_env.evaluation import BlastEvaluator, BlastLoads, ParticleLoad, Threat
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
 from blast_env.geometry import Cell
 from blast_env.particles.run import BlastRun
@@ -49,7 +49,8 @@ def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluat
 
 
 def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> None:
-    load = StructureLoad("a", True, 2.0, 10.0, 5.0, 0.1, None, 2.0, True, (), "a")
+    sums = {"impulse_sim": 10.0, "transferred_impulse_sim": 5.0}
+    load = ParticleLoad("a", True, 2.0, 0.1, None, 2.0, True, (), "a", **sums)
     other = replace(load, name="b", weight=3.0, impulse_sim=1.0, impulse_pa_s=0.01)
     bystander = replace(load, name="c", protected=False, in_range=False)
     loads = BlastLoads((load, bystander, other), np.zeros(3))

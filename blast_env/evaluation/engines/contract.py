@@ -13,7 +13,7 @@ An instance is accepted wherever an engine's name is. A row in the table below r
 from abc import ABC
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
@@ -46,8 +46,6 @@ class StructureLoad:
         name: Name of the structure.
         protected: Whether its load counts.
         weight: Its weight among the protected structures.
-        impulse_sim: Sum of m |v| over the collisions, simulation units.
-        transferred_impulse_sim: Momentum actually transferred, simulation units.
         impulse_pa_s: Impulse per area, calibrated where the engine needs that, Pa*s; for gas
             dynamics the peak specific impulse, averaged over the counted walls.
         peak_pa: Largest overpressure on its walls, Pa; `None` for particles, which have none.
@@ -63,8 +61,6 @@ class StructureLoad:
     name: str
     protected: bool
     weight: float
-    impulse_sim: float
-    transferred_impulse_sim: float
     impulse_pa_s: float
     peak_pa: float | None
     peak_weight: float
@@ -85,7 +81,7 @@ class StructureLoad:
         notes: tuple[str, ...] = (),
         area_m2: float | None = None,
     ) -> Self:
-        """Return the load on a structure of a scenario by an engine without simulation units.
+        """Return the load on a structure of a scenario by an engine without particles.
 
         Args:
             structure: The structure.
@@ -99,8 +95,6 @@ class StructureLoad:
             name=structure.name,
             protected=structure.protected,
             weight=structure.weight,
-            impulse_sim=np.nan,
-            transferred_impulse_sim=np.nan,
             impulse_pa_s=impulse_pa_s,
             peak_pa=peak_pa,
             peak_weight=structure.counted_peak_weight,
@@ -109,6 +103,19 @@ class StructureLoad:
             building=structure.building_name,
             area_m2=area_m2,
         )
+
+
+@dataclass(frozen=True)
+class ParticleLoad(StructureLoad):
+    """The load on one structure by a particle engine.
+
+    Attributes:
+        impulse_sim: Sum of m |v| over the collisions, simulation units.
+        transferred_impulse_sim: Momentum actually transferred, simulation units.
+    """
+
+    impulse_sim: float = field(kw_only=True)
+    transferred_impulse_sim: float = field(kw_only=True)
 
 
 class _Part(Protocol):
@@ -156,12 +163,13 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     is_known = len(areas_m2) == len(counted)
     peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
     impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
+    hit = [each for each in parts if isinstance(each, ParticleLoad)]
+    sums = {name: sum(getattr(each, name) for each in hit) for name in SIM_NAMES if hit}
     return replace(
         counted[0],
+        **sums,
         name=name,
         weight=sum(weights),
-        impulse_sim=sum(each.impulse_sim for each in parts),
-        transferred_impulse_sim=sum(each.transferred_impulse_sim for each in parts),
         impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
         peak_pa=max(peaks_pa, default=None),
         in_range=all(each.in_range for each in counted),
@@ -249,9 +257,13 @@ class BlastLoads:
         return sum(each.weight * each.impulse_pa_s for each in on_buildings(self.protected))
 
     @property
-    def protected_impulse_sim(self) -> float:
-        """Weighted sum of the impulses of the protected structures, simulation units."""
-        return sum(load.weight * load.impulse_sim for load in self.protected)
+    def protected_impulse_sim(self) -> float | None:
+        """Weighted sum of the impulses of the protected structures, simulation units.
+
+        `None` of an engine without particles.
+        """
+        hit = [load for load in self.protected if isinstance(load, ParticleLoad)]
+        return sum(load.weight * load.impulse_sim for load in hit) if hit else None
 
     @property
     def protected_peak_pa(self) -> float:
@@ -302,6 +314,10 @@ def structure_response(
         damage.append(worst(each.damage[name] for name in names if name is not None))
         area_m2.append(each.glazed_m2 if is_glazing else each.area_m2)
     return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
+
+
+SIM_NAMES: Final = ("impulse_sim", "transferred_impulse_sim")
+"""The sums of a `ParticleLoad` in simulation units."""
 
 
 @dataclass(frozen=True)

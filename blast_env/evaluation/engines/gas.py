@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.bays import (
     LOADED_BAY_COLUMNS,
     BayLoads,
@@ -287,17 +287,6 @@ class GasResult:
     def steps(self) -> int:
         """Number of steps of the engine."""
         return self.run.steps
-
-    @property
-    def collisions(self) -> "pd.DataFrame":
-        """Unavailable, since a gas has no particles that collide.
-
-        Raises:
-            BlastEnvError: Always; the message names the alternatives.
-        """
-        raise BlastEnvError(
-            "engine 'gas' has no collisions: loads are in structures, modules, faces and gauges"
-        )
 
     @cached_property
     def faces(self) -> "pd.DataFrame":

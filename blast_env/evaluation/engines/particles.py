@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, Literal
 import numpy as np
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
-from blast_env.evaluation.engines.contract import BlastLoads, Engine, StructureLoad, find_engine
+from blast_env.evaluation.engines.contract import BlastLoads, Engine, ParticleLoad, find_engine
 from blast_env.geometry import Element, layout_text
 from blast_env.layout.build_scene import build_scene
 from blast_env.particles.calibration.model import (
@@ -278,28 +278,6 @@ class BlastResult:
 
         return building_table(self.structures, self.blast.scenario.building_names)
 
-    @property
-    def bays(self) -> "pd.DataFrame":
-        """Unavailable, since particles have no pressure to load a pane or a panel.
-
-        Raises:
-            BlastEnvError: Always; the message names the alternative.
-        """
-        raise BlastEnvError(
-            f"engine {self.engine_name!r} has no overpressure, so no response of bays: use 'gas'"
-        )
-
-    @property
-    def pieces(self) -> "pd.DataFrame":
-        """Unavailable, since particles have no pressure to load a piece.
-
-        Raises:
-            BlastEnvError: Always; the message names the alternative.
-        """
-        raise BlastEnvError(
-            f"engine {self.engine_name!r} has no overpressure, so no loads on pieces: use 'gas'"
-        )
-
     @cached_property
     def calibration(self) -> Calibration:
         """The scenario's calibration.
@@ -372,7 +350,7 @@ class BlastResult:
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
         return BlastLoads(
             structures=tuple(
-                StructureLoad(
+                ParticleLoad(
                     name=each.name,
                     protected=each.protected,
                     weight=each.weight,
