@@ -25,7 +25,7 @@ Made = TypeVar("Made")
 SITES: Final[Mapping[str, Callable[[Path], Scenario]]] = MappingProxyType({".toml": load_scenario})
 """Readers of site files that need no options, by suffix."""
 
-MAPS: Final = (".geojson", ".json", ".osm", ".pbf", ".dxf")
+MAPS: Final = (".geojson", ".json", ".osm", ".pbf", ".dxf", ".ifc")
 """Suffixes of maps and drawings, which take options: `imported_site`."""
 
 

@@ -38,7 +38,7 @@ class ImportCommand(ImportOptions, Command):
     the deviation of the modules of each building from its outline.
     """
 
-    file: Path = argument(".geojson, .osm, .osm.pbf or .dxf.")
+    file: Path = argument(".geojson, .osm, .osm.pbf, .dxf or .ifc.")
     out: Path = option(..., "Scenario file to write: .toml.", writes=(".toml",))
     picture: Path | None = option(
         None, "Write a plan, outlines over modules: .png, .svg, .pdf.", writes=PICTURES

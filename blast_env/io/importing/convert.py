@@ -25,6 +25,7 @@ from blast_env.io.importing.threats import charge_sources
 from blast_env.io.importing.zone import build_zone
 from blast_env.provenance import package_version
 from blast_env.reading import read_apart
+from blast_env.response.components import catalogue
 from blast_env.site import Scenario, SimulationSection
 from blast_env.site.checks import charge_radius_m
 from blast_env.site.models import MOST_NOTE, MOST_NOTES, SCHEMA_VERSION
@@ -35,8 +36,9 @@ with import_extra("maps", "maps and drawings"):
 
 _MOST_DESCRIPTION: Final = 2000
 _MOST_TITLE: Final = 100
+_GLASS: Final = "window_annealed_6"
 _HASH_DIGITS: Final = 12
-_PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf")
+_PLAIN_SUFFIXES: Final = (".geojson", ".json", ".osm", ".dxf", ".ifc")
 _READ_HERE_BYTES: Final = 100_000
 """Largest unpacked file that is read in this process: starting another takes half a second."""
 
@@ -74,7 +76,8 @@ def import_site(path: str | Path, options: ImportOptions | None = None) -> Impor
     limits on time and memory; see `ReadingLimits`.
 
     Args:
-        path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`) or DXF (`.dxf`).
+        path: GeoJSON (`.geojson`, `.json`), OpenStreetMap (`.osm`, `.osm.pbf`), DXF (`.dxf`) or
+            IFC (`.ifc`, extra `ifc`).
         options: Options of the import.
 
     Raises:
@@ -122,6 +125,8 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
         "simulation": {"preset": options.preset},
         "georeference": site.georeference.model_dump(),
     }
+    if components := _components(buildings):
+        document["components"] = components
     if zone is not None:
         document["build_zone"] = zone
     if options.preset in CALIBRATIONS:
@@ -176,11 +181,20 @@ def _read_as_dxf(path: Path, options: ImportOptions) -> SiteMap:
     return replace(site_map, coordinates=MapCoordinates(options.crs))
 
 
+def _read_as_ifc(path: Path, options: ImportOptions) -> SiteMap:
+    _refuse(options.units, "--units", "IFC, which states its unit")
+    _refuse(options.crs, "--crs", "IFC, which is in metres of its own")
+    from blast_env.io.importing.ifc import read_ifc  # here, because it needs the extra `ifc`
+
+    return read_ifc(path)
+
+
 _READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = MappingProxyType(
     {
         ".geojson": _read_as_geojson,
         ".json": _read_as_geojson,
         ".dxf": _read_as_dxf,
+        ".ifc": _read_as_ifc,
         **dict.fromkeys(OSM_SUFFIXES, _read_as_osm),
     }
 )
@@ -244,8 +258,34 @@ def _structures(
             part["base_m"] = building.base_m
         if building.carries:
             part["carries"] = True
+        if building.facade:
+            part["facade"] = {
+                "storeys": int(building.facade["storeys"]),
+                "bay_m": building.facade["bay"],
+                "glazing": _window_of(building),
+            }
         parts.append(part)
     return parts
+
+
+def _window_of(building: FittedBuilding) -> str:
+    return f"window_of_{building.name}"
+
+
+def _components(buildings: tuple[FittedBuilding, ...]) -> dict[str, Any]:
+    """Return the windows of a model, with panes of a common glass."""
+    glass = catalogue()[_GLASS].model_dump(mode="json", exclude_none=True)
+    return {
+        _window_of(each): {
+            **glass,
+            "title": f"window of {each.title or each.name}"[:_MOST_TITLE],
+            "width_m": each.facade["width"],
+            "height_m": each.facade["height"],
+            "sill_m": each.facade["sill"],
+        }
+        for each in buildings
+        if each.facade
+    }
 
 
 def _description(

@@ -1,7 +1,7 @@
 """Polygons of a map's buildings on a site."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -53,6 +53,7 @@ class FittedBuilding:
         part_of: Place in the file of the building of which it is a part, or an empty string.
         deviation: Deviation of the modules from the outline.
         is_cut: Whether the site's border cuts it.
+        facade: Its storeys and windows, see `Thing`.
     """
 
     name: str
@@ -67,6 +68,7 @@ class FittedBuilding:
     part_of: str
     deviation: Deviation
     is_cut: bool
+    facade: Mapping[str, float]
 
     @property
     def part_names(self) -> tuple[str, ...]:
@@ -137,6 +139,7 @@ def fit_buildings(
             part_of=thing.part_of,
             deviation=Deviation.between(thing.geometry, _modules(own)),
             is_cut=_touches_border(thing.geometry, site),
+            facade=thing.facade,
         )
         for name, thing, own, height_m in zip(_names(titles), kept, polygons, heights, strict=True)
     ]

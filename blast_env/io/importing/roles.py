@@ -126,6 +126,8 @@ def things_of(
     """
     for kind, place, detail in site_map.remarks:
         ledger.add(Deed.GUESSED, kind, place, detail=detail)
+    for kind, place, detail in site_map.merged:
+        ledger.add(Deed.MERGED, kind, place, detail=detail)
     features = (*site_map.features, *site_map.lost)
     roles = [_role(each, selectors, site_map.is_drawing) for each in features]
     known = ("kind", "building", "highway", "layer")
@@ -210,6 +212,11 @@ def _thing(feature: MapFeature, role: Role, options: ImportOptions, ledger: Ledg
         tnt_kg=float(tnt_kg) if isinstance(tnt_kg, int | float) and tnt_kg > 0.0 else None,
         kind=kind.lower(),
         width_m=_width_m(feature, ledger) if role is Role.CHARGE else None,
+        facade={
+            key.removeprefix("facade:"): float(value)
+            for key, value in tags.items()
+            if key.startswith("facade:")
+        },
         is_part="building:part" in tags and not _says(tags, "building"),
         fault=_fault(feature, role),
     )

@@ -91,7 +91,8 @@ class SiteMap:
         coordinates: System of the coordinates.
         features: All outlines, lines and points; texts are points.
         lost: Objects that are not usable.
-        remarks: What was mended while reading, as (kind, place, detail).
+        remarks: Guesses and mends of reading, as (kind, place, detail).
+        merged: Parts of its objects, as (kind, place, detail).
     """
 
     path: Path
@@ -99,6 +100,7 @@ class SiteMap:
     features: tuple[MapFeature, ...]
     lost: tuple[LostFeature, ...] = ()
     remarks: tuple[Remark, ...] = ()
+    merged: tuple[Remark, ...] = ()
 
     @property
     def is_drawing(self) -> bool:

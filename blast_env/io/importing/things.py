@@ -1,6 +1,7 @@
 """The objects of a map that matter to a site."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from blast_env.errors import import_extra
@@ -40,6 +41,8 @@ class Thing:
         carries: Whether the source marks it as a terrace.
         width_m: Width of a street, m.
         is_part: Whether it is a part of a building with a height of its own.
+        facade: Number of storeys, width, height and sill of its windows, and the width of a bay,
+            m; empty if the source has none.
         fault: Why it cannot be used; an empty string if it can.
     """
 
@@ -57,6 +60,7 @@ class Thing:
     kind: str = ""
     width_m: float | None = None
     is_part: bool = False
+    facade: Mapping[str, float] = field(default_factory=dict)
     fault: str = ""
 
     @property
