@@ -205,7 +205,7 @@ def _beside(source: AnySource, x_m: float, y_m: float) -> float:
     if isinstance(source, RectangleSource):
         return 0.0
     lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
-    return min(_from_line_m(line_m, x_m, y_m) for line_m in lines_m)
+    return float(min(_from_line_m(line_m, x_m, y_m) for line_m in lines_m))
 
 
 def _from_line_m(line_m: tuple[PointM, PointM], x_m: Any, y_m: Any) -> Any:

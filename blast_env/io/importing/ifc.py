@@ -128,7 +128,7 @@ def _solids(model: Any, elements: list[Any]) -> Iterator[_Solid]:
         shape = iterator.get()
         corners = np.reshape(shape.geometry.verts, (-1, 3))
         faces = corners[np.reshape(shape.geometry.faces, (-1, 3))]
-        areas = shapely.polygons(faces[:, :, :2])
+        areas = np.asarray(shapely.polygons(faces[:, :, :2]))
         ground = shapely.union_all(areas[shapely.area(areas) > 0.0], grid_size=1e-4)
         heights_m = corners[:, 2]
         yield _Solid(model.by_id(shape.id), ground, heights_m.min(), heights_m.max())
