@@ -22,6 +22,7 @@ from blast_env.site import (
     Scenario,
     VehicleSource,
 )
+from blast_env.site.presets import CHARGE_PRESETS
 from blast_env.site.sections import PointM, SegmentSource
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.zone import source_bounds_m
@@ -120,7 +121,8 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
         name = structure.title or structure.name
         yield SiteThing(ThingKind.STRUCTURE, index), f"{part}{name}{role}"
     for index, source in enumerate(scenario.charge):
-        yield SiteThing(ThingKind.CHARGE, index), f"charge {index + 1}, {source.tnt_kg:g} kg"
+        called = source.threat or f"charge {index + 1}"
+        yield SiteThing(ThingKind.CHARGE, index), f"{called}, {source.tnt_kg:g} kg"
     zone = scenario.build_zone
     if zone is not None:
         yield SiteThing(ThingKind.ZONE), "build zone"
@@ -280,7 +282,8 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
         scenario: The scenario.
         thing: The thing; `None` is the scenario itself.
         values: New values by key of the scenario file; `None` removes a key. The facade of a
-            structure, and whether it is protected, are those of its whole building.
+            structure, and whether it is protected, are those of its whole building. A charge takes
+            the mass of the preset that its new `threat` names.
 
     Raises:
         ScenarioError: If the result is invalid.
@@ -294,6 +297,8 @@ def with_values(scenario: Scenario, thing: SiteThing | None, values: Mapping[str
                     table.pop(key, None)
                 else:
                     table[key] = value
+        if values.get("threat") in CHARGE_PRESETS:
+            own["tnt_kg"] = CHARGE_PRESETS[values["threat"]][0]
 
     return changed(scenario, edit)
 

@@ -154,3 +154,12 @@ def test_what_is_drawn_on_a_terrace_stands_on_it() -> None:
     assert (hut_there.base_m, hut_there.height_m) == (1.0, 3.5)
     beside, thing = edits.added(site, ThingKind.STRUCTURE, (8.5, 10.5), (10.5, 11.5), 2.5)
     assert (beside.structures[-1].base_m, beside.structures[-1].height_m) == (0.0, 2.5)
+
+
+def test_the_name_of_a_preset_sets_the_mass_of_a_charge() -> None:
+    charge = SiteThing(ThingKind.CHARGE, 0)
+    named = edits.with_values(COURTYARD, charge, {"threat": "van"})
+    assert named.charge[0].tnt_kg == 454.0
+    other = edits.with_values(named, charge, {"threat": "parcel"})
+    assert other.charge[0].tnt_kg == 454.0
+    assert "parcel, 454 kg" in [words for _, words in edits.things(other)]

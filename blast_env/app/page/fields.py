@@ -90,6 +90,9 @@ _FIELDS: Final[Mapping[ThingKind, tuple[FormField, ...]]] = {
 }
 
 _OF_CHARGES: Final = (
+    FormField(
+        "name", "threat", "text", optional=True, hint="backpack, car, van and lorry set the mass"
+    ),
     FormField("mass (kg TNT)", "tnt_kg"),
     FormField("height (m)", "height_m"),
     FormField("weight", "weight"),
