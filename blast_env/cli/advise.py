@@ -292,7 +292,7 @@ def _answer(
     else:
         words = layout_words(best.layout)
         level = f"{target.label!r} with {likely}"
-        answer = f"{scenario.name}: {level} costs {cost:g}{flagged}: {words}."
+        answer = f"{scenario.name}: {level} costs {scenario.zone.priced(cost)}{flagged}: {words}."
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
     if shield is None or judged[shield.layout].passes(target):
         return answer

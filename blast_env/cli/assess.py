@@ -165,10 +165,8 @@ class AssessCommand(ChargeOptions):
     ) -> None:
         name, judged = list(found.items())[-1]
         count = len(judged.barriers)
-        print_line(
-            f"{scenario.name}, {name}: {judged.verdict(target)} level {target.label!r} "
-            f"under {count} charges"
-        )
+        charges = "1 charge" if count == 1 else f"{count} charges"
+        print_line(f"{scenario.name}, {name}: {judged.verdict_words(target)}, under {charges}")
         for note in judged.notes:
             print_line(f"flag: {note}")
         if doubt := judged.doubt(target):

@@ -9,6 +9,7 @@ from blast_env.app.cost import ReportCost
 from blast_env.cli.command import argument, option
 from blast_env.cli.options import (
     CHARGE,
+    MASS_ERROR_HELP,
     SCENARIO_HELP,
     TARGET_HELP,
     CacheOptions,
@@ -75,6 +76,16 @@ class ReportCommand(ProcessOptions, CacheOptions):
     places: int = option(5, "Other places of each charge source.")
     items: bool = option(True, "Rank the contribution of each module or piece.")
     stills: int = option(4, "Moments of the film, 0 to 12.")
+    mass_error: float = option(0.1, MASS_ERROR_HELP, min=0.0, max=0.3)
+    details: Path | None = option(
+        None, "TOML file with project, client, author, checker, revision and marking."
+    )
+    project: str = option("", "Project, on the first page.")
+    client: str = option("", "Client.")
+    author: str = option("", "Author.")
+    checker: str = option("", "Person who has checked the report.")
+    revision: str = option("", "Revision.")
+    marking: str = option("", "Marking of every page, as for confidentiality.")
 
     def __call__(self) -> None:
         """Run the blasts and write the report."""
@@ -111,11 +122,15 @@ class ReportCommand(ProcessOptions, CacheOptions):
 
     def _study_options(self, scenario: Scenario) -> "StudyOptions":
         from blast_env.report import Limit, StudyOptions, UnitSystem, final_cells
+        from blast_env.report.details import DETAILS, read_details
 
         units = UnitSystem.named(self.units)
         given: dict[str, Any] = {
             each.name: getattr(self, each.name) for each in fields(StudyOptions)
         }
+        given["details"] = read_details(
+            self.details, {name: getattr(self, name) for name in DETAILS}
+        )
         given["charges"] = tuple(_charge(each, scenario) for each in self.charges)
         given["limits"] = tuple(Limit.parsed(text, units) for text in self.limits)
         given["units"] = units

@@ -62,6 +62,31 @@ class Edge:
         return f"{sign}{self.stand_off_m:.1f}"
 
 
+def mass_near(judged: Consequences, level: LevelOfProtection) -> tuple[float, bool]:
+    """Return the largest mass near that of a charge that keeps a level, kg, without a blast.
+
+    Args:
+        judged: The consequences of the charge.
+        level: The level.
+
+    Returns:
+        The mass, and whether it is within the range of scaled histories; else it is an end of that
+        range: the largest mass examined if the level is kept, or the least one if it is not.
+    """
+    charge = judged.responses[0].charge
+
+    def keeps(share: float) -> bool:
+        return scaled_to(judged, charge._replace(tnt_kg=share * charge.tnt_kg)).passes(level)
+
+    kept, lost = 1.0 / MASS_RANGE, MASS_RANGE
+    if keeps(lost) or not keeps(kept):
+        return charge.tnt_kg * (lost if keeps(lost) else kept), False
+    for _ in range(_BISECTIONS):
+        middle = (kept * lost) ** 0.5
+        kept, lost = (middle, lost) if keeps(middle) else (kept, middle)
+    return charge.tnt_kg * kept, True
+
+
 @dataclass(frozen=True, eq=False)
 class Ladder:
     """Charges of rising severity behind a layout: of more mass, or nearer to the building.

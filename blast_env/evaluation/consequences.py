@@ -66,7 +66,7 @@ if TYPE_CHECKING:  # a third of a second to import
     from blast_env.evaluation.engines.gas import GasResult
 
 _CLIPPED: Final = (
-    "it passes with the peaks of the cells, which are clipped, but fails with Kingery and"
+    "it complies with the peaks of the cells, which are clipped, but not with Kingery and"
     " Bulmash's sharp peaks of the same impulse: use smaller cells"
 )
 
@@ -266,6 +266,11 @@ class Consequences:
             or not all(self._known)
         )
 
+    def under(self, number: int) -> "Consequences":
+        """Return the responses of the buildings to one charge, by its number."""
+        count = len(self.buildings)
+        return Consequences(self.responses[number * count : (number + 1) * count])
+
     def of(self, building: str) -> tuple[BuildingResponse, ...]:
         """Return the responses of one building."""
         return tuple(each for each in self.responses if each.building == building)
@@ -329,6 +334,15 @@ class Consequences:
     def verdict(self, target: LevelOfProtection) -> str:
         """Return the verdict on whether all buildings reach a level; see `verdict_word`."""
         return verdict_word(self.passes(target), self.is_flagged)
+
+    def verdict_words(self, target: LevelOfProtection) -> str:
+        """Return the verdict with the level: `DOES NOT COMPLY: level of protection below Low`."""
+        return f"{self.verdict(target)}: {self.level_words_for(target)}"
+
+    def level_words_for(self, target: LevelOfProtection) -> str:
+        """Return whether all buildings reach a level: `level of protection below Low`."""
+        side = "at least" if self.passes(target) else "below"
+        return f"level of protection {side} {target.title}"
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
         """Return the consequences with other glass in all windows of the same sizes and sills.
@@ -492,8 +506,8 @@ def verdict_word(passes: bool, flagged: bool) -> str:
         flagged: Whether there is a note on the loads or walls.
     """
     if not passes:
-        return "FAILS"
-    return "PASSES (flagged)" if flagged else "PASSES"
+        return "DOES NOT COMPLY"
+    return "COMPLIES (flagged)" if flagged else "COMPLIES"
 
 
 def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:

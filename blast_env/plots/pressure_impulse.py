@@ -128,7 +128,7 @@ def _draw(
             ends = np.array([each[index] for each in places])
             axes.plot(ends[:, 1], ends[:, 0], "-", color="0.25", linewidth=0.5)
     axes.set(xscale="log", yscale="log", xlim=(low[1], high[1]), ylim=(low[0], high[0]))
-    axes.set(xlabel="peak specific impulse (Pa s)", ylabel="peak of the mean (kPa)")
+    axes.set(xlabel="peak specific impulse (Pa s)", ylabel="peak of the bay-average pressure (kPa)")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(FuncFormatter(number_on_axis))
         axis.set_minor_formatter("")

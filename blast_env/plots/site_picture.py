@@ -91,7 +91,7 @@ def site_picture(
             shown.append((axes, raised, oblique))
         else:
             draw_plan(axes, features)
-            _draw_plan_scale(axes, found)
+            draw_scale(axes, found)
             draw_north(axes, found, PLAN)
             shown.append((axes, features, PLAN))
     write_heading(figure, found.name, _subtitle(found, placement))
@@ -141,7 +141,7 @@ def _subtitle(scenario: Scenario, placement: Placement) -> str:
     return ", ".join(filter(None, parts))
 
 
-def _draw_plan_scale(axes: Axes, scenario: Scenario) -> None:
+def draw_scale(axes: Axes, scenario: Scenario) -> None:
     """Draw a scale bar over the lower left corner of the site."""
     length_m = scale_length_m(scenario.site.rectangle_m)
     x_m = y_m = 0.03 * max(scenario.site.width_m, scenario.site.height_m)

@@ -27,7 +27,9 @@ from blast_env.plots.plan import (
 from blast_env.plots.pressure_film import record_planes, scale_end_kpa
 from blast_env.plots.pressure_frames import PressurePainter, default_section
 from blast_env.plots.pressure_impulse import pressure_impulse_diagram
+from blast_env.plots.site_picture import draw_north, draw_scale
 from blast_env.plots.site_plan import (
+    PLAN,
     draw_plan,
     legend_of,
     rectangle_patch,
@@ -41,6 +43,7 @@ from blast_env.report.threats import NamedCharge
 from blast_env.runner import Tell, share_of
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
+from blast_env.site.worst_places import nearest_point_m
 from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
 with render_extra():
@@ -94,9 +97,24 @@ def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout
     vehicles = without(vehicle_features(scenario, layout), Kinds.CHARGE)
     features = (*_unlabelled(site_features(scenario, layout)), *vehicles, *charges)
     draw_plan(axes, features)
+    for threat in threats:
+        _draw_stand_off(axes, scenario, threat.against(scenario, layout).position_m)
+    draw_scale(axes, scenario)
+    draw_north(axes, scenario, PLAN)
     write_legend(figure, legend_of(features))
     write_names(axes, features)
     return png(figure)
+
+
+def _draw_stand_off(axes: Axes, scenario: Scenario, place_m: tuple[float, float]) -> None:
+    """Draw the line from a charge to the nearest protected wall, with its length."""
+    wall_m = nearest_point_m(scenario.structures, place_m)
+    length_m = float(np.hypot(wall_m[0] - place_m[0], wall_m[1] - place_m[1]))
+    ink = unit_interval(INK)
+    axes.annotate("", wall_m, place_m, arrowprops={"arrowstyle": "<|-|>", "color": ink}, zorder=7.0)
+    middle_m = (0.5 * (wall_m[0] + place_m[0]), 0.5 * (wall_m[1] + place_m[1]))
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+    axes.annotate(f"{length_m:.1f} m", middle_m, ha="center", va="center", bbox=box, zorder=8.0)
 
 
 def _unlabelled(features: Sequence[Feature]) -> list[Feature]:

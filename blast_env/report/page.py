@@ -14,9 +14,11 @@ import numpy as np
 import tomli_w
 
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation.capacity import mass_near
 from blast_env.evaluation.consequences import verdict_word
 from blast_env.evaluation.engines.bays import bay_rows
 from blast_env.evaluation.grid_error import FACTOR, ORDER
+from blast_env.evaluation.probability import level_probability, probability_text
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import layout_counts, layout_text
@@ -36,13 +38,14 @@ from blast_env.report.outcomes import LoadErrors, LoadPair
 from blast_env.report.peaks import PeakSource
 from blast_env.report.study import Study
 from blast_env.report.threats import other_places
-from blast_env.report.verdict import ReportVerdict, verdict_of
+from blast_env.report.verdict import ReportVerdict, counted, verdict_of
 from blast_env.response.buildings import BuildingDamage
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with import_extra("report", "reports"):
     from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
 
 HTML_SUFFIXES: Final = (".html", ".htm")
 _TEMPLATE: Final = "report.html.j2"
@@ -129,11 +132,14 @@ def report_html(study: Study, commands: list[str]) -> str:
         "counted": lambda load: _counted(load, units),
         "word": lambda passes, flagged: verdict_word(passes, flagged).lower(),
         "percent": _percent,
+        "gone": _gone,
+        "noun_of": counted,
+        "css": _css,
         "impulse_error": lambda pa_s: _error(units.impulse_of(pa_s)),
         "share_error": lambda share: _error(100.0 * share, 1),
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),
-        "money": lambda cost: f"{cost:,.10g}",
+        "money": study.scenario.zone.priced,
         "picture": lambda png: f"data:image/png;base64,{b64encode(png).decode()}",
     }
     return environment.get_template(_TEMPLATE).render(_context(study, commands))
@@ -167,6 +173,16 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "sources": _sources(study, verdict, summary),
         "standing": _standing(verdict),
         "checks": checks_of(study),
+        "details": options.details,
+        "sure": _sureness(study),
+        "facade_pictures": [
+            (each.name, picture)
+            for each in study.threats[:1]
+            for picture in study.pictures[each.name]
+            if picture[0].endswith("facades unfolded")
+        ],
+        "uncertainty": study.uncertainty,
+        "references": REFERENCES,
         "spread": _spread(study),
         "noun": study.scenario.objective.noun,
         "bay_tables": _bay_tables(study),
@@ -230,11 +246,74 @@ def _summary(study: Study) -> list[SummaryLine]:
     return lines
 
 
+_OUTCOMES: Final = {
+    "stands": ("remains stable", "remain stable"),
+    "slides": ("slides", "slide"),
+    "rocks": ("rocks", "rock"),
+    "overturns": ("overturns", "overturn"),
+}
+
+
 def _standing(verdict: ReportVerdict) -> str:
+    """Return the outcomes of the pieces: `5 barriers remain stable, 1 barrier slides`."""
     if verdict.barrier is None:
         return ""
     counts = verdict.barrier.pieces["outcome"].value_counts()
-    return ", ".join(f"{number} {word}" for word, number in counts.items())
+    return ", ".join(
+        f"{counted(number, 'barrier')} {_OUTCOMES[word][number > 1]}"
+        for word, number in counts.items()
+    )
+
+
+@dataclass(frozen=True)
+class Sureness:
+    """How sure the level of protection is, and up to which charge.
+
+    Attributes:
+        likely: Probability with the layout, and what drives it.
+        bare: Probability without it.
+        masses: The largest mass that keeps the level, by threat.
+    """
+
+    likely: str
+    bare: str
+    masses: tuple[str, ...]
+
+
+def _sureness(study: Study) -> Sureness | None:
+    """Return how sure the level is; `None` without buildings with a facade."""
+    if not study.walled.responses:
+        return None
+    walled, bare = (
+        level_probability(each, study.uncertainty) for each in (study.walled, study.bare)
+    )
+    target = study.target
+    masses = []
+    for number, threat in enumerate(study.threats):
+        kg, is_found = mass_near(study.walled.under(number), target)
+        kept = study.walled.under(number).passes(target)
+        bound = "" if is_found else ("at least " if kept else "less than ")
+        masses.append(f"{bound}{kg:.3g} kg ({threat.name})")
+    bare_text = probability_text(bare.of(target), len(bare.levels))
+    return Sureness(walled.words(target), bare_text, tuple(masses))
+
+
+REFERENCES: Final = (
+    "UFC 4-010-01, DoD minimum antiterrorism standards for buildings (levels of protection)",
+    "UFC 3-340-02, Structures to resist the effects of accidental explosions (single degree of "
+    "freedom; types of bursts)",
+    "PDC-TR 06-08, Single degree of freedom structural response limits for antiterrorism design "
+    "(damage of wall panels)",
+    "ASTM E1300, Determining load resistance of glass in buildings (strength of panes)",
+    "GSA P100, Facilities standards for the public buildings service, table 8-1 (performance "
+    "conditions of glazing)",
+    "ISO 16933, Explosion-resistant security glazing, arena air-blast test (hazard ratings)",
+    "C. N. Kingery and G. Bulmash, ARBRL-TR-02555, 1984 (airblast of TNT)",
+    "TNO, Methods for the determination of possible damage, CPR 16E, Green Book (houses)",
+    "P. J. Roache, J. Fluids Eng. 116 (1994) 405 (error of the cells)",
+    "T. Yang and Y. Luo, J. Civil Environ. Eng. 42(2) (2020) 115 (scatter of loads)",
+)
+"""The reference list of a report."""
 
 
 def _spread(study: Study) -> tuple[float, float] | None:
@@ -330,12 +409,13 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
             peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
             found.append((f"{titled(line.name)}, {words}: impulse", impulse, where))
             found.append((f"{titled(line.name)}, {words}: peak", peak, where))
-        span = f"{_percent(line.least)} to {_percent(line.most)}"
+        span = f"{_gone(line.least)} to {_gone(line.most)}"
         span += _of_cells(_error(100.0 * line.error, 1))
         found.append(
             (f"{titled(line.name)}: reduction", span, "1 - impulse with / without, all threats")
         )
-    found.append(("cost of the layout", f"{study.cost:,.10g}", "bill of quantities"))
+    cost = study.scenario.zone.priced(study.cost)
+    found.append(("cost of the layout", cost, "bill of quantities"))
     if isfinite(study.grid_error):
         found.append(
             (
@@ -346,7 +426,7 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
         )
     if verdict.barrier is not None:
         where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
-        found.append(("pieces of the barrier", _standing(verdict), where))
+        found.append(("barriers", _standing(verdict), where))
     for neighbour in study.walled.worst_neighbours:
         share = _percent(neighbour.probability[BuildingDamage.MAJOR])
         where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "
@@ -405,6 +485,20 @@ def _counted(load: TargetLoad, units: UnitSystem) -> str:
 
 def _percent(share: float) -> str:
     return _NONE if isnan(share) else f"{100.0 * share:.1f} %".replace("-", _MINUS)
+
+
+def _css(text: str) -> Markup:
+    """Return a text as a string of CSS, which can end neither the string nor the style sheet."""
+    safe = "".join(
+        each if each.isalnum() or each in " .,-" else f"\\{ord(each):x} " for each in text
+    )
+    return Markup(f'"{safe}"')  # nothing but letters, digits and escapes
+
+
+def _gone(share: float) -> str:
+    """Return a reduction; a negative one in words."""
+    worse = " (the barrier makes it worse)" if share <= -0.0005 else ""
+    return _percent(share) + worse
 
 
 def _points(share: float) -> str:

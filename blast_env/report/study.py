@@ -16,10 +16,12 @@ from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
 from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.governing import Severity
+from blast_env.evaluation.probability import Uncertainty
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, Piece, layout_text, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import Placement, check_layout
+from blast_env.report.details import ReportDetails
 from blast_env.report.figures import (
     Picture,
     blast_pictures,
@@ -90,6 +92,8 @@ class StudyOptions:
         stills: Number of moments of the film.
         processes: Worker processes of blasts that need no pictures.
         cache: Folder of the loads of those blasts.
+        mass_error: Half the width of the 95 % interval of the charges' masses, as a share.
+        details: Project, client, author and the like.
 
     Raises:
         BlastEnvError: If an option is out of bounds.
@@ -107,6 +111,8 @@ class StudyOptions:
     stills: int = 4
     processes: int = 1
     cache: Path | None = None
+    mass_error: float = 0.1
+    details: ReportDetails = field(default_factory=ReportDetails)
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -115,6 +121,7 @@ class StudyOptions:
             ("charges", len(self.charges), 0, MOST_THREATS),
             ("places", self.places, 1, 50),
             ("stills", self.stills, 0, 12),
+            ("mass_error", self.mass_error, 0.0, 0.3),
         ):
             if not low <= value <= high:
                 raise BlastEnvError(f"{name} is {value}, must be {low} to {high}")
@@ -218,6 +225,15 @@ class Study:
         if self.options.ratio == 1.0 or pair.cells != fine:
             return LoadErrors(float("nan"), float("nan"), float("nan"))
         return LoadErrors.of(pair, self.pair(pair.target, pair.threat, coarse), self.options.ratio)
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        """The uncertain quantities, with the largest error of the cells of an impulse."""
+        fine = self.options.cells[1]
+        own = [each for each in self.pairs if each.target.protected and each.cells == fine]
+        shares = [self.errors(each).walled_pa_s / each.walled.impulse_pa_s for each in own]
+        cells = max((share for share in shares if np.isfinite(share)), default=0.0)
+        return Uncertainty(mass=self.options.mass_error, cells=cells)
 
     @property
     def grid_error(self) -> float:

@@ -83,7 +83,7 @@ class ReportVerdict:
         passes_bare: The same without the layout.
         flagged: Whether a load behind the verdict has a note.
         flagged_bare: The same without the layout.
-        words: The requirements.
+        words: The verdict on each requirement, such as `level of protection below Low`.
         doubt: Why a fail rests on sharper peaks; empty if it does not.
         buildings: The buildings with a facade.
         limits: The given limits.
@@ -117,11 +117,11 @@ def verdict_of(study: Study) -> ReportVerdict:
     limits = tuple(_limits(study))
     target = study.target
     kept, kept_bare = ([each.kept for each in limits], [each.kept_bare for each in limits])
-    asked = [f"{len(limits)} limits of loads"] if limits else []
+    asked = [_limit_words(limits)] if limits else []
     doubt = ""
     glazing: tuple[OtherGlass, ...] = ()
     if study.walled.buildings:
-        asked.insert(0, f"level of protection {target.label!r}")
+        asked.insert(0, study.walled.level_words_for(target))
         kept.append(study.walled.passes(target))
         kept_bare.append(study.bare.passes(target))
         doubt = study.walled.doubt(target)
@@ -131,7 +131,7 @@ def verdict_of(study: Study) -> ReportVerdict:
         passes_bare=all(kept_bare) if asked else None,
         flagged=study.walled.is_flagged or any(each.pair.walled.flagged for each in limits),
         flagged_bare=study.bare.is_flagged or any(each.pair.bare.flagged for each in limits),
-        words=" and ".join(asked),
+        words="; ".join(asked),
         doubt=doubt,
         buildings=tuple(_line(study, name) for name in study.walled.buildings),
         limits=limits,
@@ -146,6 +146,21 @@ def _limits(study: Study) -> Iterator[KeptLimit]:
         for pair in study.pairs:
             if pair.target.name == limit.target and pair.cells == fine:
                 yield KeptLimit(limit, pair, limit.is_kept(pair.walled), limit.is_kept(pair.bare))
+
+
+def _limit_words(limits: Sequence[KeptLimit]) -> str:
+    """Return how many limits are exceeded, and under which threats."""
+    exceeded = [each.pair.threat.name for each in limits if not each.kept]
+    if not exceeded:
+        return f"{counted(len(limits), 'load limit')} kept"
+    threats = list(dict.fromkeys(exceeded))
+    noun = "threat" if len(threats) == 1 else "threats"
+    return f"{counted(len(exceeded), 'load limit')} exceeded ({noun} {', '.join(threats)})"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: `1 load limit`, `2 load limits`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _line(study: Study, name: str) -> BuildingLine:

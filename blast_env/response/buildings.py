@@ -129,6 +129,11 @@ class LevelOfProtection(IntEnum):
         """Name in lower case."""
         return self.name.lower().replace("_", " ")
 
+    @property
+    def title(self) -> str:
+        """Name with a capital letter, for sentences."""
+        return self.label.capitalize()
+
     @classmethod
     def named(cls, label: str) -> "LevelOfProtection":
         """Return the level with a label; `BELOW_STANDARDS` is not allowed as a target.

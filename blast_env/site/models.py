@@ -532,7 +532,7 @@ def _digest(content: dict[str, Any]) -> str:
 
 def _without_words(zone: BuildZone) -> dict[str, Any]:
     """Return the content of a zone without texts for readers and defaults of optional keys."""
-    content = zone.model_dump(mode="json")
+    content = zone.model_dump(mode="json", exclude={"currency"})
     for area in (*content["keep_outs"], *content["cost_areas"]):
         del area["reason"]
     for item in content["items"]:

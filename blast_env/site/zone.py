@@ -40,6 +40,7 @@ from blast_env.site.catalogue import (
     Variant,
 )
 from blast_env.site.sections import (
+    FOR_PEOPLE,
     AnySource,
     AnyStructure,
     Area,
@@ -131,6 +132,7 @@ class BuildZone(Section):
         module_cost: Cost of a module outside all cost areas, without a catalogue.
         cost_areas: Areas with another cost; the highest one counts.
         budget: Largest total cost of a layout; unlimited unless given.
+        currency: Unit of all costs, as `EUR`.
         access_way: A way across the zone that must stay open, if there is one.
         height_m: Height of the modules, without a catalogue; the height of the air unless given.
     """
@@ -148,6 +150,7 @@ class BuildZone(Section):
     module_cost: Cost = 1.0
     cost_areas: Annotated[tuple[CostArea, ...], Field(max_length=100)] = ()
     budget: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
+    currency: Annotated[str, Field(max_length=20), FOR_PEOPLE] = ""
     access_way: AccessWay | None = None
     height_m: Height | None = None
 
@@ -165,6 +168,10 @@ class BuildZone(Section):
             pieces += len(measures) if isinstance(measures, list | tuple) else 0
         # `build_zone_problems` reports an empty catalogue.
         return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
+
+    def priced(self, cost: float) -> str:
+        """Return a cost with its currency: `12,000 EUR`."""
+        return f"{cost:,.10g} {self.currency}".rstrip()
 
     @property
     def catalogue(self) -> Catalogue:

@@ -45,10 +45,12 @@ def test_the_verdict_comes_first_and_better_glass_may_turn_it(site: Path, tmp_pa
     engine, cost, verdict = output.splitlines()[:3]
     assert cost.startswith("up to a blast of gas")
     assert engine.startswith("engine gas ")
-    assert verdict.startswith("glazed_room, no barrier: FAILS level 'medium' under 1 charges")
+    assert verdict.startswith(
+        "glazed_room, no barrier: DOES NOT COMPLY: level of protection below M"
+    )
     rows = {line.split()[0]: line for line in output.splitlines() if line.startswith("window")}
-    assert rows["window_annealed_6"].endswith("fails")
-    assert rows["window_laminated_6"].endswith("passes (flagged)")
+    assert rows["window_annealed_6"].endswith("does not comply")
+    assert rows["window_laminated_6"].endswith("complies (flagged)")
     assert all(each.stat().st_size > 10_000 for each in (picture, view, diagram))
     bays = pd.read_excel(table, "Bays", header=None).astype(str)
     assert "control_room/west/1/1" in bays.to_numpy()
@@ -59,9 +61,9 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(site: Path) -> None:
     """1 kg on cells of 0.5 m: 2 cells per m/kg^(1/3), where 9.2 are wanted."""
     lines = run(site, "--tnt-kg", "1", "--target", "very low", "--cell", "0.5").splitlines()
     verdict = next(k for k, line in enumerate(lines) if "glazed_room, no barrier" in line)
-    assert "PASSES (flagged) level 'very low'" in lines[verdict]
+    assert "COMPLIES (flagged): level of protection at least Very low" in lines[verdict]
     assert lines[verdict + 1].startswith("flag: control_room: 1 of 1 charges are outside")
-    assert not any(line.endswith("passes") for line in lines)
+    assert not any(line.endswith("complies") for line in lines)
 
 
 def test_a_site_without_facades() -> None:

@@ -23,6 +23,7 @@ from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import write_layout
 from blast_env.report import UNITS, Limit, Study, StudyOptions, run_study, write_report
+from blast_env.report.details import ReportDetails, read_details
 from blast_env.report.loads import MeasuredBlast, measure, targets_of
 from blast_env.report.page import report_html
 from blast_env.report.study import Runs, blasts_of
@@ -174,9 +175,11 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
         (str(number), title)
         for number, title in enumerate(
             (
-                *("Assumptions", "Site and threats", "Layout", "Loads", "The blast"),
+                *("Plan", "Facades before and after", "Alternatives and cost"),
+                *("Design-basis threat", "Assumptions", "Limits", "References"),
+                *("Loads", "The blast"),
                 *("Contribution of each item", "Other masses and places", "Reduction against cost"),
-                *("Validity and limits", "Sources of the numbers", "Reproduction"),
+                *("Sources of the numbers", "Reproduction"),
             ),
             start=1,
         )
@@ -189,9 +192,9 @@ def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
     whole, *limits = re.findall(r'<span class="(\w+)">([^<]+)</span>', page)
     assert fine.bare.flagged  # 6.8 cells per m/kg^(1/3)
     assert fine.walled.flagged
-    assert whole[1] in ("PASSES (flagged)", "FAILS")
-    assert limits == [("fail", "fails"), ("pass", "passes (flagged)")]
-    assert ">passes<" not in page
+    assert whole[1] in ("COMPLIES (flagged)", "DOES NOT COMPLY")
+    assert limits == [("fail", "does not comply"), ("pass", "complies (flagged)")]
+    assert ">complies<" not in page
     assert "1 of 1</strong> cases with the layout, 0 without" in page
 
 
@@ -288,12 +291,58 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     first = page[page.index("<h3>Verdict") : page.index("<h2>")]
     assert f">{verdict.word}<" in first
     assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
-    assert "costs 4" in first
+    assert '<td class="l">4, for 4 modules</td>' in first
+    assert f"level {study.target.label!r}".replace("'", "&#39;") in first
+    assert "driven by" in first
+    assert "keeps the level at the place of the threat" in first
     assert all(f"all windows: {each.title}" in page for each in verdict.glazing)
     assert page.count("no price given in the site file") == len(verdict.glazing) - 1
     assert "installed already" in page  # of the windows as they are
     bays = page[page.index("Bay by bay") :]
     assert all(f"hut/{wall}/1/1" in bays for wall in ("west", "east", "south", "north"))
+
+
+def test_page_one_has_the_verdict_in_the_words_of_the_field(study: Study) -> None:
+    harsh = replace(study.options, limits=(Limit("hut", impulse_pa_s=1.0),))
+    verdict = verdict_of(replace(study, options=replace(harsh, target=LevelOfProtection.HIGH)))
+    assert verdict.word == "DOES NOT COMPLY"
+    assert verdict.words == "level of protection below High; 1 load limit exceeded (threat T1)"
+
+
+def test_details_and_currency_are_on_the_page_and_the_marking_on_every_page(study: Study) -> None:
+    details = ReportDetails(project="North gate", client="City", marking='"</style> X')
+    document = study.scenario.model_dump(mode="json", exclude_none=True)
+    document["build_zone"]["currency"] = "EUR"
+    priced = Scenario.from_document(document, "priced")
+    assert priced.content_hash == study.scenario.content_hash
+    options = replace(study.options, details=details)
+    page = report_html(replace(study, options=options, scenario=priced), [])
+    assert "<h1>North gate</h1>" in page
+    assert "Client: <strong>City</strong>" in page
+    assert "4 EUR, for 4 modules" in page
+    assert page.count("</style>") == 1
+    assert r'@top-center { content: "\22 \3c \2f style\3e  X"' in page
+
+
+def test_details_come_from_a_file_and_options_have_precedence(tmp_path: Path) -> None:
+    path = tmp_path / "details.toml"
+    path.write_text('client = "City"\nrevision = "A"\n')
+    found = read_details(path, {"revision": "B", "author": ""})
+    assert found == ReportDetails(client="City", revision="B")
+    path.write_text('clients = "City"\n')
+    with pytest.raises(BlastEnvError, match="clients"):
+        read_details(path, {})
+    with pytest.raises(BlastEnvError, match="marking has 201 characters"):
+        ReportDetails(marking="x" * 201)
+
+
+def test_a_barrier_that_adds_load_is_named(study: Study) -> None:
+    pairs = tuple(
+        replace(each, bare=replace(each.bare, impulse_pa_s=0.9 * each.walled.impulse_pa_s))
+        for each in study.pairs
+    )
+    page = report_html(replace(study, pairs=pairs), [])
+    assert "\N{MINUS SIGN}11.1 % (the barrier makes it worse)" in page
 
 
 def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
