@@ -27,7 +27,7 @@ class Tool(StrEnum):
     ERASE = "erase"
     STRUCTURE = "structure"
     ZONE = "build zone"
-    KEEP_OUT = "keep-out"
+    KEEP_OUT = "no-build area"
     CHARGE = "charge"
     CHARGE_AREA = "charge area"
     GAUGE = "gauge"

@@ -39,7 +39,7 @@ class ThingKind(StrEnum):
     ZONE = "build zone"
     STRUCTURE = "structure"
     CHARGE = "charge"
-    KEEP_OUT = "keep-out"
+    KEEP_OUT = "no-build area"
     COST_AREA = "cost area"
     GAUGE = "gauge"
     ITEM = "item"
@@ -127,7 +127,7 @@ def things(scenario: Scenario) -> Iterator[tuple[SiteThing, str]]:
     if zone is not None:
         yield SiteThing(ThingKind.ZONE), "build zone"
         for index, area in enumerate(zone.keep_outs):
-            yield SiteThing(ThingKind.KEEP_OUT, index), f"keep-out: {area.reason}"
+            yield SiteThing(ThingKind.KEEP_OUT, index), f"no-build area: {area.reason}"
         for index, cost_area in enumerate(zone.cost_areas):
             yield SiteThing(ThingKind.COST_AREA, index), f"cost area: {cost_area.reason}"
         for index, item in enumerate(zone.items):
@@ -415,7 +415,7 @@ def with_roads_free(scenario: Scenario) -> Scenario:
     """Return the scenario with the roads in its build zone kept free.
 
     Raises:
-        ScenarioError: If that takes too many keep-outs.
+        ScenarioError: If that takes too many no-build areas.
     """
     areas = [{**_sized(each), "reason": "road"} for each in roads_in_zone(scenario)]
 

@@ -182,6 +182,8 @@ class Verdict(Kept):
         damage: Damage of its worst wall panel; empty where it has none.
         total_damage: Damage of all its components, added up.
         impulse_pa_s: Mean impulse on its bays.
+        likely: Probability of the level or a higher one.
+        standing: Standing of the load that decides, with its reason.
     """
 
     building: str
@@ -193,6 +195,8 @@ class Verdict(Kept):
     damage: str
     total_damage: float
     impulse_pa_s: float
+    likely: float
+    standing: str
 
 
 class BlastRecord(Kept):
@@ -336,9 +340,11 @@ class VerdictRow(Kept):
         threat: Name of the threat, or "worst of" so many.
         building: Name of the building.
         level: Level of protection that it reaches.
+        likely: Probability of that level or a higher one; a dash below all of them.
         panes: Expected number of broken panes, and the number of panes.
         condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
         damage: Damage of the worst wall panel.
+        standing: Standing of the load that decides, with its reason.
         flags: Reasons to distrust its loads; a dash if there are none.
     """
 
@@ -346,9 +352,11 @@ class VerdictRow(Kept):
     threat: str
     building: str
     level: str
+    likely: str
     panes: str
     condition: str
     damage: str
+    standing: str
     flags: str
 
 

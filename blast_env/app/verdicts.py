@@ -15,8 +15,9 @@ import numpy as np
 
 from blast_env.app.records import BlastRecord, Verdict, VerdictRow
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.consequences import BuildingResponse, by_building
+from blast_env.evaluation.consequences import BuildingResponse, Consequences, by_building
 from blast_env.evaluation.governing import Severity, governing
+from blast_env.evaluation.probability import Uncertainty, level_probability, probability_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
@@ -29,6 +30,7 @@ from blast_env.site.scene import BlastSite
 _BAYS: Final = "bays.npz"
 _DASH: Final = "\N{EN DASH}"
 _NAME: Final = "damage_{}_{}.png"
+_DRAWS: Final = 200  # of the uncertain quantities: the table must come at once
 _HASH_DIGITS: Final = 16
 
 
@@ -132,6 +134,7 @@ def picture_name(number: int, digest: str) -> str:
 
 def _verdict(building: BuildingResponse) -> Verdict:
     facade = building.facade
+    draws = level_probability(Consequences((building,)), Uncertainty(), _DRAWS)
     return Verdict(
         building=building.building,
         level=facade.level_of_protection,
@@ -142,6 +145,8 @@ def _verdict(building: BuildingResponse) -> Verdict:
         damage=facade.worst_damage.name.lower() if len(facade.walled) else "",
         total_damage=building.severity.damage,
         impulse_pa_s=building.severity.load,
+        likely=draws.of(facade.level_of_protection),
+        standing=building.standings[building.deciding_bay].words,
     )
 
 
@@ -180,8 +185,10 @@ def _verdict_row(layout: str, threat: str, verdict: Verdict, flags: tuple[str, .
         threat=threat,
         building=verdict.building,
         level=level,
+        likely=probability_text(verdict.likely, _DRAWS) if verdict.level else _DASH,
         panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
         condition=verdict.condition if verdict.panes else _DASH,
         damage=verdict.damage or _DASH,
+        standing=verdict.standing,
         flags="; ".join(flags) or _DASH,
     )

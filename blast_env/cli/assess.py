@@ -31,6 +31,7 @@ from blast_env.cli.output import (
 from blast_env.cli.targets import PICTURES
 from blast_env.evaluation import Case, Threat
 from blast_env.evaluation.consequences import (
+    BAY_CASE_COLUMNS,
     CASE_COLUMNS,
     BuildingResponse,
     Consequences,
@@ -42,7 +43,6 @@ from blast_env.evaluation.consequences import (
     verdict_word,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import GridError, convergence_index, final_engine
@@ -167,6 +167,9 @@ class AssessCommand(ChargeOptions):
         count = len(judged.barriers)
         charges = "1 charge" if count == 1 else f"{count} charges"
         print_line(f"{scenario.name}, {name}: {judged.verdict_words(target)}, under {charges}")
+        for building in judged.buildings:
+            stood = judged.standing(building).words
+            print_line(f"standing of the load that decides, {building}: {stood}")
         for note in judged.notes:
             print_line(f"flag: {note}")
         if doubt := judged.doubt(target):
@@ -273,7 +276,7 @@ class AssessCommand(ChargeOptions):
             return write_csv(bays, path)
         from blast_env.particles.workbook import SheetTable, write_tables
 
-        tables = [SheetTable("Bays", bays, (*CASE_COLUMNS, *LOADED_BAY_COLUMNS))]
+        tables = [SheetTable("Bays", bays, BAY_CASE_COLUMNS)]
         pieces = piece_table(found)
         if len(pieces):
             tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))

@@ -21,6 +21,7 @@ reflected pressure round the edges of a small wall, and coarse cells underestima
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import cbrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -35,6 +36,7 @@ from blast_env.evaluation.engines.oblique_walls import STEPPED, stepped_building
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.places import BayPlaces, bay_places
+from blast_env.evaluation.standing import Stood, standing_of
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element, Layout
 from blast_env.layout.build_scene import charge_against
@@ -47,6 +49,7 @@ from blast_env.response.components import Glazing, catalogue
 from blast_env.response.damage import worst
 from blast_env.response.facade import (
     FacadeResponse,
+    cells_of,
     force_words,
     peak_factor,
     respond,
@@ -69,6 +72,8 @@ _CLIPPED: Final = (
     "it complies with the peaks of the cells, which are clipped, but not with Kingery and"
     " Bulmash's sharp peaks of the same impulse: use smaller cells"
 )
+
+_OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal
 
 _BREACH: Final = "so close that walls may be breached: the response covers bending only"
 
@@ -100,6 +105,32 @@ class BuildingResponse:
         """The distances of its bays from the charge, and whether it sees them."""
         assert self.site is not None, "the response was made without a site"
         return bay_places(self.site, [each.bay for each in self.on_cells.bays])
+
+    @cached_property
+    def standings(self) -> tuple[Stood, ...]:
+        """The standing of the load on each bay."""
+        places, scale = self.places, cbrt(self.charge.tnt_kg)
+        cells = cells_of(self.peak_factor)
+        return tuple(
+            standing_of(
+                float(distance_m) / scale,
+                bool(seen),
+                cells,
+                self.known.get(each.bay.name, True),
+                each.bay.line is not None and min(map(abs, each.bay.line.normal)) > _OBLIQUE,
+            )
+            for each, distance_m, seen in zip(self.on_cells.bays, *places, strict=True)
+        )
+
+    @property
+    def deciding_bay(self) -> int:
+        """The index of the bay with the worst component."""
+        facade = self.facade
+        glass, walls = facade.glazing.hazard, facade.walls.damage
+        worst_glass, worst_wall = (float(each.max(initial=-1.0)) for each in (glass, walls))
+        if worst_glass >= worst_wall:
+            return int(facade.glazed[int(glass.argmax())])
+        return int(facade.walled[int(walls.argmax())])
 
     @cached_property
     def facade(self) -> FacadeResponse:
@@ -283,6 +314,11 @@ class Consequences:
         """Return the lowest level from the histories on the cells, which clip peaks."""
         return min(each.on_cells.level_of_protection for each in self.of(building))
 
+    def standing(self, building: str) -> Stood:
+        """Return the standing of the load on the bay that decides under the worst charge."""
+        worst = governing(self.of(building), lambda each: each.severity)
+        return worst.standings[worst.deciding_bay]
+
     def level_words(self, building: str) -> str:
         """Return the level of a building as text, with that on the cells where it is higher."""
         level, on_cells = self.level(building), self.level_on_cells(building)
@@ -393,20 +429,31 @@ CASE_COLUMNS: Final = (
 )
 """The first columns in tables of bays and of pieces under several charges."""
 
+BAY_CASE_COLUMNS: Final = (
+    *CASE_COLUMNS,
+    *LOADED_BAY_COLUMNS,
+    Column("standing", "", "of the load: measured, verified, approximate or outside"),
+    Column("reason", "", "reason for the standing"),
+)
+"""The columns of `bay_table`."""
+
 
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row per layout, charge and bay: `CASE_COLUMNS`, then `LOADED_BAY_COLUMNS`.
+    """Return one row per layout, charge and bay; see `BAY_CASE_COLUMNS`.
 
     Args:
         found: The consequences by the name of the layout.
     """
     rows = [
-        _case(name, each.charge) | row | {"known": each.known.get(str(row["bay"]), False)}
+        _case(name, each.charge)
+        | row
+        | {"known": each.known.get(str(row["bay"]), False)}
+        | {"standing": stood.standing.label, "reason": stood.reason}
         for name, judged in found.items()
         for each in judged.responses
-        for row in bay_rows(each.facade)
+        for row, stood in zip(bay_rows(each.facade), each.standings, strict=True)
     ]
-    return table_of(rows, (*CASE_COLUMNS, *LOADED_BAY_COLUMNS))
+    return table_of(rows, BAY_CASE_COLUMNS)
 
 
 def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":

@@ -470,7 +470,7 @@ def _counted(count: int, word: str, plural: str = "s") -> str:
 def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
     """Return whether each cell may have a module on the empty site.
 
-    Keep-outs, structures, their clearance and the charge exclude cells. `Placement` checks the
+    No-build areas, structures, their clearance and the charge exclude cells. `Placement` checks the
     conditions that depend on the layout (stock, budget, access way).
 
     Args:

@@ -139,7 +139,7 @@ class Kinds:
         named="",
     )
     KEEP_OUT: Final = FeatureKind(
-        "keep_out", "keep-out", 1.5, Look(hatched=True, drawn_dashed=True, cad_colour=30)
+        "keep_out", "no-build area", 1.5, Look(hatched=True, drawn_dashed=True, cad_colour=30)
     )
     BUILD_ZONE: Final = FeatureKind(
         "build_zone",
@@ -240,7 +240,7 @@ class Feature:
         kind: Its kind.
         places_m: (x, y) of a point, of the two ends of a line, or of the corners of an area,
             counterclockwise, for a rectangle from the lower left one.
-        name: For people: a structure's name, the reason of a keep-out, a module's identifier.
+        name: For people: a structure's name, the reason of a no-build area, a module's identifier.
         properties: Further properties; plain values, units in the keys.
         words: Name in legends, if it differs from that of its kind.
         label: Text beside it in pictures.

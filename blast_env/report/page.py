@@ -330,7 +330,7 @@ class BayTable:
     Attributes:
         title: Building and charge.
         rows: Bay; then, without the layout and with it: share of panes that break, their
-            condition, damage of the wall panel.
+            condition, damage of the wall panel; and the standing of the load with it.
         left_out: Number of bays left out.
     """
 
@@ -342,11 +342,19 @@ class BayTable:
 def _bay_tables(study: Study) -> list[BayTable]:
     tables = []
     for bare, walled in zip(study.bare.responses, study.walled.responses, strict=True):
+        standings = {
+            each.bay.name: stood.standing.label
+            for each, stood in zip(walled.facade.bays, walled.standings, strict=True)
+        }
         both = list(zip(bay_rows(bare.facade), bay_rows(walled.facade), strict=True))
         # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
         both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
         rows = tuple(
-            (str(first["bay"]), *(text for each in (first, second) for text in _bay_texts(each)))
+            (
+                str(first["bay"]),
+                *(text for each in (first, second) for text in _bay_texts(each)),
+                standings[str(first["bay"])],
+            )
             for first, second in both[:_MOST_BAYS]
         )
         x_m, y_m = walled.charge.position_m

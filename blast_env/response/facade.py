@@ -8,7 +8,7 @@ share that history.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from math import cbrt, floor
+from math import cbrt, floor, inf
 from typing import Final
 
 import numpy as np
@@ -365,6 +365,11 @@ def peak_factor(cell_m: float, tnt_kg: float) -> float:
         tnt_kg: Mass of the charge.
     """
     return 1.0 + _CELLS_OF_HALF_A_PEAK * cell_m / cbrt(tnt_kg)
+
+
+def cells_of(peak_factor: float) -> float:
+    """Return the cells per m/kg^(1/3) of a charge, from the factor on peaks on them."""
+    return _CELLS_OF_HALF_A_PEAK / (peak_factor - 1.0) if peak_factor > 1.0 else inf
 
 
 def slowest_period_s(bays: Sequence[FilledBay]) -> float:

@@ -47,7 +47,7 @@ class AccessWay(Section):
     """A way across the build zone that must stay open for a vehicle.
 
     The vehicle is a square of whole cells. It moves along rows and columns, stays inside the
-    zone, and covers neither a module nor a structure; keep-outs are open to it.
+    zone, and covers neither a module nor a structure; no-build areas are open to it.
 
     Attributes:
         width_m: Side of the vehicle's square; whole modules.

@@ -59,7 +59,7 @@ def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
 
 
 def _area_problems(zone: BuildZone) -> Iterator[Problem]:
-    """Check that keep-outs and cost areas overlap the zone."""
+    """Check that no-build areas and cost areas overlap the zone."""
     listed: dict[str, Sequence[Area]] = {"keep_outs": zone.keep_outs, "cost_areas": zone.cost_areas}
     for key, areas in listed.items():
         for index, area in enumerate(areas):

@@ -99,7 +99,7 @@ class ItemSiteRanges:
         shift_m: From the middle of the site to that of road, entry and building, m.
         path_probability: Probability of a path to the door that is kept free.
         path_width_m: Its width, m.
-        trees: Number of trees, each a keep-out.
+        trees: Number of trees, each a no-build area.
         tree_side_m: Side of the square of a tree, m.
         clearance_m: Least distance between a piece and a building, m.
         access_way_probability: Probability of an access way that must stay open; with a vehicle it

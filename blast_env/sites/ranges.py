@@ -158,8 +158,8 @@ class SiteRanges:
             road, m.
         path_probability: Probability of a path from the road to the door that is kept free.
         path_width_m: Its width, m.
-        hydrant_probability: Probability of a hydrant, a keep-out 1.5 m square.
-        trees: Number of trees, each a keep-out.
+        hydrant_probability: Probability of a hydrant, a no-build area 1.5 m square.
+        trees: Number of trees, each a no-build area.
         tree_side_m: Side of the square of a tree, m.
         clearance_m: Least distance between a module and a building, m.
         access_way_probability: Probability of an access way that must stay open.

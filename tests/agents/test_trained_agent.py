@@ -67,7 +67,7 @@ def test_proposals_are_legal_and_always_the_same(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["courtyard", "perimeter_gate", "street_junction"])
 def test_proposals_keep_every_condition_of_a_bundled_site(name: str) -> None:
-    """Budget, clearance, access way and keep-outs, by an agent that knows nothing of them."""
+    """Budget, clearance, access way and no-build areas, by an agent that knows nothing of them."""
     scenario = load_scenario(name)
     layout = untrained(scenario).propose(scenario)
     assert Placement.of(scenario, layout).cells == layout

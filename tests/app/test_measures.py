@@ -66,6 +66,8 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     assert on_cells > facade.level_of_protection
     words = f"{facade.level_of_protection.label}; {on_cells.label} on the cells"
     assert after.level == words != before.level
+    assert before.likely == "\N{EN DASH}" or 0.0 < float(before.likely.split()[-1]) <= 1.0
+    assert after.standing.startswith("approximate (3.4 cells per m/kg^(1/3)")
     assert after.damage == before.damage  # its walls are as they were
     assert blasted.verdicts()[0] == bare
     assert {row.cost for row in blasted.comparison()} == {"0", "70"}

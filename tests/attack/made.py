@@ -334,7 +334,7 @@ FAMILIES: Final[Mapping[str, Maker]] = MappingProxyType(
         "parking as a star.geojson": lambda: _with_house(
             _feature("Polygon", [[*_star(3001), _star(3001)[0]]], kind="charge_place")
         ),
-        "a keep-out as a star.geojson": lambda: _with_house(
+        "a no-build area as a star.geojson": lambda: _with_house(
             _feature("Polygon", [[*_star(3001), _star(3001)[0]]], kind="keep_out"),
             _feature("Polygon", [[*_star(3001), _star(3001)[0]]], kind="build_zone"),
         ),

@@ -157,7 +157,7 @@ def _interrupted_after(blasts: int) -> DesignProblem:
 @pytest.mark.parametrize("name", ["courtyard", "street_junction"])
 @pytest.mark.parametrize("method", DRAWN)
 def test_layouts_are_legal_on_real_sites(method: str, name: str) -> None:
-    """With keep-outs, a budget and an access way, against a hidden charge."""
+    """With no-build areas, a budget and an access way, against a hidden charge."""
     scenario = ballistic(name)
     evaluator = BlastEvaluator(scenario, "event")
     problem = DesignProblem(evaluator, practice_hidden(scenario, 3, 1, 0))

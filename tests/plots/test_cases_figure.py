@@ -112,13 +112,13 @@ def test_the_legend_has_what_is_drawn_and_nothing_else() -> None:
         "barrier module, as high as the air",
         "protected structure",
         "build zone",
-        "keep-out",
+        "no-build area",
         "site border",
     ]
 
 
 def test_different_sites_have_their_names_and_their_own_scales(tmp_path: Path) -> None:
-    """A legend for all of them, and a site without a keep-out does not lose that of another."""
+    """A legend for all of them, and a site without a no-build area keeps that of another."""
     sites = [generate_site(1), generate_site(2), COURTYARD]
     figure = comparison_figure(comparison(0.5, 0.5, 0.5, scenarios=sites))
     assert figure.get_suptitle().startswith("different sites: a layout for each case")
@@ -126,7 +126,7 @@ def test_different_sites_have_their_names_and_their_own_scales(tmp_path: Path) -
         assert axes.texts[0].get_text().startswith(f"{site.name}, ")
         low, high = axes.get_xlim()
         assert low < 0.0 < site.site.width_m < high < 1.1 * site.site.width_m
-    assert "keep-out" in words(figure)
+    assert "no-build area" in words(figure)
     assert save_figure(figure, tmp_path / "cases.png").stat().st_size > 10_000
 
 

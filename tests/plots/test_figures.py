@@ -55,7 +55,7 @@ def test_the_heat_map_has_units_and_a_legend(barrier_result: BlastResult) -> Non
         "protected structure",
         "other structure",
         "build zone",
-        "keep-out",
+        "no-build area",
         "site border",
     ]
     assert {"shelter", "wall"} <= set(texts_of(figure))

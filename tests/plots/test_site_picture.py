@@ -211,7 +211,7 @@ def test_conditions_of_the_zone_are_drawn() -> None:
         "building has another cost",
         "access way that stays open",
         "gate of the access way",
-        "keep-out",
+        "no-build area",
     } <= set(words)
 
 

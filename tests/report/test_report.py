@@ -179,7 +179,7 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
                 *("Design-basis threat", "Assumptions", "Limits", "References"),
                 *("Loads", "The blast"),
                 *("Contribution of each item", "Other masses and places", "Reduction against cost"),
-                *("Sources of the numbers", "Reproduction"),
+                *("Sources of the numbers", "Checks by hand", "Reproduction"),
             ),
             start=1,
         )

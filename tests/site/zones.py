@@ -32,7 +32,7 @@ def structure(name: str, x_m: float, y_m: float, rows: int, columns: int) -> Doc
 
 
 def area(x_m: float, y_m: float, width_m: float, height_m: float, **keys: Any) -> Document:
-    """A keep-out or cost area, its corner so far from the zone's corner."""
+    """A no-build area or cost area, its corner so far from the zone's corner."""
     corner_m = [CORNER_M[0] + x_m, CORNER_M[1] + y_m]
     return {"corner_m": corner_m, "size_m": [width_m, height_m], **keys}
 

@@ -128,7 +128,7 @@ class DesignPage:
 _KEYS = (
     (
         "V P E S Z K C A G",
-        "tools: select, place, erase, structure, zone, keep-out, charge, area, gauge",
+        "tools: select, place, erase, structure, zone, no-build area, charge, area, gauge",
     ),
     ("arrow keys", "with Select: move the selection by 0.5 m; otherwise: move the cell"),
     ("Enter, space", "place an item on the cell, or remove the one there"),

@@ -18,7 +18,7 @@ _TOOLS: Final = (
     (Tool.ERASE, "e", "backspace", "Erase"),
     (Tool.STRUCTURE, "s", "domain", "Structure"),
     (Tool.ZONE, "z", "select_all", "Zone"),
-    (Tool.KEEP_OUT, "k", "block", "Keep-out"),
+    (Tool.KEEP_OUT, "k", "block", "No-build area"),
     (Tool.CHARGE, "c", "whatshot", "Charge"),
     (Tool.CHARGE_AREA, "a", "crop_din", "Area"),
     (Tool.GAUGE, "g", "speed", "Gauge"),

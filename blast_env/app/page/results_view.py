@@ -39,9 +39,11 @@ _VERDICT_COLUMNS: Final = (
     ("threat", "threat", "left"),
     ("building", "building", "left"),
     ("level", "level of protection", "left"),
+    ("likely", "its probability", "left"),
     ("panes", "panes broken", "right"),
     ("condition", "worst pane (GSA, ISO)", "left"),
     ("damage", "worst wall panel", "left"),
+    ("standing", "standing of the load", "left"),
     ("flags", "flags", "left"),
 )
 # Okabe and Ito, with dashes, so that colour is not the only difference between lines.

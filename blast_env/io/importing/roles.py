@@ -1,4 +1,4 @@
-"""Roles of the objects of a map: buildings, places of charges, build zone, keep-outs."""
+"""Roles of the objects of a map: buildings, places of charges, build zone, no-build areas."""
 
 from collections.abc import Mapping
 from contextlib import suppress

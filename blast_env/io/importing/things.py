@@ -17,7 +17,7 @@ class Role(StrEnum):
     BUILDING = "building"
     CHARGE = "place of a charge"
     ZONE = "build zone"
-    KEEP_OUT = "keep-out"
+    KEEP_OUT = "no-build area"
     NAME = "name"
     OTHER = "other"
 

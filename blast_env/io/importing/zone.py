@@ -31,10 +31,10 @@ with import_extra("maps", "maps and drawings"):
     from shapely.geometry.base import BaseGeometry
 
 MOST_KEEP_OUTS: Final = 100
-"""Most keep-outs of a scenario."""
+"""Most no-build areas of a scenario."""
 
 MOST_AREAS: Final = 1000
-"""Most outlines of a zone, or of keep-outs."""
+"""Most outlines of a zone, or of no-build areas."""
 
 _MOST_REASON: Final = 200
 _ANY: Final = 1e-3  # of a block: a single cell suffices
@@ -47,10 +47,10 @@ def build_zone(
 ) -> dict[str, Any] | None:
     """Return the build zone in the form of a scenario; `None` if neither map nor options have one.
 
-    A zone that is not a rectangle becomes its bounding box, with keep-outs for the rest.
+    A zone that is not a rectangle becomes its bounding box, with no-build areas for the rest.
 
     Raises:
-        BlastEnvError: If it is not on the site, or takes too many keep-outs.
+        BlastEnvError: If it is not on the site, or takes too many no-build areas.
     """
     inside = np.zeros(site.shape, dtype=bool)
     if options.zone_m is not None:
@@ -87,12 +87,12 @@ def build_zone(
 def _keep_outs(
     site: PlacedSite, inside: BoolArray, window: tuple[slice, slice]
 ) -> list[dict[str, Any]]:
-    """Return the keep-outs, in the finest blocks within the limit of a scenario."""
+    """Return the no-build areas, in the finest blocks within the limit of a scenario."""
     corner = (window[0].start, window[1].start)
     empty = [_Empty(corner, ~inside[window], _OUTSIDE)]
     for thing, outline in _on_site(site, Role.KEEP_OUT):
         touched, shares = covered_shares(outline, site.shape)
-        reason = (thing.name or "keep-out of the map")[:_MOST_REASON]
+        reason = (thing.name or "no-build area of the map")[:_MOST_REASON]
         empty += _Empty.within(window, touched, shares > _TOUCHED, reason)
     for side in COARSER:
         tables = [rectangles_of(in_blocks(each.cells, side, _ANY)) for each in empty]

@@ -228,7 +228,7 @@ def test_the_line_is_the_scenario_s_own_rule(tmp_path: Path) -> None:
     for cell in zone.cells():
         reason = empty.explain(cell) or ""
         if reason and "structure" not in reason:
-            continue  # of a keep-out or a charge, which come first
+            continue  # of a no-build area or a charge, which come first
         square = zone.cell_rectangle_m(cell)
         is_inside = any(
             lies_inside(nearest_m(square, structure.rectangle_m), polygon)
