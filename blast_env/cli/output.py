@@ -21,6 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 from blast_env.errors import BlastEnvError, MissingExtraError
+from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.geometry import Element
 from blast_env.io.importing.options import plain
 from blast_env.site import AnyCharge, Scenario
@@ -336,8 +337,7 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
     """
     if not len(pieces):
         return
-    counts = ", ".join(f"{count} {word}" for word, count in outcome_counts(pieces).items())
-    table = ResultTable(f"{title}: {counts}", _PIECE_HEADERS, text_columns=2)
+    table = ResultTable(f"{title}: {outcome_words(pieces)}", _PIECE_HEADERS, text_columns=2)
     ordered = pieces.sort_values(["tilt", "slide_m"], ascending=False, kind="stable")
     for row in ordered.head(_MOST_PIECES).to_dict("records"):
         overturn_s = row["overturn_s"]
@@ -354,8 +354,3 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
     result_console().print(table)
     if len(ordered) > _MOST_PIECES:
         print_line(f"and {len(ordered) - _MOST_PIECES} more pieces with smaller movements")
-
-
-def outcome_counts(pieces: "pd.DataFrame") -> dict[str, int]:
-    """Return the number of pieces by outcome, the most frequent first."""
-    return {str(word): int(n) for word, n in pieces["outcome"].value_counts().items()}

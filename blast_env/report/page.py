@@ -17,6 +17,7 @@ from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation.capacity import mass_near
 from blast_env.evaluation.consequences import verdict_word
 from blast_env.evaluation.engines.bays import bay_rows
+from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.grid_error import FACTOR, ORDER
 from blast_env.evaluation.probability import level_probability, probability_text
 from blast_env.files import scratch_folder, write_atomically
@@ -246,23 +247,8 @@ def _summary(study: Study) -> list[SummaryLine]:
     return lines
 
 
-_OUTCOMES: Final = {
-    "stands": ("remains stable", "remain stable"),
-    "slides": ("slides", "slide"),
-    "rocks": ("rocks", "rock"),
-    "overturns": ("overturns", "overturn"),
-}
-
-
 def _standing(verdict: ReportVerdict) -> str:
-    """Return the outcomes of the pieces: `5 barriers remain stable, 1 barrier slides`."""
-    if verdict.barrier is None:
-        return ""
-    counts = verdict.barrier.pieces["outcome"].value_counts()
-    return ", ".join(
-        f"{counted(number, 'barrier')} {_OUTCOMES[word][number > 1]}"
-        for word, number in counts.items()
-    )
+    return "" if verdict.barrier is None else outcome_words(verdict.barrier.pieces)
 
 
 @dataclass(frozen=True)

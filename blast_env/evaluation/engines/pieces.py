@@ -251,3 +251,24 @@ def _ways(scenario: Scenario, elements: Sequence[Element], cell_m: float) -> lis
         if variant.columns >= variant.rows:
             ways.append(_Way(index, south, layers * variant.columns * cells_a_module))
     return ways
+
+
+_VERBS: Final = {
+    "stands": ("remains stable", "remain stable"),
+    "slides": ("slides", "slide"),
+    "rocks": ("rocks", "rock"),
+    "overturns": ("overturns", "overturn"),
+}
+
+
+def outcome_words(pieces: "pd.DataFrame") -> str:
+    """Return the outcomes, the most frequent first: `5 barriers remain stable, 1 barrier slides`.
+
+    Args:
+        pieces: One row per piece; see `PIECE_COLUMNS`.
+    """
+    counts = pieces["outcome"].value_counts().items()
+    return ", ".join(
+        f"{n} {'barrier' if n == 1 else 'barriers'} {_VERBS[str(word)][n > 1]}"
+        for word, n in counts
+    )
