@@ -114,15 +114,6 @@ def test_an_archive_of_rl_zoo_is_read_where_rl_zoo_is_missing(
     assert layout == TrainedAgent(model.policy, scenario).propose(scenario)
 
 
-def test_an_archive_with_an_unknown_policy_is_refused_with_the_reason(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    archive = tmp_path / "model.zip"
-    archived(archive, monkeypatch, "elsewhere.Policy")
-    with pytest.raises(BlastEnvError, match=r"cannot be read: No module named 'elsewhere'"):
-        load_archive(archive, "ppo", load_scenario("courtyard"), trust_archive=True)
-
-
 def test_options_are_read_as_json_or_text_and_reach_the_policy() -> None:
     options = ["ent_coef=0.02", "learning_rate=lin_3e-4", "policy_kwargs.width=16", "gamma=9e-1"]
     changes = parse_options(options, hyperparameter_keys("maskable_ppo"))

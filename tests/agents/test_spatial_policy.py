@@ -18,12 +18,10 @@ from blast_agents.training.agent import logits_of
 
 import blast_env  # noqa: F401
 from blast_env import load_scenario
-from blast_env.design.rules import wall_near_charge
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation, Observable
 from blast_env.layout import Placement
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
 from blast_env.sites import Visibility, generate_site
 from blast_env.sites.turning import turned
 
@@ -126,44 +124,6 @@ def test_another_charge_is_not_taken_for_the_one_before() -> None:
     assert not torch.equal(logits_of(used, placed), logits)
 
 
-def test_an_untrained_policy_finishes_seldom() -> None:
-    """Otherwise the first layouts would be too short to learn from."""
-    env = environment()
-    policy = SpatialMaskablePolicy(
-        env.observation_space, env.action_space, lambda _: 1e-3, rows=40, columns=16
-    )
-    logits = logits_of(policy, observed(env, (5.0, 15.0)))
-    assert logits.softmax(dim=1)[0, -1].item() < 1e-3 / 2.0
-
-
-def test_the_optimiser_knows_all_weights() -> None:
-    """The head takes the place of stable-baselines3's after that has made an optimiser."""
-    env = environment()
-    policy = SpatialPolicy(
-        env.observation_space, env.action_space, lambda _: 1e-3, rows=40, columns=16
-    )
-    optimised = {id(weight) for weight in policy.optimizer.param_groups[0]["params"]}
-    assert optimised == {id(weight) for weight in policy.parameters()}
-
-
-def test_the_cells_of_a_row_across_the_sight_share_the_facade_out() -> None:
-    """What each of them hides adds up to all of it: no gap and no overlap between neighbours."""
-    env = environment()
-    view = zone_view(observed(env, (5.0, 15.0)), 40, 16)
-    for column in (0, 7, 15):  # columns of the zone stand across the line of sight
-        assert view.cells[0, :, column, CUT].sum() == pytest.approx(SHARE_GAIN, rel=0.05)
-
-
-def test_what_a_module_hides_it_takes_from_those_in_line_with_it_and_from_no_others() -> None:
-    env = environment()
-    bare = zone_view(observed(env, (5.0, 12.0)), 40, 16).cells[0]
-    view = zone_view(observed(env, (5.0, 12.0), layout=[(14, 0)]), 40, 16).cells[0]
-    torch.testing.assert_close(view[..., CUT], bare[..., CUT])
-    assert bare[14, 8, OPEN_CUT] == bare[14, 8, CUT] > 0.0
-    assert view[14, 8, OPEN_CUT] == 0.0  # straight behind it
-    assert view[22, 8, OPEN_CUT] == bare[22, 8, OPEN_CUT] > 0.0  # at another part of the facade
-
-
 @pytest.mark.parametrize("seed", [10_000, 10_003, 10_005, 10_010])
 def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
     """A charge that may be anywhere on a road or in a parking area, against lines drawn one by one.
@@ -183,18 +143,6 @@ def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
     found = view.cells[0, :, :, CUT].numpy() / SHARE_GAIN
     assert np.corrcoef(found.ravel(), expected.ravel())[0, 1] > 0.95
     assert np.abs(found - expected).max() < 0.05
-
-
-def test_a_rule_s_wall_covers_the_bearings_to_the_facade() -> None:
-    """What is left open of the facade is what a policy has to see shrink."""
-    scenario = load_scenario("courtyard")
-    charge = Charge((5.0, 10.0), 100.0)
-    layout = wall_near_charge(scenario, charge)
-    env = environment()
-    bare = zone_view(observed(env, charge.position_m), 40, 16).site[0, OPEN_FACADE]
-    wall = zone_view(observed(env, charge.position_m, layout=layout[:8]), 40, 16)
-    assert bare == 1.0
-    assert wall.site[0, OPEN_FACADE] < 0.7
 
 
 def test_a_place_counts_by_the_angle_under_which_it_sees_the_facade() -> None:

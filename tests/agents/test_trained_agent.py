@@ -205,14 +205,6 @@ def test_code_in_a_checkpoint_does_not_run(run: Path, tmp_path: Path) -> None:
     assert not victim.exists()
 
 
-def test_weights_of_another_network_are_refused(run: Path, tmp_path: Path) -> None:
-    copy = Path(copytree(run, tmp_path / "run"))
-    text = (copy / "config.json").read_text()
-    (copy / "config.json").write_text(text.replace('"width": 8', '"width": 9'))
-    with pytest.raises(BlastEnvError, match="width is 9 in the configuration, must be 8"):
-        load_agent(copy)
-
-
 @pytest.mark.parametrize("algorithm", ["ppo", "maskable_ppo"])
 def test_an_image_agent_is_trained_loaded_and_proposes(tmp_path: Path, algorithm: str) -> None:
     chosen = settings(scenario_file(tmp_path), algorithm=algorithm, steps=16, observation="image")

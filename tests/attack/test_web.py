@@ -13,7 +13,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Victim]:
         yield found
 
 
-@pytest.mark.parametrize("name", ["host", "origin", "frame", "token", "path names"])
+@pytest.mark.parametrize("name", ["host", "frame", "token"])
 def test_a_real_server_holds(server: Victim, name: str) -> None:
     """Every seventh: all of them take `make attack`."""
     for told, attempt in [*ATTACKS[name](server)][::7]:

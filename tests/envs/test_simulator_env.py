@@ -36,7 +36,7 @@ def make(**arguments: Any) -> BlastSimulatorEnv:
     ("scenario", "engine"),
     [
         (BALLISTIC_COURTYARD, "pymunk"),
-        *((name, "event") for name in ("courtyard", "free_field", "street_junction")),
+        ("free_field", "event"),
     ],
 )
 def test_both_checkers_pass_without_a_warning(scenario: str | Scenario, engine: str) -> None:
