@@ -3,9 +3,9 @@ import pytest
 
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell
-from blast_env.layout import check_layout, usable_cells
-from blast_env.site import Scenario, bundled_scenarios, load_scenario
-from tests.site.documents import full_document, minimal_document
+from blast_env.layout import check_layout
+from blast_env.site import Scenario, load_scenario
+from tests.site.documents import full_document
 
 
 def scenario() -> Scenario:
@@ -17,50 +17,6 @@ def scenario() -> Scenario:
         del document["build_zone"][key]
     document["charge"][0]["position_m"] = [18.25, 12.25]
     return Scenario.from_document(document, "test")
-
-
-def test_no_cell_is_usable_without_a_build_zone() -> None:
-    without_zone = Scenario.from_document(minimal_document(), "test")
-    assert usable_cells(without_zone).shape == (0, 0)
-    assert check_layout(without_zone, []) == ()
-    with pytest.raises(LayoutError, match="no build zone"):
-        check_layout(without_zone, [(0, 0)])
-
-
-@pytest.mark.parametrize("name", bundled_scenarios())
-def test_mask_leaves_out_exactly_what_overlaps(name: str) -> None:
-    """Against the rectangles' own `overlaps`; where the charge is, only that some is free."""
-    bundled = load_scenario(name)
-    zone = bundled.build_zone
-    if zone is None:
-        return
-    usable = usable_cells(bundled)
-    for cell in zone.cells():
-        square = zone.cell_rectangle_m(cell)
-        solid = [*bundled.structures, *zone.keep_outs]
-        if any(square.overlaps(each.rectangle_m) for each in solid):
-            assert not usable[cell], cell
-    assert usable.sum() > 2 * zone.stock
-
-
-def test_layout_keeps_its_order() -> None:
-    layout = [(3, 1), (2, 0), (19, 9)]
-    assert check_layout(scenario(), layout) == tuple(layout)
-
-
-@pytest.mark.parametrize(
-    "layout",
-    [
-        np.array([[3, 1], [2, 0]]),
-        [np.array([3, 1]), np.array([2, 0])],
-        [(np.int64(3), np.uint8(1)), [2, 0]],
-        ((3, 1), (2, 0)),
-    ],
-)
-def test_numpy_layouts_become_plain_integers(layout: list[Cell]) -> None:
-    cells = check_layout(scenario(), layout)
-    assert cells == ((3, 1), (2, 0))
-    assert all(type(number) is int for cell in cells for number in cell)
 
 
 @pytest.mark.parametrize(

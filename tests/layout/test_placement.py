@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell
 from blast_env.layout import Placement, check_layout, usable_cells
-from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from tests.site.documents import Document
 from tests.site.zones import (
     area,
@@ -88,49 +87,8 @@ def test_order_does_not_matter_and_fewer_modules_are_no_worse(
 
 # --- The bundled scenarios of single modules, as they are and with every condition added.
 
-MODULAR = [name for name in bundled_scenarios() if not load_scenario(name).height_notes]
-
-
-@pytest.mark.parametrize("conditions", [{}, CONDITIONS], ids=["as they are", "with conditions"])
-@pytest.mark.parametrize("name", MODULAR)
-def test_bundled_scenarios_are_placed_without_contradiction(
-    name: str, conditions: Document
-) -> None:
-    """Some episodes of each, 20 cells looked at in every state."""
-    document = load_scenario(name).model_dump()
-    if document["build_zone"] is None:
-        assert Placement.empty(load_scenario(name)).is_full
-        return
-    document["build_zone"].update(conditions)
-    scenario = Scenario.from_document(document, name)
-    zone = scenario.zone
-    every, rng = list(zone.cells()), np.random.default_rng(0)
-    for _ in range(4):
-        placement = Placement.empty(scenario)
-        while not placement.is_full:
-            looked_at = [every[i] for i in rng.integers(len(every), size=18)]
-            cells = available(placement)
-            chosen = cells[rng.integers(len(cells))]
-            assert_free_explain_and_place_agree(placement, [*looked_at, chosen, cells[0]])
-            placement = placement.place(chosen)
-        assert check_layout(scenario, placement.cells) == placement.cells
-        assert (Placement.of(scenario, placement.cells[::-1]).free == placement.free).all()
-
 
 # --- Whole layouts.
-
-
-@pytest.mark.parametrize(
-    ("cells", "words"),
-    [
-        ([(0, 0), (1, 1), (0, 0)], "cell (0, 0) is repeated"),
-        ([(0, 0), (8, 0)], "cell (8, 0) is outside the build zone of 8 rows and 8 columns"),
-        ([(0, 0), (0, 1)], "cell (0, 1) costs 1, but only 0.5 of the budget of 1.5 is left"),
-    ],
-)
-def test_layout_is_refused_by_its_first_bad_cell(cells: list[Cell], words: str) -> None:
-    with pytest.raises(LayoutError, match=f"^{re.escape(words)}$"):
-        Placement.of(zone_scenario(budget=1.5 if "costs" in words else 50.0), cells)
 
 
 def test_layout_that_closes_the_way_is_refused_by_the_cell_that_closes_it() -> None:
@@ -152,12 +110,6 @@ def test_numpy_cells_become_plain_integers(cell: Any) -> None:
     assert placement.cells == ((3, 1),)
     assert all(type(number) is int for number in placement.cells[0])
     assert placement.explain(cell) == "cell (3, 1) is taken by a module"
-
-
-@pytest.mark.parametrize("cell", [3, (1.0, 2), (True, 1), (1, 2, 3), None, "31"])
-def test_what_is_no_cell_is_refused(cell: Any) -> None:
-    with pytest.raises(LayoutError, match=r"^cell: .* must be a pair of integers"):
-        Placement.empty(zone_scenario()).place(cell)
 
 
 # --- A value like any other.

@@ -99,64 +99,6 @@ def test_vehicle_crosses_where_it_fits(picture: str, width: int, is_way: bool) -
     assert is_open(way(width, "bottom_top"), grid(picture).T) is is_way
 
 
-@pytest.mark.parametrize("between", ["left_right", "bottom_top"])
-def test_vehicle_as_wide_as_the_zone_needs_all_of_it(between: str) -> None:
-    assert is_open(way(3, between), np.ones((3, 3), dtype=bool))
-    assert closing_cells(way(3, between), np.ones((3, 3), dtype=bool)).all()
-    taken = np.ones((3, 3), dtype=bool)
-    taken[2, 0] = False
-    assert not is_open(way(3, between), taken)
-
-
-@pytest.mark.parametrize(
-    ("picture", "width"),
-    [
-        # Cells marked x would close the way; those marked # are taken.
-        (
-            """
-            #######
-            #.....#
-            xx###xx
-            #.....#
-            #######
-            """,
-            1,
-        ),
-        (
-            """
-            ........
-            xxxxxxxx
-            xxxxxxxx
-            ........
-            """,
-            3,
-        ),
-        (
-            """
-            .....
-            .....
-            #....
-            .....
-            .....
-            """,
-            1,
-        ),
-        (
-            """
-            ####
-            xxxx
-            xxxx
-            """,
-            2,
-        ),
-    ],
-    ids=["two ways round", "either side is too narrow", "room all around", "corridor"],
-)
-def test_cells_that_close_the_way_are_found(picture: str, width: int) -> None:
-    passable, marked = grid(picture), ~grid(picture, "x")
-    assert (closing_cells(way(width), passable)[passable] == marked[passable]).all()
-
-
 def by_trial(passable: np.ndarray, width: int) -> np.ndarray:
     """The cells that close the way, each found by putting a module there."""
     closing = np.zeros_like(passable)

@@ -3,7 +3,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from blast_env.errors import BlastEnvError
 from blast_env.layout import usable_cells
@@ -23,7 +22,6 @@ from tests.site.documents import (
     changed,
     full_document,
     minimal_document,
-    without,
 )
 
 
@@ -68,22 +66,9 @@ def test_sources_are_drawn_by_their_weights() -> None:
     assert charges.count(Charge((3.0, 5.0), 1.0)) / 2000 == pytest.approx(0.75, abs=0.04)
 
 
-def test_charge_of_a_seed_is_reproducible() -> None:
-    scenario = scenario_from(full_document())
-    first, second = (scenario.sample_charge(np.random.default_rng(7)) for _ in range(2))
-    assert first == second
-
-
 def test_charge_radius_is_that_of_the_fan_with_its_balls() -> None:
     # Offset 1 unit and radius 1 unit; 4 units are a metre.
     assert scenario_from(minimal_document()).charge_radius_m == 0.5
-
-
-def test_structures_of_a_scenario_made_in_code_may_not_overlap() -> None:
-    document = full_document()
-    document["structures"][1]["corner_m"] = [21.0, 11.0]
-    with pytest.raises(ValidationError, match="overlaps"):
-        Scenario.model_validate(document)
 
 
 @pytest.mark.parametrize(
@@ -182,11 +167,6 @@ def test_stand_off_needs_the_structure_on_the_right() -> None:
     document = changed(minimal_document(), ("charge", 0, "position_m"), [18.0, 5.0])
     with pytest.raises(BlastEnvError, match="to the right of the charge"):
         scenario_from(document).at_stand_off(15.0)
-
-
-def test_optional_sections_may_be_left_out() -> None:
-    scenario = scenario_from(without(full_document(), ("build_zone",)))
-    assert scenario.build_zone is None
 
 
 def test_strip_behind_the_structure_keeps_its_width() -> None:

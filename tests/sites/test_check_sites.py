@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from blast_env.design.rules import random_layout
-from blast_env.layout import Placement
 from blast_env.site import Scenario
 from blast_env.sites import SiteMeasures, SiteRanges
 from studies.check_sites import MeasuredSite, drawn_sites, measured
@@ -33,12 +31,6 @@ def test_the_last_site_drawn_for_a_seed_is_the_one_generated(sites: tuple[Scenar
     drawn = [list(drawn_sites(seed, SiteRanges())) for seed in range(8)]
     assert [each[-1] for each in drawn] == list(sites[:8])
     assert max(map(len, drawn)) > 1
-
-
-def test_random_layouts_use_all_that_can_be_placed(sites: tuple[Scenario, ...]) -> None:
-    rng = np.random.default_rng(0)
-    for site in sites[:10]:
-        assert Placement.of(site, random_layout(site, rng)).is_full
 
 
 def test_measuring_puts_the_visibility_layout_first() -> None:
