@@ -148,10 +148,10 @@ def test_a_layout_over_the_budget_can_be_looked_at_but_not_reported(blasted: Ses
     with pytest.raises(LayoutError, match="budget"):
         blasted.report(Path("a.html"))
     blasted.undo()
-    words = {each.name: each for each in placing.measures(blasted.scenario, blasted.design.layout)}
-    assert words["glass"].is_taken
-    assert not words["panels"].is_taken
-    assert words["panels"].words == "reinforced concrete wall, 150 mm on all structures, west"
+    known = {each.name: each for each in placing.measures(blasted.scenario, blasted.design.layout)}
+    assert known["glass"].is_taken
+    assert not known["panels"].is_taken
+    assert known["panels"].words == "reinforced concrete wall, 150 mm on all structures, west"
 
 
 def test_a_measure_is_added_to_a_site_with_items_and_windows() -> None:
