@@ -76,6 +76,7 @@ _MOST_TEXT: Final = 1000
 _SAG_M: Final = 0.02  # largest deviation of the chords of an arc
 _ROUNDING: Final = 1e-9  # of the largest coordinate
 _NOWHERE: Final = Point()
+_AROUND_TEXT: Final = 8  # a hole in a hatch for a text
 _FRAMES: Final = ("IMAGE", "WIPEOUT", "VIEWPORT")
 """Entities whose outline is that of a picture."""
 
@@ -352,6 +353,9 @@ class _Drawn:
         if _is_mesh(entity):
             return self._footprint(make_primitive(entity).mesh, place)
         if isinstance(entity, Polygonal):
+            entity.paths.paths = [
+                each for each in entity.paths if not each.path_type_flags & _AROUND_TEXT
+            ]
             rings = [self._places(line, place) for line in from_hatch(entity)]
             lines = [LineString([*ring[:, :2], ring[0, :2]]) for ring in rings if len(ring) > 2]
             return shapely.build_area(shapely.GeometryCollection(lines)), (0.0, 0.0)

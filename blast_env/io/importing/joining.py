@@ -121,7 +121,8 @@ def _snapped(sides: Sequence[FloatArray]) -> tuple[list[LineString], FloatArray]
 def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     """Return the objects of a drawing, with outlines within outlines of a layer as courtyards.
 
-    An inner outline with a name or another height is a building of its own.
+    An inner outline with a name or another height is a building of its own. The filling of an
+    outline is no courtyard, but has them.
     """
     outlines = [
         k
@@ -134,16 +135,29 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     texts = shapely.STRtree([each.geometry for each in things if each.role is Role.NAME])
     shapes = np.array([things[k].geometry for k in outlines], dtype=object)
     areas = shapely.area(shapes)
+    whole = shapely.area(shapely.polygons(shapely.get_exterior_ring(shapes)))
     inner, outer = shapely.STRtree(shapes).query(shapes, "within")
     deep: dict[int, list[int]] = {}
+    fillings: dict[int, int] = {}
     for low, high in zip(inner, outer, strict=True):
         one, other = things[outlines[low]], things[outlines[high]]
         alike = (one.kind, one.height_m, one.base_m) == (other.kind, other.height_m, other.base_m)
-        if low != high and areas[low] < _ALIKE * areas[high] and alike:
+        if low != high and whole[low] < _ALIKE * whole[high] and alike:
             deep.setdefault(int(low), []).append(int(high))
+        elif areas[low] < _ALIKE * areas[high] and alike:
+            fillings.setdefault(int(high), int(low))
     found, gone = list(things), set()
+    for high, low in fillings.items():
+        outline, filling = outlines[high], things[outlines[low]]
+        if outlines[low] not in gone:
+            found[outline] = replace(found[outline], geometry=filling.geometry)
+            kind, detail = "fillings of outlines", f"of {found[outline].place}"
+            ledger.add(Deed.MERGED, kind, filling.place, filling.name, detail)
+            gone.add(outlines[low])
     for low, around in sorted(deep.items(), key=lambda each: len(each[1])):
         court = things[outlines[low]]
+        if outlines[low] in gone:
+            continue
         if len(around) % 2 == 0 or court.name or len(texts.query(court.geometry, "contains")):
             continue
         high = outlines[min(around, key=lambda each: areas[each])]

@@ -468,6 +468,27 @@ def test_hatch_with_a_hole_and_an_inner_outline_are_courtyards(tmp_path: Path) -
     assert len(entries(site, Deed.GUESSED, "taken as courtyards")) == 1
 
 
+@pytest.mark.parametrize("yard", [False, True])
+@pytest.mark.parametrize("around", [False, True])
+def test_a_hatched_outline_is_a_building_not_its_courtyard(
+    yard: bool, around: bool, tmp_path: Path
+) -> None:
+    """Outline and filling are drawn apart, with a hole for a text, and the yard twice."""
+    path, document = drawing(tmp_path)
+    space = document.modelspace()
+    hatch = space.add_hatch(dxfattribs=of_layer("HOUSES"))
+    hatch.paths.add_polyline_path(rectangle(0, 0, 12, 10), is_closed=True)
+    hatch.paths.add_polyline_path(rectangle(1, 1, 2, 1), is_closed=True, flags=8)
+    if yard:
+        hatch.paths.add_polyline_path(rectangle(4, 3, 4, 4), is_closed=True, flags=0)
+    outlines = [rectangle(0, 0, 12, 10), *([rectangle(4, 3, 4, 4)] * (yard and around))]
+    for shape in outlines:
+        space.add_lwpolyline(shape, close=True, dxfattribs=of_layer("HOUSES"))
+    document.saveas(path)
+    (house,) = imported(path, **DRAWN).buildings
+    assert house.outline.area == (104.0 if yard else 120.0)
+
+
 def test_meshes_have_a_footprint_and_their_heights(tmp_path: Path) -> None:
     path, document = drawing(tmp_path)
     space = document.modelspace()
