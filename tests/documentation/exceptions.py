@@ -95,15 +95,11 @@ _CLUSTER: Final = "--cluster dask.json"
 
 SMALLER: Final[dict[str, str]] = {
     # README.md
-    "blast-env evaluate --layout walls.json --scenario visitor_entrance --seeds 4": (
-        "--seeds 1 --cell 0.5"
-    ),
     "blast-env evaluate --layout found/layout.json --scenario visitor_entrance --seeds 4": (
         "--seeds 1 --cell 0.5"
     ),
-    "blast-env report visitor_entrance --layout walls.json --out report.html --pdf report.pdf": (
-        "--threats 1 --places 1 --stills 1 --no-items"
-    ),
+    "blast-env report visitor_entrance --layout found/layout.json --out report.html"
+    " --pdf report.pdf": ("--threats 1 --places 1 --stills 1 --no-items"),
     # docs/start.md
     "blast-env search --engine gas --scenario depot.toml --threat hidden"
     " --method population_annealing --budget 300 --start-from building/layout.json --processes 2"
