@@ -1,11 +1,11 @@
 """Checks of the response of buildings: the tables of docs/engineers/response.md.
 
-`python -m studies.response tables` prints those without a blast, `cells` the others.
+`python -m studies.response tables` prints those without a blast, `cells` and `angles` the others.
 """
 
 from collections.abc import Iterator
 from itertools import product
-from math import pi, sin
+from math import atan2, degrees, pi, sin
 from typing import Annotated, Final
 
 import numpy as np
@@ -16,8 +16,10 @@ from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.screening import screen
 from blast_env.response.components import Glazing, catalogue
 from blast_env.response.facade import (
+    BAY_M,
     Bay,
     FacadeResponse,
     FilledBay,
@@ -26,7 +28,7 @@ from blast_env.response.facade import (
     sharpened,
 )
 from blast_env.response.glass import Pane, glazing_responses
-from blast_env.response.sdof import Resistance, System, responses
+from blast_env.response.sdof import Resistance, System, impulses, responses
 from blast_env.response.walls import (
     Panel,
     PanelResponses,
@@ -311,6 +313,33 @@ def peak_rows(found: dict[float, FacadeResponse], reference_pa: FloatArray) -> I
         yield f"{cell_m:g} m", f"{ratio:.2f}", f"{allowed:.2f}", f"{(impulse / fine).mean():.3f}"
 
 
+def angle_rows(width_m: float) -> Iterator[Row]:
+    """Yield one row per bay from the middle of a wall: angle, impulse by gas, by the rule."""
+    site = open_wall(20.0, width_m, 10.0, 100.0)
+    loads = GasBlast(site, engine=GasEngine(cell_m=0.5)).run().bay_loads
+    assert loads is not None
+    gas_pa_s = dict(
+        zip(
+            (each.bay.name for each in loads.bays),
+            impulses(*loads.histories).max(axis=1).tolist(),
+            strict=True,
+        )
+    )
+    charge_m = np.array(site.charge[0].segment_m[0])
+    count = round(width_m / BAY_M)
+    lowest = screen(site).threats[0].bays[:count]
+    for each in lowest[count // 2 :: 2]:
+        bay = each.filled.bay
+        aside_m = 0.5 * (bay.left_m + bay.right_m) - charge_m[1]
+        own = gas_pa_s[bay.name]
+        yield (
+            f"{degrees(atan2(aside_m, 20.0)):.0f} degrees",
+            f"{own:.0f}",
+            f"{each.impulse_pa_s:.0f}",
+            f"{own / each.impulse_pa_s:.2f}",
+        )
+
+
 app = typer.Typer(help=__doc__, add_completion=False, pretty_exceptions_enable=False)
 
 
@@ -352,6 +381,16 @@ def cells(
         print_line("\n" + markdown_table(("period", *words), period_rows(found)))
         levels = markdown_table(("component", *words), component_rows(found, OPEN_KG))
         print_line("\nlevel of protection, in brackets if sharper peaks make it worse\n\n" + levels)
+
+
+@app.command()
+def angles(
+    width: Annotated[float, typer.Option(help="Width of the wall, m.")] = 96.0,
+) -> None:
+    """Print the impulse on a wall by gas and by the rule of screening: 100 kg at 20 m."""
+    with user_errors():
+        headers = ("angle in plan", "gas, Pa s", "rule, Pa s", "gas over the rule")
+        print_line(markdown_table(headers, angle_rows(width)))
 
 
 if __name__ == "__main__":

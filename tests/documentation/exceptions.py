@@ -137,6 +137,7 @@ SMALLER: Final[dict[str, str]] = {
     # docs/engineers/screening.md
     "blast-env screen site.toml --glazing window_laminated_6 --wall brick_215 --mass backpack --gas"
     " --cells coarse": "--cells uniform --cell 1",
+    "python -m studies.response angles": "--width 12",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites": "clinic_front",
