@@ -325,12 +325,12 @@ def angle_rows(width_m: float) -> Iterator[Row]:
             strict=True,
         )
     )
-    charge_m = np.array(site.charge[0].segment_m[0])
+    found = screen(site).threats[0]
     count = round(width_m / BAY_M)
-    lowest = screen(site).threats[0].bays[:count]
+    lowest = found.bays[:count]
     for each in lowest[count // 2 :: 2]:
         bay = each.filled.bay
-        aside_m = 0.5 * (bay.left_m + bay.right_m) - charge_m[1]
+        aside_m = 0.5 * (bay.left_m + bay.right_m) - found.charge.position_m[1]
         own = gas_pa_s[bay.name]
         yield (
             f"{degrees(atan2(aside_m, 20.0)):.0f} degrees",
