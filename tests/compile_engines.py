@@ -11,12 +11,16 @@ import numpy as np
 from blast_env import load_scenario, simulate
 from blast_env.design.surrogate.relations import relations
 from blast_env.design.surrogate.ways import Ways
+from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.gas.faces import ground_faces
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
 from blast_env.gas.solver import GasSolver, Settling
 from blast_env.gas.source import GasCharge, set_charge
+from blast_env.layout.build_scene import draw_charge
 from blast_env.site import Scenario
+from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document
 
 
@@ -56,12 +60,19 @@ def driving() -> None:
         assert vehicle.vehicle_ground(source).drive().speeds is not None
 
 
+def response() -> None:
+    """Of facades and pieces, after a blast on cells that are merged."""
+    site = glazed_hut()
+    consequences(site, WALL, [draw_charge(site, 0)], GasEngine(cells="coarse"))
+
+
 def main() -> None:
     event_engine()
     gas_engine("single")
     gas_engine("double")
     surrogate()
     driving()
+    response()
 
 
 if __name__ == "__main__":

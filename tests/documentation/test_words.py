@@ -1,9 +1,7 @@
 """Plain English: how often "what" stands in pages, docstrings and comments, and rare phrases."""
 
 import ast
-import io
 import re
-import tokenize
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -46,11 +44,9 @@ def docstrings(source: str) -> Iterator[str]:
             yield text
 
 
-def comments(source: str) -> Iterator[str]:
-    """Yield the comments of a module."""
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type == tokenize.COMMENT:
-            yield token.string
+def comments(source: str) -> list[str]:
+    """Return the comments of a module, as they are formatted."""
+    return re.findall(r"^\s*# .*|  # .*", source, re.MULTILINE)
 
 
 @cache
