@@ -101,16 +101,16 @@ def test_generated_sites(family: str) -> None:
         check(generate_site(seed, FAMILIES[family]))
 
 
-def test_sites_of_fifty_shapes() -> None:
+def test_sites_of_many_shapes() -> None:
     """Also those where columns are fewest, of which stable-baselines3 does not even warn."""
     rng = np.random.default_rng(0)
     sizes = {tuple(rng.integers(24, 70, size=2).tolist()) for _ in range(60)}
     shapes = set()
-    for rows, columns in islice(sorted(sizes), 50):
+    for rows, columns in islice(sorted(sizes), 20):
         scenario = shaped_yard(columns / 2.0, rows / 2.0)
         shapes.add(GridObservation().space(scenario).shape)
         check(scenario)
-    assert len(shapes) == 50
+    assert len(shapes) == 20
 
 
 def test_a_policy_refuses_turned_planes() -> None:

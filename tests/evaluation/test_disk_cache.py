@@ -133,7 +133,7 @@ def _fill(folder: Path, first: int, wrong: "multiprocessing.Queue[int]") -> None
     count = 0
     for most_bytes in (256_000_000, 6_000):
         cache = DiskCache(folder / str(most_bytes), most_bytes)
-        for seed in (*range(first, 40), *range(first)) * 2:
+        for seed in (*range(first, 40), *range(first)):
             cache.add(key(seed), loads(seed))
             for asked in (seed, (seed + 20) % 40):
                 found = cache.get(key(asked))

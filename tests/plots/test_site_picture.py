@@ -79,7 +79,7 @@ def apart(draw: st.DrawFn) -> list[Rectangle]:
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(apart(), st.sampled_from(CORNERS))
 def test_nothing_is_painted_over_what_stands_before_it(
     rectangles: list[Rectangle], corner: str

@@ -1,7 +1,6 @@
 """Sites from seeds: valid, of one size, varied, the same everywhere, worth solving."""
 
 import json
-import multiprocessing
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -73,16 +72,6 @@ def test_a_saved_site_loads_as_the_same_site(seed: int, tmp_path: Path) -> None:
     loaded = load_scenario(tmp_path / "site.toml")  # makes all checks of a scenario file
     assert loaded == site
     assert loaded.content_hash == site.content_hash
-
-
-def _hashes(seeds: range) -> list[str]:
-    return [generate_site(seed).content_hash for seed in seeds]
-
-
-def test_a_spawned_process_generates_the_same_sites(sites: tuple[Scenario, ...]) -> None:
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        hashes = pool.apply(_hashes, (range(10),))
-    assert hashes == [site.content_hash for site in sites[:10]]
 
 
 def test_the_first_sites_are_what_they_were(sites: tuple[Scenario, ...]) -> None:
