@@ -19,6 +19,7 @@ from blast_env.cli import app
 from blast_env.cli.command import LazyCommand
 from blast_env.cli.output import ResultTable
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
+from blast_env.gas.engine import GasRun
 from blast_env.layout import LayoutFile
 from blast_env.particles.event.engine import EventRun
 from blast_env.particles.pymunk.engine import PymunkRun
@@ -274,7 +275,8 @@ def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(EventRun, "advance", interrupt)
+    for run in (EventRun, GasRun):
+        monkeypatch.setattr(run, "advance", interrupt)
 
 
 SEARCH = ("search", "--engine", "event")
