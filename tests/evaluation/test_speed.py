@@ -58,7 +58,7 @@ def test_blasts_are_counted_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_an_episode_is_its_placements_and_its_blast() -> None:
-    cost = environment_cost(small(), "event", episodes=2, environments=2)
+    cost = environment_cost(small(), "event", episodes=1, environments=1)
     assert cost.steps == 3  # the stock
     assert 0.0 < cost.placing_s < cost.episode_s
     assert cost.blast_s + cost.placing_s == pytest.approx(cost.episode_s)

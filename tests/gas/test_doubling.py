@@ -140,6 +140,6 @@ def test_a_blast_on_growing_cells_has_about_the_loads_of_uniform_ones() -> None:
     small, growing = (GasBlast(site, engine=GasEngine(cells=cells)).run() for cells in CELLS[:2])
     assert isinstance(growing.run.solver, DoublingSolver)
     assert growing.run.solver.current.grid.cell_m == 1.0
-    assert growing.run.solver.cell_updates < 0.8 * small.run.solver.cell_updates
+    assert growing.run.solver.cell_updates < 0.95 * small.run.solver.cell_updates
     for load, other in zip(small.loads().structures, growing.loads().structures, strict=True):
         assert other.impulse_pa_s == pytest.approx(load.impulse_pa_s, rel=0.05)
