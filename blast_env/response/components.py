@@ -10,15 +10,30 @@ from functools import cache
 from importlib.resources import files
 from typing import Annotated, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat, TypeAdapter, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictFloat,
+    TypeAdapter,
+    ValidationError,
+)
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.response.glass import GlassKind, Interlayer, Pane
 from blast_env.response.walls import Masonry, Panel, ReinforcedConcrete, Sheeting, Supports
+from blast_env.values import plain_text
 
 _MM: Final = 1e-3
-_Positive = Annotated[StrictFloat, Field(gt=0.0, le=100.0)]
-_Text = Annotated[str, Field(min_length=1, max_length=300)]
+_Size = Annotated[StrictFloat, Field(ge=0.05, le=20.0)]
+_Text = Annotated[str, Field(min_length=1, max_length=300), AfterValidator(plain_text)]
+
+
+def _none_or_pane(thickness_mm: float) -> float:
+    if thickness_mm != 0.0 and not thickness_mm >= 1.0:
+        raise ValueError("must be 0 or at least 1")
+    return thickness_mm
 
 
 class _Component(BaseModel):
@@ -35,7 +50,7 @@ class _Component(BaseModel):
 
     title: _Text
     source: _Text
-    cost_m2: Annotated[StrictFloat, Field(ge=0.0)] | None = None
+    cost_m2: Annotated[StrictFloat, Field(ge=0.0, le=1e9)] | None = None
 
 
 class Glazing(_Component):
@@ -53,12 +68,12 @@ class Glazing(_Component):
     """
 
     kind: Literal["glazing"] = "glazing"
-    width_m: _Positive
-    height_m: _Positive
-    thickness_mm: _Positive
+    width_m: _Size
+    height_m: _Size
+    thickness_mm: Annotated[StrictFloat, Field(ge=1.0, le=100.0)]
     glass: GlassKind = GlassKind.ANNEALED
     interlayer: Interlayer | None = None
-    outer_thickness_mm: Annotated[StrictFloat, Field(ge=0.0, le=100.0)] = 0.0
+    outer_thickness_mm: Annotated[StrictFloat, Field(le=100.0), AfterValidator(_none_or_pane)] = 0.0
     sill_m: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.9
 
     @property
@@ -87,7 +102,7 @@ class Wall(_Component):
     kind: Literal["wall"] = "wall"
     section: Annotated[ReinforcedConcrete | Masonry | Sheeting, Field(discriminator="kind")]
     supports: Supports = Supports.SIMPLE
-    span_m: _Positive | None = None
+    span_m: Annotated[StrictFloat, Field(ge=0.1, le=50.0)] | None = None
 
     def panel(self, storey_m: float) -> Panel:
         """Return its panel in a storey of a given height."""

@@ -111,6 +111,28 @@ def floors_m(rise_m: float, storey_m: float = STOREY_M, storeys: int | None = No
     return [0.0] + [ground_m + storey_m * number for number in range(count - 1)]
 
 
+def bays_in(
+    ground_m: Rectangle,
+    rise_m: float,
+    walls: Sequence[str],
+    storey_m: float,
+    bay_m: float,
+    lines: Sequence[WallLine] = (),
+    storeys: int | None = None,
+) -> int:
+    """Return the number of bays that `divide` makes, from the rise between base and top."""
+    along = (
+        _bays_along(high - low, bay_m)
+        for wall in walls
+        for *_, low, high in _stretches(ground_m, wall, lines)
+    )
+    return len(floors_m(rise_m, storey_m, storeys)) * sum(along)
+
+
+def _bays_along(length_m: float, bay_m: float) -> int:
+    return max(1, round(length_m / bay_m))
+
+
 def divide(
     structure: str,
     ground_m: Rectangle,
@@ -150,7 +172,7 @@ def divide(
     for wall in walls:
         before = 0
         for line_number, line, low, high in _stretches(ground_m, wall, lines):
-            count = max(1, round((high - low) / bay_m))
+            count = _bays_along(high - low, bay_m)
             ends = np.linspace(low, high, count + 1).tolist()
             bays += [
                 Bay(

@@ -128,9 +128,9 @@ class Interlayer(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     material: Literal["pvb", "film"] = "pvb"
-    thickness_mm: Annotated[StrictFloat, Field(gt=0.0, le=20.0)] = LEAST_INTERLAYER_MM
-    tension_n_m: Annotated[StrictFloat, Field(gt=0.0)] = 16_000.0
-    tear_share: Annotated[StrictFloat, Field(gt=0.0, le=1.0)] = 0.15
+    thickness_mm: Annotated[StrictFloat, Field(ge=0.1, le=20.0)] = LEAST_INTERLAYER_MM
+    tension_n_m: Annotated[StrictFloat, Field(ge=1.0, le=1e9)] = 16_000.0
+    tear_share: Annotated[StrictFloat, Field(ge=0.001, le=1.0)] = 0.15
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from functools import cached_property
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictFloat, model_validator
 
 from blast_env.arrays import FloatArray
 from blast_env.response.sdof import Resistance, Responses, System, drawn_responses, responses
@@ -147,15 +147,26 @@ class ReinforcedConcrete(_Section):
     """
 
     kind: Literal["reinforced_concrete"] = "reinforced_concrete"
-    thickness_m: Annotated[StrictFloat, Field(gt=0.0, le=3.0)]
-    steel_share: Annotated[StrictFloat, Field(gt=0.0, le=0.04)] = 0.003
-    cover_m: Annotated[StrictFloat, Field(gt=0.0)] = 0.035
-    concrete_pa: Annotated[StrictFloat, Field(gt=0.0)] = 30e6
-    steel_pa: Annotated[StrictFloat, Field(gt=0.0)] = 500e6
-    steel_ultimate_pa: Annotated[StrictFloat, Field(gt=0.0)] | None = None
+    thickness_m: Annotated[StrictFloat, Field(ge=0.01, le=3.0)]
+    steel_share: Annotated[StrictFloat, Field(ge=1e-5, le=0.04)] = 0.003
+    cover_m: Annotated[StrictFloat, Field(ge=0.001, le=1.0)] = 0.035
+    concrete_pa: Annotated[StrictFloat, Field(ge=1e6, le=300e6)] = 30e6
+    steel_pa: Annotated[StrictFloat, Field(ge=50e6, le=3e9)] = 500e6
+    steel_ultimate_pa: Annotated[StrictFloat, Field(ge=50e6, le=5e9)] | None = None
     dynamic_increase: Annotated[StrictFloat, Field(ge=1.0, le=2.0)] = 1.17
     ultimate_increase: Annotated[StrictFloat, Field(ge=1.0, le=2.0)] = 1.05
     tension_membrane: StrictBool = False
+
+    @model_validator(mode="after")
+    def _check_steel(self) -> Self:
+        """Refuse more steel than the concrete can balance: the block would exceed the section."""
+        most = 0.85 * self.concrete_pa / self.steel_pa
+        if self.steel_share > most:
+            raise ValueError(
+                f"steel_share is {self.steel_share:g}, must be at most {most:.3g}: 0.85 concrete_pa"
+                " over steel_pa"
+            )
+        return self
 
     @property
     def mass_kg_m2(self) -> float:
@@ -224,10 +235,10 @@ class Masonry(_Section):
     """
 
     kind: Literal["masonry"] = "masonry"
-    thickness_m: Annotated[StrictFloat, Field(gt=0.0, le=2.0)]
-    density_kg_m3: Annotated[StrictFloat, Field(gt=0.0)] = 1900.0
-    flexural_pa: Annotated[StrictFloat, Field(gt=0.0)] = 0.7e6
-    young_pa: Annotated[StrictFloat, Field(gt=0.0)] = 6e9
+    thickness_m: Annotated[StrictFloat, Field(ge=0.01, le=2.0)]
+    density_kg_m3: Annotated[StrictFloat, Field(ge=100.0, le=10_000.0)] = 1900.0
+    flexural_pa: Annotated[StrictFloat, Field(ge=1e3, le=100e6)] = 0.7e6
+    young_pa: Annotated[StrictFloat, Field(ge=1e7, le=1e12)] = 6e9
 
     @property
     def mass_kg_m2(self) -> float:
@@ -261,9 +272,9 @@ class Sheeting(_Section):
     """
 
     kind: Literal["sheeting"] = "sheeting"
-    moment_n: Annotated[StrictFloat, Field(gt=0.0)]
-    bending_stiffness_n_m: Annotated[StrictFloat, Field(gt=0.0)]
-    mass_kg_m2: Annotated[StrictFloat, Field(gt=0.0)]
+    moment_n: Annotated[StrictFloat, Field(ge=1.0, le=1e9)]
+    bending_stiffness_n_m: Annotated[StrictFloat, Field(ge=1.0, le=1e12)]
+    mass_kg_m2: Annotated[StrictFloat, Field(ge=0.1, le=1e5)]
     material: Literal["steel", "timber", "reinforced_masonry"]
 
     @property

@@ -34,9 +34,9 @@ from blast_env.site.scene import WALLS
 from blast_env.site.sections import FOR_PEOPLE, Count, Height, Name, Section, Storeys, Walls
 from blast_env.units import MODULE_SIDE_M
 
-Cost = Annotated[StrictFloat, Field(gt=0.0, le=1e9)]
-Mass = Annotated[StrictFloat, Field(gt=0.0, le=1e6)]
-BaseWidth = Annotated[StrictFloat, Field(gt=0.0, le=20.0)]
+Cost = Annotated[StrictFloat, Field(ge=1e-6, le=1e9)]
+Mass = Annotated[StrictFloat, Field(ge=0.1, le=1e6)]
+BaseWidth = Annotated[StrictFloat, Field(ge=0.01, le=20.0)]
 Friction = Annotated[StrictFloat, Field(ge=0.0, le=2.0)]
 Anchorage = Annotated[StrictFloat, Field(ge=0.0, le=1e9)]
 _FILE: Final = "barriers.toml"

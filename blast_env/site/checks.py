@@ -15,7 +15,8 @@ from blast_env.geometry import Rectangle, stacked_runs
 from blast_env.response.components import Component, Glazing, Wall
 from blast_env.site.balls import lattice_capacity
 from blast_env.site.boxes import TOLERANCE_M
-from blast_env.site.facade import facade_problems, hardening_problems
+from blast_env.site.driving import places_shape
+from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
 from blast_env.site.heights import (
     air_height_m,
     depth_inside_m,
@@ -49,13 +50,16 @@ from blast_env.site.zone import (
     empty_zone,
     source_bounds_m,
 )
-from blast_env.site.zone_checks import build_zone_problems
+from blast_env.site.zone_checks import build_zone_problems, place_count_problems
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
 Checked = TypeVar("Checked")
 
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""
+
+MOST_SPEED_PLACES: Final = 400_000
+"""Most places of the speeds of all vehicles: a site of 300 m x 300 m takes 2 s a search."""
 
 _MOST_ITEMS: Final = 100
 """Most items of an array that are examined; longer arrays are errors anyway."""
@@ -134,8 +138,12 @@ def sound_parts(document: Mapping[str, Any]) -> Parts:
 
 
 def check_parts(parts: Parts) -> tuple[Problem, ...]:
-    """Return all problems between the sections."""
-    return (
+    """Return all problems between the sections.
+
+    Whatever takes memory or time is counted first; too much of it is the only problem then.
+    """
+    counted = tuple(_count_problems(parts))
+    return counted or (
         *_name_problems(parts),
         *_structure_problems(parts),
         *_charge_problems(parts),
@@ -148,6 +156,37 @@ def check_parts(parts: Parts) -> tuple[Problem, ...]:
         *terrace_problems(parts.structures),
         *_objective_problems(parts),
     )
+
+
+def _count_problems(parts: Parts) -> Iterator[Problem]:
+    """Yield the problems of products of counts: bays, places of pieces, places of vehicles."""
+    yield from bay_count_problems(parts.structures)
+    if parts.build_zone is not None:
+        yield from place_count_problems(parts.build_zone)
+    yield from _vehicle_count_problems(parts)
+
+
+def _vehicle_count_problems(parts: Parts) -> Iterator[Problem]:
+    """Yield the problems of too many places of vehicles, with and without a motion."""
+    vehicles = [each for each in parts.sources.values() if isinstance(each, VehicleSource)]
+    if parts.site is None:
+        return
+    places = len(vehicles) * places_on(parts.site)
+    if places > MOST_PLACES:
+        yield Problem(
+            "charge",
+            f"has {len(vehicles)} vehicles, whose charges may go off at {places:,} places of the"
+            f" site, must have at most {MOST_PLACES:,}",
+        )
+    moved = sum(each.motion is not None for each in vehicles)
+    rows, columns = places_shape(parts.site.width_m, parts.site.height_m)
+    if moved * rows * columns > MOST_SPEED_PLACES:
+        yield Problem(
+            "charge",
+            f"has {moved} vehicle{'s' * (moved > 1)} with a motion, whose speed is needed at"
+            f" {moved * rows * columns:,} places of the site, must have at most"
+            f" {MOST_SPEED_PLACES:,}: make the site smaller, or leave the motion out",
+        )
 
 
 def _facade_problems(parts: Parts) -> Iterator[Problem]:
@@ -205,7 +244,8 @@ def check_sources(parts: Parts) -> tuple[Problem, ...]:
 
     They are the result of `check_parts` if the other sections are consistent.
     """
-    return (*_charge_problems(parts), *_build_zone_problems(parts))
+    counted = tuple(_vehicle_count_problems(parts))
+    return counted or (*_charge_problems(parts), *_build_zone_problems(parts))
 
 
 def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
@@ -287,18 +327,9 @@ def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
 
 def _charge_problems(parts: Parts) -> Iterator[Problem]:
     """Check that every place of the charge is clear of structures and border."""
-    vehicles = sum(isinstance(source, VehicleSource) for source in parts.sources.values())
-    places = 0 if parts.site is None else vehicles * places_on(parts.site)
-    if places > MOST_PLACES:
-        yield Problem(
-            "charge",
-            f"has {vehicles} vehicles, whose charges may go off at {places:,} places of the site,"
-            f" must have at most {MOST_PLACES:,}",
-        )
     for index, source in parts.sources.items():
         if isinstance(source, VehicleSource):
-            if places <= MOST_PLACES:
-                yield from _vehicle_problems(parts, f"charge[{index}]", source)
+            yield from _vehicle_problems(parts, f"charge[{index}]", source)
         else:
             yield from _place_problems(parts, f"charge[{index}]", source)
         yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)

@@ -25,7 +25,7 @@ from typing import Final
 from blast_env.errors import BlastEnvError
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
-from blast_env.response.facade import Bay, FilledBay, divide
+from blast_env.response.facade import Bay, FilledBay, bays_in, divide
 from blast_env.site.catalogue import Hardening
 from blast_env.site.problems import Problem, unknown_name
 from blast_env.site.sections import AnyStructure, FacadeSection
@@ -99,6 +99,29 @@ def with_glass(window: Glazing, glass: Glazing) -> Glazing:
     return glass.model_copy(update=kept)
 
 
+def bay_count_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem]:
+    """Yield a problem if the facades have too many bays, which are counted but not made."""
+    bays = sum(_bay_count(each) for each in structures.values())
+    if bays > MOST_BAYS:
+        yield Problem("structures", f"have {bays:,} bays in all, must be at most {MOST_BAYS:,}")
+
+
+def _bay_count(structure: AnyStructure) -> int:
+    facade = structure.facade
+    rise_m = (structure.height_m or 0.0) - structure.base_m
+    if facade is None or rise_m <= 0.0:
+        return 0
+    return bays_in(
+        structure.rectangle_m,
+        rise_m,
+        structure.faces,
+        facade.storey_m,
+        facade.bay_m,
+        () if structure.footprint is None else structure.footprint.walls,
+        facade.storeys,
+    )
+
+
 def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
     """Return the bays of a structure with the names of their components; none without a facade.
 
@@ -132,14 +155,13 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
 
 
 def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> Iterator[Problem]:
-    """Yield the problems of the facades of a scenario.
+    """Yield the problems of the facades of a scenario without `bay_count_problems`.
 
     Args:
         structures: The valid structures, by index.
         own: The components that the scenario defines.
     """
     known = {**catalogue(), **own}
-    bays = 0
     for index, structure in structures.items():
         facade = structure.facade
         if facade is None:
@@ -153,11 +175,10 @@ def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> 
         if problems:
             continue
         try:
-            bays += len([bay.filled(known) for bay in named_bays(structure)])
+            for bay in named_bays(structure):
+                bay.filled(known)
         except BlastEnvError as error:
             yield Problem(where, str(error))
-    if bays > MOST_BAYS:
-        yield Problem("structures", f"have {bays:,} bays in all, must be at most {MOST_BAYS:,}")
 
 
 def hardening_problems(

@@ -19,7 +19,7 @@ from blast_env.statistics import (
 )
 from blast_env.units import PA_PER_PSI
 
-Reference = Annotated[StrictFloat, Field(gt=0.0, le=1e12)]
+Reference = Annotated[StrictFloat, Field(ge=1e-3, le=1e12)]
 Probability = Annotated[StrictFloat, Field(gt=0.0, lt=1.0)]
 Level = Annotated[StrictFloat, Field(ge=0.0, lt=1.0)]
 _UNITS: Final = {"impulse": "Pa s", "peak": "Pa", "both": ""}

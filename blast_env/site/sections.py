@@ -39,13 +39,13 @@ from blast_env.site.problems import (
 )
 from blast_env.site.scene import WALLS, Charge, WallName
 from blast_env.units import MODULE_SIDE_M
-from blast_env.values import STEERING
+from blast_env.values import plain_text
 
 if TYPE_CHECKING:  # shapely takes a tenth of a second to import
     from blast_env.site.footprint import Footprint
 
 Coordinate = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
-Length = Annotated[StrictFloat, Field(gt=0.0, le=2000.0)]
+Length = Annotated[StrictFloat, Field(ge=1e-3, le=2000.0)]
 PointM = tuple[Coordinate, Coordinate]
 SizeM = tuple[Length, Length]
 
@@ -64,15 +64,7 @@ Speed = Annotated[StrictFloat, Field(ge=1.0, le=300.0)]
 """Speed of a vehicle, km/h."""
 
 
-def _check_text(text: str) -> str:
-    """Refuse characters that control a terminal or page; tabs and line feeds are allowed."""
-    wrong = STEERING.search(text)
-    if wrong is not None:
-        raise ValueError(f"must not have the character {wrong[0]!r}")
-    return text
-
-
-FOR_PEOPLE: Final = AfterValidator(_check_text)
+FOR_PEOPLE: Final = AfterValidator(plain_text)
 """Annotation of texts for readers."""
 
 Reason = Annotated[str, Field(min_length=1, max_length=200), FOR_PEOPLE]
@@ -128,7 +120,7 @@ class ChargeSource(Section):
 
     threat: Name | None = None
     tnt_kg: Annotated[StrictFloat, Field(ge=0.01, le=100_000.0)]
-    weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
+    weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
     height_m: Coordinate = 0.0
 
     @model_validator(mode="before")
@@ -481,8 +473,8 @@ class StructureSection(Section):
 
     name: Name
     protected: StrictBool = False
-    weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
-    peak_weight: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] | None = None
+    weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] = 1.0
+    peak_weight: Annotated[StrictFloat, Field(ge=1e-6, le=1e6)] | None = None
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None
     height_m: Height | None = None
     base_m: Coordinate = 0.0
@@ -773,7 +765,7 @@ class DrawingGeoreference(Georeference):
     kind: Literal["drawing"] = "drawing"
     x_m: Annotated[StrictFloat, Field(ge=-1e9, le=1e9)]
     y_m: Annotated[StrictFloat, Field(ge=-1e9, le=1e9)]
-    metres_per_unit: Annotated[StrictFloat, Field(gt=0.0, le=1e6)] = 1.0
+    metres_per_unit: Annotated[StrictFloat, Field(ge=1e-12, le=1e6)] = 1.0
 
 
 AnyGeoreference = Annotated[MapGeoreference | DrawingGeoreference, Field(discriminator="kind")]

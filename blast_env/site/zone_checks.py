@@ -23,16 +23,32 @@ MOST_PLACES: Final = 10_000_000
 """Most places: cells times variants, each of which takes some ten bytes."""
 
 
-def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
-    """Yield the problems of a build zone, its areas and its surroundings."""
-    zone = surroundings.zone
-    yield from _area_problems(zone)
-    yield from _key_problems(zone)
-    places = zone.rows * zone.columns * len(zone.catalogue.variants)
+MOST_COVERED: Final = 1_000_000_000
+"""Most cells under all pieces at all their places: each takes a nanosecond, several times."""
+
+
+def place_count_problems(zone: BuildZone) -> Iterator[Problem]:
+    """Yield the problems of a zone with too many places, which are counted but not made."""
+    variants = zone.catalogue.variants
+    places = zone.rows * zone.columns * len(variants)
     if places > MOST_PLACES:
         message = f"make {places:,} places of pieces in the zone, must make at most {MOST_PLACES:,}"
         yield Problem("build_zone.items", message)
-        return
+    covered = sum(
+        each.rows * each.columns * max(zone.rows - each.rows + 1, 0) * right
+        for each in variants
+        if (right := zone.columns - each.columns + 1) > 0
+    )
+    if covered > MOST_COVERED:
+        message = f"cover {covered:,} cells at all their places together, must cover at most"
+        yield Problem("build_zone.items", f"{message} {MOST_COVERED:,}")
+
+
+def build_zone_problems(surroundings: Surroundings) -> Iterator[Problem]:
+    """Yield the problems of a build zone without `place_count_problems`."""
+    zone = surroundings.zone
+    yield from _area_problems(zone)
+    yield from _key_problems(zone)
     cells = empty_zone(surroundings)
     if zone.items:
         yield from _item_problems(zone, cells)

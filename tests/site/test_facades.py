@@ -75,8 +75,11 @@ def test_a_facade_needs_a_height() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"thickness_mm": -6.0}, "thickness_mm: is -6.0, must be greater than 0"),
-        ({"interlayer": {"tension_n_m": -1.0}}, "interlayer.tension_n_m: is -1.0, must be greater"),
+        ({"thickness_mm": -6.0}, "thickness_mm: is -6.0, must be at least 1"),
+        (
+            {"interlayer": {"tension_n_m": -1.0}},
+            "interlayer.tension_n_m: is -1.0, must be at least",
+        ),
         ({"interlayer": {"tear_shere": 0.1}}, "interlayer.tear_shere: unknown key"),
         ({"kind": "door"}, "kind: is 'door', must be 'glazing' or 'wall'"),
     ],

@@ -21,7 +21,7 @@ def only_line(*structures: Document, **zone: Any) -> str:
     ("zone", "line"),
     [
         ({"clearance_m": -0.5}, "clearance_m: is -0.5, must be at least 0"),
-        ({"module_cost": 0.0}, "module_cost: is 0.0, must be greater than 0"),
+        ({"module_cost": 0.0}, "module_cost: is 0.0, must be at least 1e-06"),
         ({"budget": 0}, "budget: is 0, must be greater than 0"),
         (
             {"cost_areas": [area(0.0, 0.0, 1.0, 1.0, reason="duct")]},
