@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 from blast_env.benchmark import (
     BUDGETS,
@@ -20,7 +21,7 @@ from blast_env.design.search import (
     layouts_by_rule,
 )
 from blast_env.design.search.registry import proposer_row
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout
@@ -59,16 +60,31 @@ def find_method(name: str) -> Method:
         return partial(_by_rule if is_rule else _proposed, find_proposer(name))
     try:
         found = load_plugin(name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise BlastEnvError(f"method is {name!r}: {error}") from error
-    if isinstance(found, type):
-        found = found()
+        if isinstance(found, type):
+            found = found()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise BlastEnvError(f"method is {value_text(name)}: {error}") from error
     if hasattr(found, "propose"):
         return method_of(found)
     if not callable(found):
-        raise BlastEnvError(f"method is {name!r}, must be something to call")
-    method: Callable[[BenchmarkProblem, int], Layout] = found
-    return method
+        raise BlastEnvError(f"method is {value_text(name)}, must be something to call")
+    return partial(_called, found, name)
+
+
+def _called(method: Callable[[Any, int], Any], name: str, problem: Any, seed: int) -> Layout:
+    """Call a method; refuse one that does not take a problem and a seed, or returns no layout."""
+    try:
+        layout: Any = method(problem, seed)
+    except TypeError as error:
+        within = error.__traceback__ and error.__traceback__.tb_next
+        if within is not None:  # a fault of the method itself
+            raise
+        message = f"method is {value_text(name)}, must take a problem and a seed: {error}"
+        raise BlastEnvError(message) from error
+    if not isinstance(layout, Sequence):
+        what = type(layout).__name__
+        raise BlastEnvError(f"method is {value_text(name)}, must return a layout, not: {what}")
+    return tuple(layout)
 
 
 def budgets_of(name: str, asked: Sequence[int]) -> tuple[int, ...]:

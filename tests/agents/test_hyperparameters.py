@@ -138,7 +138,7 @@ def test_options_are_read_as_json_or_text_and_reach_the_policy() -> None:
         ("learning_rate=0", "above 0"),
         ("batch_size=100", "must divide n_steps * n_envs = 512"),
         ("policy=MlpPolcy", "CnnPolicy"),
-        ('env_wrapper=["os.system"]', "ThreatPool"),
+        ('env_wrapper=[{"os.system": {"size": 1}}]', "ThreatPool"),
     ],
 )
 def test_a_wrong_option_is_refused_with_the_reason(option: str, words: str) -> None:

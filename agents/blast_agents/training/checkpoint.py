@@ -22,7 +22,7 @@ from blast_agents.training.run_folder import (
     write_rows,
 )
 from blast_env.documents import described
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import BlastEnvError, shortened, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 
@@ -238,10 +238,41 @@ class Checkpoint(BaseModel):
         if self.is_start:
             return
         try:
+            _check_optimizer(policy.optimizer, self.optimizer)
             policy.optimizer.load_state_dict(self.optimizer)
         # torch reports a mismatch by exceptions of many types.
         except Exception as error:
-            raise BlastEnvError(f"{place}: the optimiser's state does not fit: {error}") from error
+            reason = shortened(str(error), 300)
+            raise BlastEnvError(f"{place}: the optimiser's state does not fit: {reason}") from error
+
+
+def _check_optimizer(optimizer: torch.optim.Optimizer, given: Mapping[str, Any]) -> None:
+    """Refuse settings and tensors of another optimiser, which torch loads and fails with later.
+
+    Raises:
+        Exception: If anything does not fit, of many types.
+    """
+    own, rates = optimizer.state_dict(), ("lr", "initial_lr")
+    for group, known in zip(given["param_groups"], own["param_groups"], strict=True):
+        for key in {*group, *known} - {*rates}:
+            same = type(group[key]) is type(known[key]) and group[key] == known[key]
+            if not same:
+                raise ValueError(f"{key} differs")
+        if not (isinstance(group["lr"], float | int) and 0.0 <= group["lr"] <= 1.0):
+            raise ValueError("lr must be a number from 0 to 1")
+    parameters = [each for group in optimizer.param_groups for each in group["params"]]
+    for number, tensors in given["state"].items():
+        shape = dict(enumerate(parameters))[number].shape
+        if tensors.keys() != {"step", "exp_avg", "exp_avg_sq"}:
+            raise ValueError(f"parameter {number} has other values than those of Adam")
+        for name, tensor in tensors.items():
+            what = f"{name} of parameter {number}"
+            if not (isinstance(tensor, torch.Tensor) and tensor.dtype is torch.float32):
+                raise ValueError(f"{what} is no tensor of numbers")
+            if tensor.shape != (() if name == "step" else shape):
+                raise ValueError(f"{what} has the shape {tuple(tensor.shape)}")
+            if not torch.isfinite(tensor).all() or (name != "exp_avg" and (tensor < 0.0).any()):
+                raise ValueError(f"{what} is negative, or not finite")
 
 
 def load_weights(policy: nn.Module, values: Weights, place: Path) -> None:

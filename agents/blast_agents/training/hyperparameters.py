@@ -5,7 +5,7 @@ from functools import partial
 from operator import mul
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, NotRequired
 
 import yaml
 from pydantic import (
@@ -18,10 +18,12 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
+from typing_extensions import TypedDict
 
 from blast_env.documents import DocumentError, described, parse_json
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, UnknownNameError, shortened
+from blast_env.values import MOST_SEED
 
 
 def parse_options(options: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
@@ -133,6 +135,15 @@ WrapperName = Literal["blast_agents.training.environments.ThreatPool"]
 Share = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
 
 
+class PoolArguments(TypedDict):
+    """Arguments of the wrapper; see `ThreatPool`."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
+
+    size: Annotated[StrictInt, Field(ge=1, le=100_000)]
+    seed: NotRequired[Annotated[StrictInt, Field(ge=0, le=MOST_SEED)]]
+
+
 class PolicyArguments(BaseModel):
     """Arguments of the spatial policies; the policies of stable-baselines3 take none.
 
@@ -190,8 +201,7 @@ class Hyperparameters(CommonHyperparameters):
     A step is a step of an environment: a module or piece.
 
     Attributes:
-        env_wrapper: Wrappers of the environment, the innermost first: names, or names with
-            arguments.
+        env_wrapper: Wrappers of the environment, the innermost first: names with arguments.
         n_steps: Steps of each environment between two updates.
         n_epochs: Passes over the steps in an update.
         gamma: Discount; 1 for none.
@@ -202,7 +212,7 @@ class Hyperparameters(CommonHyperparameters):
         target_kl: Divergence of the policy that ends an update; `None` for no limit.
     """
 
-    env_wrapper: tuple[WrapperName | dict[WrapperName, dict[str, Any]], ...] = ()
+    env_wrapper: Annotated[tuple[dict[WrapperName, PoolArguments], ...], Field(max_length=4)] = ()
     n_steps: Annotated[StrictInt, Field(ge=2, le=100_000)]
     n_epochs: Annotated[StrictInt, Field(ge=1, le=100)]
     gamma: Share = 1.0
@@ -229,13 +239,9 @@ class Hyperparameters(CommonHyperparameters):
 
     def wrappers(self) -> tuple[tuple[str, dict[str, Any]], ...]:
         """Return name and arguments of each wrapper, the innermost first."""
-        wrappers: list[tuple[str, dict[str, Any]]] = []
-        for each in self.env_wrapper:
-            if isinstance(each, str):
-                wrappers.append((each, {}))
-            else:
-                wrappers += [(name, dict(arguments)) for name, arguments in each.items()]
-        return tuple(wrappers)
+        return tuple(
+            (name, dict(arguments)) for each in self.env_wrapper for name, arguments in each.items()
+        )
 
 
 Count = Annotated[StrictInt, Field(ge=0, le=10_000)]
