@@ -21,7 +21,7 @@ import joblib
 from joblib.parallel import ParallelBackendBase, SequentialBackend
 
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, value_text
 from blast_env.provenance import code_digest, versions
 
 if TYPE_CHECKING:
@@ -87,7 +87,9 @@ def _connect(address: str) -> "Client":
             pool.submit(asyncio.run, _knock(scheduler)).result()
         return Client(scheduler, timeout=_CONNECT_S, set_as_default=False, name="blast-env")
     except (OSError, ValueError, TypeError) as error:  # no answer; no address
-        raise BlastEnvError(f"cluster {address!r}: no scheduler answers: {error}") from error
+        raise BlastEnvError(
+            f"cluster {value_text(address)}: no scheduler answers: {error}"
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,9 @@ def address_of(scheduler: str) -> str:
     try:
         return checked_as(_SchedulerFile, parse_json(read_text(Path(scheduler)))).address
     except DocumentError as error:
-        raise BlastEnvError(f"cluster {scheduler!r}: is no scheduler file: {error}") from error
+        raise BlastEnvError(
+            f"cluster {value_text(scheduler)}: is no scheduler file: {error}"
+        ) from error
 
 
 async def _knock(address: str) -> None:

@@ -14,6 +14,7 @@ from typing import Any, Final, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from blast_env.errors import BlastEnvError, key_path, shortened, value_text
+from blast_env.files import read_regular
 
 MAX_BYTES: Final = 1_000_000
 """Larger files are refused: their name was probably given by mistake."""
@@ -24,6 +25,9 @@ the depth, or they fail with obscure errors."""
 
 MOST_DEEP_PARTS: Final = 10_000
 """Most third and further parts of all dotted keys together: each may create a table."""
+
+MOST_VALUES: Final = 3_000_000
+"""Most commas and opening brackets of a JSON file: empty tables take some hundred bytes each."""
 
 MAX_DIGITS: Final = 1000
 """Most digits of an integer."""
@@ -71,19 +75,9 @@ def read_text(path: Path, most_bytes: int = MAX_BYTES) -> str:
         DocumentError: If it cannot be read; the message has the reason, not the file's name.
     """
     try:
-        if path.is_dir():
-            raise DocumentError("", "is a folder, must be a file")
-        if not path.exists():
-            raise DocumentError("", "there is no such file")
-        if not path.is_file():
-            raise DocumentError("", "is not a regular file")
-        with path.open("rb") as file:
-            content = file.read(most_bytes + 1)
-            size = path.stat().st_size
-    except OSError as error:
-        raise DocumentError("", f"cannot be read: {error.strerror or error}") from error
-    if len(content) > most_bytes:
-        raise DocumentError("", f"has {size} bytes, must have at most {most_bytes}")
+        content = read_regular(path, most_bytes)
+    except BlastEnvError as error:
+        raise DocumentError("", str(error)) from error
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -166,9 +160,11 @@ def parse_json(text: str) -> Any:
     """Return the content of a JSON file from its text.
 
     Raises:
-        DocumentError: If it is not JSON, is nested too deeply, has a key twice in one object (one
-            of them would be lost), an integer that is too long, or a constant such as NaN.
+        DocumentError: If it is not JSON, has too many values, is nested too deeply, has a key twice
+            in one object (one of them would be lost), an integer that is too long, or a constant
+            such as NaN.
     """
+    check_values(text)
     depth = 0
     for token in _JSON_TOKEN.finditer(text):
         depth = max(depth + (token[1] is not None) - (token[2] is not None), 0)
@@ -185,6 +181,19 @@ def parse_json(text: str) -> Any:
         raise DocumentError(place, f"is not JSON: {error.msg}") from error
     except RecursionError as error:  # brackets that do not match
         raise DocumentError("", "is nested too deeply") from error
+
+
+def check_values(text: str) -> str:
+    """Return the text of a JSON file after a check of the number of its values.
+
+    Raises:
+        DocumentError: If there are more than `MOST_VALUES`.
+    """
+    values = sum(text.count(sign) for sign in ",[{")
+    if values > MOST_VALUES:
+        message = f"has {values:,} commas and opening brackets, must have at most {MOST_VALUES:,}"
+        raise DocumentError("", message)
+    return text
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

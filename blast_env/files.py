@@ -6,11 +6,12 @@ import os
 import re
 import secrets
 import shutil
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
-from stat import S_ISREG
+from stat import S_ISDIR, S_ISREG
 from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple, TypeVar
 
@@ -18,6 +19,42 @@ from blast_env.errors import BlastEnvError
 from blast_env.values import path_of
 
 T = TypeVar("T")
+
+
+def read_regular(path: str | Path, most_bytes: int) -> bytes:
+    """Return the content of a regular file: no pipe, device or folder, whose reading might hang.
+
+    Args:
+        path: The file.
+        most_bytes: Largest size of the file, holes included.
+
+    Raises:
+        BlastEnvError: If it cannot be read, is another kind of file, or is larger; the message has
+            the reason, not the file's name.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        descriptor = os.open(path, flags)
+    except FileNotFoundError as error:
+        raise BlastEnvError("there is no such file") from error
+    except OSError as error:
+        folder = os.path.isdir(path)  # which Windows does not open
+        reason = "is a folder, must be a file" if folder else f"cannot be read: {error.strerror}"
+        raise BlastEnvError(reason) from error
+    try:
+        status = os.fstat(descriptor)
+        if S_ISDIR(status.st_mode):
+            raise BlastEnvError("is a folder, must be a file")
+        if not S_ISREG(status.st_mode):
+            raise BlastEnvError("is not a regular file")
+        if status.st_size > most_bytes:
+            raise BlastEnvError(f"has {status.st_size} bytes, must have at most {most_bytes}")
+        with os.fdopen(descriptor, "rb", closefd=False) as file:
+            return file.read(most_bytes)
+    except OSError as error:
+        raise BlastEnvError(f"cannot be read: {error.strerror or error}") from error
+    finally:
+        os.close(descriptor)
 
 
 def make_folder(folder: str | Path) -> None:
@@ -51,11 +88,14 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
 
     Raises:
         BlastEnvError: If the folder does not exist or cannot be written to, if `target` is
-            itself a folder, or if the block raises `OSError`: the device is full, for example.
+            itself a folder or a device, or if the block raises `OSError`: the device is full, for
+            example.
     """
     path = Path(os.path.realpath(path_of(target)))
     if os.path.isdir(path):
         raise BlastEnvError(f"{target}: is a folder, must be a file")
+    if os.path.exists(path) and not os.path.isfile(path):  # renaming would replace a device
+        raise BlastEnvError(f"{target}: is not a regular file")
     if not os.path.isdir(path.parent):
         raise BlastEnvError(f"{target}: there is no folder {str(path.parent)!r} to write it to")
     # A short name: that of `target` may already have the greatest length.
@@ -130,6 +170,7 @@ def _cannot_write(
 
 
 _CHECKSUM_BYTES: Final = 32
+_MOST_ENTRY_BYTES: Final = 2**28
 _KEPT_SHARE: Final = 0.9  # of the bound, after deleting: not every addition tidies up again
 _UNSEEN_SHARE: Final = 1.0 / 32.0
 
@@ -193,9 +234,8 @@ class FolderStore:
     def get(self, key: str) -> bytes | None:
         """Return the content of a key, or `None` if it is absent or damaged."""
         path = self._path(key)
-        try:
-            stored = path.read_bytes()
-        except OSError:
+        stored = self._stored(path)
+        if stored is None:
             return None
         content = _unpacked(stored, key)
         if content is None:
@@ -227,6 +267,13 @@ class FolderStore:
             BlastEnvError: If it cannot be written.
         """
         path, packed = self._path(key), _packed(content, key)
+        if len(packed) > _MOST_ENTRY_BYTES:
+            raise BlastEnvError(
+                f"{path}: would have {len(packed)} bytes, must have at most {_MOST_ENTRY_BYTES}"
+            )
+        with suppress(OSError):  # whatever is no file there: a link would lead elsewhere
+            if path.is_symlink() or (path.exists() and not path.is_file()):
+                path.unlink()
         with write_atomically(path, self.durable) as temporary:
             temporary.write_bytes(packed)
         if self.most_bytes is None:
@@ -242,14 +289,24 @@ class FolderStore:
     def items(self) -> Iterator[tuple[str, bytes]]:
         """Yield keys and contents in the order of the files' names, without damaged ones."""
         for path in sorted(entry.path for entry in self._finished()):
+            stored = self._stored(Path(path))
             try:
-                stored = Path(path).read_bytes()
-                key = json.loads(stored[_CHECKSUM_BYTES:].partition(b"\n")[0])
-            except (OSError, ValueError):
+                key = json.loads((stored or b"")[_CHECKSUM_BYTES:].partition(b"\n")[0])
+            except ValueError:
                 continue
-            content = _unpacked(stored, key) if isinstance(key, str) else None
+            content = _unpacked(stored or b"", key) if isinstance(key, str) else None
             if content is not None:
                 yield key, content
+
+    def _stored(self, path: Path) -> bytes | None:
+        """Return the content of a file, or `None` if it is absent; warn of any other reason."""
+        try:
+            return read_regular(path, _MOST_ENTRY_BYTES)
+        except BlastEnvError as error:
+            if not isinstance(error.__cause__, FileNotFoundError):
+                message = f"{path}: {error}; counts as absent"
+                warnings.warn(message, RuntimeWarning, stacklevel=3)
+            return None
 
     def discard(self, key: str) -> None:
         """Count the content of a key as damaged, and delete it if permitted."""

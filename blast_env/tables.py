@@ -24,11 +24,13 @@ class Column(NamedTuple):
         unit: Unit; empty for counts, names and pure numbers. "sim" stands for the units of the
             simulation: mass units, and 4 length units per metre.
         meaning: Its meaning, in words.
+        is_text: Whether it holds texts; otherwise numbers or truth values.
     """
 
     name: str
     unit: str
     meaning: str
+    is_text: bool = False
 
 
 def table_of(rows: Sequence[Mapping[str, object]], columns: Sequence[Column]) -> "pd.DataFrame":

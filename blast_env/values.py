@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Sequence
+from html import escape
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final
@@ -15,10 +16,45 @@ MOST_SEED: Final = 2**63 - 1
 """The largest seed: tables and files keep it in 64 bits."""
 
 STEERING: Final = re.compile(
-    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u206f\ud800-\udfff]"
 )
-"""Characters that control a terminal or a page, reverse the direction of a line, or are
+"""Characters that control a terminal or a page, change the direction of a line, or are
 surrogates."""
+
+
+def plain_text(text: str) -> str:
+    """Return a text for readers; tabs and line feeds are allowed.
+
+    Raises:
+        ValueError: If it has a character that controls a terminal or a page.
+    """
+    wrong = STEERING.search(text)
+    if wrong is not None:
+        raise ValueError(f"must not have the character {wrong[0]!r}")
+    return text
+
+
+def printable(text: str) -> str:
+    """Return a text from elsewhere for a terminal: what controls it is escaped."""
+    return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+
+
+def printable_line(text: str) -> str:
+    """Return a text from elsewhere for one line of a terminal: ends of lines are escaped, too."""
+    return printable(text).replace("\t", r"\t").replace("\n", r"\n")
+
+
+_MARKUP: Final = re.compile(r"[\\`\[\]{}$]")
+
+
+def markup_text(text: str) -> str:
+    """Return a text from elsewhere for a line of Markdown or HTML, where nothing of it is markup.
+
+    Emphasis, which does no harm, is left.
+    """
+    plain = _MARKUP.sub(lambda match: f"\\{match[0]}", printable_line(text))
+    return escape(plain, quote=False)
+
 
 _PLAIN: Final = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA: Final = re.compile(r"([+-]?[0-9]+),([0-9]+)")

@@ -97,7 +97,7 @@ def main(
         make_folder(out)
         run = partial(run_site, cells=cells, folder=out / "blasts")
         for path in tables:
-            asked = asked_in(read_frame(path, [each.name for each in COLUMNS]), layouts, sites)
+            asked = asked_in(read_frame(path, COLUMNS), layouts, sites)
             with progress_bar(path.stem) as progress:
                 rows: Sequence[list[dict[str, object]]] = run_all(run, asked, processes, progress)
             blasts = sum(len(each.blasts) for each in asked)

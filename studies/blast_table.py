@@ -38,17 +38,22 @@ from blast_env.tables import Column, table_of
 
 COLUMNS: Final = (
     Column(
-        "scenario", "", "bundled scenario of that hash, or generated site; empty: one of a file"
+        "scenario",
+        "",
+        "bundled scenario of that hash, or generated site; empty: one of a file",
+        True,
     ),
-    Column("scenario_hash", "", "content hash of the scenario"),
-    Column("layout", "", "JSON: [row, column] per module, [row, column, item, turned] per piece"),
+    Column("scenario_hash", "", "content hash of the scenario", True),
+    Column(
+        "layout", "", "JSON: [row, column] per module, [row, column, item, turned] per piece", True
+    ),
     Column("charge_x_m", "m", "where the charge went off, from the left border"),
     Column("charge_y_m", "m", "from the lower border"),
     Column("charge_height_m", "m", "height of its centre; 0: it lay on the ground"),
     Column("tnt_kg", "kg", "its mass"),
     Column("seed", "", "of fan and air; 0 for gas dynamics, which draws none"),
-    Column("engine", "", "engine with its version and fields"),
-    Column("structure", "", "name of the structure"),
+    Column("engine", "", "engine with its version and fields", True),
+    Column("structure", "", "name of the structure", True),
     Column("protected", "", "whether its load counts"),
     Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
     Column("peak_pa", "Pa", "largest overpressure on them; missing for particles"),

@@ -184,8 +184,7 @@ def fit_it(
 
 def named_rows(paths: Sequence[Path], without: Sequence[str] = ()) -> pd.DataFrame:
     """Return the rows of blast tables with a named scenario, except those in `without`."""
-    names = [column.name for column in COLUMNS]
-    table = pd.concat([read_frame(path, names) for path in paths], ignore_index=True)
+    table = pd.concat([read_frame(path, COLUMNS) for path in paths], ignore_index=True)
     return table[~table["scenario"].isin(["", *without])]
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final, Self, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from blast_env.documents import read_text
+from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.engines.contract import (
@@ -269,7 +269,7 @@ def write_kept(record: Kept, path: Path) -> None:
 def read_kept(kind: type[AnyKept], path: Path) -> AnyKept | None:
     """Return the record in a file, or `None` if it is missing or damaged."""
     try:
-        return kind.model_validate_json(read_text(path, MOST_BYTES))
+        return kind.model_validate_json(check_values(read_text(path, MOST_BYTES)))
     except ValueError:
         return None
 

@@ -8,7 +8,7 @@ from pydantic import Field, TypeAdapter
 
 from blast_env.app.records import MOST_BYTES, EngineRecord, Kept, write_kept
 from blast_env.app.threats import NamedThreat
-from blast_env.documents import read_text
+from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
@@ -209,7 +209,7 @@ def read_task(folder: Path) -> Task:
         BlastEnvError: If there is none.
     """
     try:
-        return _TASK.validate_json(read_text(folder / TASK, MOST_BYTES))
+        return _TASK.validate_json(check_values(read_text(folder / TASK, MOST_BYTES)))
     except ValueError as error:
         raise BlastEnvError(f"{folder}: holds no work: {error}") from error
 
@@ -222,6 +222,6 @@ def write_status(status: Status, folder: Path) -> None:
 def read_status(folder: Path) -> Status:
     """Return the progress of work; an unreadable status counts as failed."""
     try:
-        return Status.model_validate_json(read_text(folder / STATUS, MOST_BYTES))
+        return Status.model_validate_json(check_values(read_text(folder / STATUS, MOST_BYTES)))
     except ValueError as error:
         return Status(state="failed", title=folder.name, text=f"cannot be read: {error}")

@@ -20,7 +20,15 @@ from blast_env.benchmark.references import (
     engine_key,
     stored_references,
 )
-from blast_env.benchmark.submissions import MOST_RUNS, Run, Submission, read_runs, write_runs
+from blast_env.benchmark.submissions import (
+    MOST_RUNS,
+    MethodName,
+    Note,
+    Run,
+    Submission,
+    read_runs,
+    write_runs,
+)
 from blast_env.documents import checked_as, parse_json
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastCache, BlastEvaluator
@@ -74,11 +82,11 @@ class JudgedSubmission:
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
-    method: str
-    cell_m: Annotated[float, Field(gt=0.0)]
-    engine: str
+    method: MethodName
+    cell_m: Annotated[float, Field(ge=0.01, le=100.0)]
+    engine: Annotated[str, Field(max_length=500)]
     runs: Annotated[tuple[JudgedRun, ...], Field(min_length=1, max_length=MOST_RUNS)]
-    note: str = ""
+    note: Note = ""
     format: Literal["blast-env judged 1"] = FORMAT
 
     @classmethod
@@ -88,10 +96,7 @@ class JudgedSubmission:
         Raises:
             BlastEnvError: If it cannot be read or has another format.
         """
-        try:
-            return checked_as(cls, read_runs(path))
-        except BlastEnvError as error:
-            raise BlastEnvError(f"{path}: {error}") from error
+        return read_runs(path, cls)
 
     def save(self, path: str | Path) -> Path:
         """Write the file, one run per line.

@@ -10,6 +10,7 @@ from blast_env.benchmark.definitions import BUDGETS
 from blast_env.benchmark.judging import JudgedSubmission
 from blast_env.statistics import Estimate, mean_estimate
 from blast_env.tables import markdown_table
+from blast_env.values import markup_text
 
 _HEAD = """# Standings
 
@@ -54,11 +55,17 @@ def standings_page(judged: Sequence[JudgedSubmission]) -> str:
     """Return the page of the documentation with the standings, in Markdown."""
     parts = [_HEAD]
     for table in standings_tables(judged):
-        parts += [f"## {table.title}\n", markdown_table(table.headers, table.rows) + "\n"]
+        rows = [[markup_text(cell) for cell in row] for row in table.rows]
+        title = markup_text(table.title)
+        parts += [f"## {title}\n", markdown_table(table.headers, rows) + "\n"]
     methods: dict[str, list[str]] = {}
     for each in judged:
         methods.setdefault(each.note, []).append(each.method)
-    notes = [(", ".join(names), note) for note, names in methods.items() if note]
+    notes = [
+        (markup_text(", ".join(names)), markup_text(note))
+        for note, names in methods.items()
+        if note
+    ]
     if notes:
         parts += ["## Methods\n", markdown_table(("methods", "note"), notes) + "\n"]
     return "\n".join(parts)

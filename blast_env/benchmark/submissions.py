@@ -4,18 +4,19 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
 from pydantic import ConfigDict, Field
 
 from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.benchmark.problem import BenchmarkProblem
-from blast_env.documents import checked_as, parse_json, read_text
-from blast_env.errors import BlastEnvError
+from blast_env.documents import MAX_BYTES, checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.journal import Journal
 from blast_env.layout import check_layout
+from blast_env.reading import read_apart
 from blast_env.values import MOST_SEED, path_of
 
 FORMAT: Final = "blast-env submission 1"
@@ -31,7 +32,12 @@ MOST_BLASTS: Final = BUDGETS[-1]
 Method = Callable[[BenchmarkProblem, int], Layout]
 """Finds a layout for a problem within its budget; the number is the random seed."""
 
+Runs = TypeVar("Runs")
+"""A dataclass with runs."""
+
 Blasts = Annotated[int, Field(ge=0, le=MOST_BLASTS)]
+MethodName = Annotated[str, Field(min_length=1, max_length=60)]
+Note = Annotated[str, Field(max_length=500)]
 
 
 @dataclass(frozen=True)
@@ -73,9 +79,9 @@ class Submission:
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 
-    method: Annotated[str, Field(min_length=1, max_length=60)]
+    method: MethodName
     runs: Annotated[tuple[Run, ...], Field(min_length=1, max_length=MOST_RUNS)]
-    note: Annotated[str, Field(max_length=500)] = ""
+    note: Note = ""
     format: Literal["blast-env submission 1"] = FORMAT
 
     @classmethod
@@ -87,8 +93,8 @@ class Submission:
         Raises:
             BlastEnvError: If it cannot be read or has another format, or as `check`.
         """
+        found = read_runs(path, cls)
         try:
-            found = checked_as(cls, read_runs(path))
             found.check(definitions)
         except BlastEnvError as error:
             raise BlastEnvError(f"{path}: {error}") from error
@@ -113,7 +119,7 @@ class Submission:
         for index, run in enumerate(self.runs):
             where = f"runs[{index}]"
             if run.problem not in definitions:
-                raise BlastEnvError(f"{where}: there is no problem {run.problem!r}")
+                raise BlastEnvError(f"{where}: there is no problem {value_text(run.problem)}")
             if run.key in seen:
                 raise BlastEnvError(
                     f"{where}: {run.problem}, {run.budget}, {run.seed}: appears twice"
@@ -132,17 +138,41 @@ class Submission:
             legal.add((run.problem, run.layout))
 
 
-def read_runs(path: str | Path) -> Any:
-    """Return the unchecked content of a file of runs.
+def read_runs(path: str | Path, kind: type[Runs], *others: type[Runs]) -> Runs:
+    """Return the content of a file of runs; a large one is read in a separate process with limits.
+
+    Args:
+        path: The file.
+        kind: Its dataclass.
+        others: Further dataclasses, for a file with their `format`.
 
     Raises:
-        BlastEnvError: If it cannot be read, is not JSON, or has more than `MOST_RUNS` runs.
+        BlastEnvError: If it cannot be read, is not JSON, has more than `MOST_RUNS` runs, is of
+            another form, or takes too much time or memory; the message begins with the file.
     """
-    content = parse_json(read_text(path_of(path), MOST_BYTES))
-    runs = content.get("runs") if isinstance(content, dict) else None
-    if isinstance(runs, list) and len(runs) > MOST_RUNS:
-        raise BlastEnvError(f"has {len(runs):,} runs, must have at most {MOST_RUNS:,}")
-    return content
+    path = path_of(path)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            found: Runs = read_apart(str(path), _runs_in, path, (kind, *others))
+            return found
+    except OSError:
+        pass  # whose reason reading says
+    read: Runs = _runs_in(path, (kind, *others))
+    return read
+
+
+def _runs_in(path: Path, kinds: tuple[Any, ...]) -> Any:
+    try:
+        content = parse_json(read_text(path, MOST_BYTES))
+        given = content if isinstance(content, dict) else {}
+        runs = given.get("runs")
+        if isinstance(runs, list) and len(runs) > MOST_RUNS:
+            raise BlastEnvError(f"has {len(runs):,} runs, must have at most {MOST_RUNS:,}")
+        asked: Any = given.get("format")
+        kind = next((each for each in kinds if each.format == asked), kinds[0])
+        return checked_as(kind, content)
+    except BlastEnvError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
 
 
 def write_runs(path: str | Path, record: Any) -> Path:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from blast_env.benchmark import (
     BUDGETS,
@@ -30,7 +30,6 @@ from blast_env.benchmark import (
     standings_tables,
     stored_references,
 )
-from blast_env.benchmark.judging import FORMAT as JUDGED
 from blast_env.benchmark.references import cell_key
 from blast_env.benchmark.submissions import read_runs
 from blast_env.cli.command import FOLDER, argument, option
@@ -263,13 +262,14 @@ def _file_name(method: str) -> str:
 
 def _submission(path: Path) -> Submission:
     """Read a submission, also one judged before."""
+    kinds: tuple[type[Any], ...] = (Submission, JudgedSubmission)
+    found: Any = read_runs(path, *kinds)
+    submission: Submission = found.submission if isinstance(found, JudgedSubmission) else found
     try:
-        content = read_runs(path)
+        submission.check()
     except BlastEnvError as error:
         raise BlastEnvError(f"{path}: {error}") from error
-    if isinstance(content, dict) and content.get("format") == JUDGED:
-        return JudgedSubmission.load(path).submission
-    return Submission.load(path)
+    return submission
 
 
 def _print_standings(judged: Sequence[JudgedSubmission]) -> None:

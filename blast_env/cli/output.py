@@ -10,7 +10,7 @@ from pathlib import Path
 from signal import SIG_DFL, SIGINT, SIGTERM, getsignal, signal
 from threading import current_thread, main_thread
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -26,7 +26,7 @@ from blast_env.geometry import Element
 from blast_env.io.importing.options import plain
 from blast_env.site import AnyCharge, Scenario
 from blast_env.units import MS_PER_S, PA_PER_KPA
-from blast_env.values import STEERING
+from blast_env.values import printable, printable_line
 
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
@@ -76,11 +76,6 @@ def message_console() -> Console:
 def _plain(**options: Any) -> Console:
     """Return a console that shows texts verbatim: a path may look like markup or an emoji."""
     return Console(highlight=False, markup=False, emoji=False, **options)
-
-
-def printable(text: str) -> str:
-    """Return a text with its terminal control characters escaped."""
-    return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 class InterruptedCommandError(Exception):
@@ -246,10 +241,15 @@ class ResultTable(Table):
 
     def __init__(self, title: str, headers: Sequence[str], text_columns: int = 1) -> None:
         super().__init__()
-        self.heading = title
+        self.heading = printable_line(title)
         self._has_names = text_columns > 0
         for number, header in enumerate(headers):
-            self.add_column(header, justify="left" if number < text_columns else "right")
+            side: Literal["left", "right"] = "left" if number < text_columns else "right"
+            self.add_column(printable(header), justify=side)
+
+    def add_row(self, *cells: Any, **options: Any) -> None:
+        """Add a row, with what would control the terminal escaped."""
+        super().add_row(*(printable_line(str(each)) for each in cells), **options)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         yield Text(self.heading, style="bold")

@@ -487,7 +487,7 @@ class ShownGas(ShownBlast["GasBlast", "GasResult"]):
         cells = " x ".join(str(count) for count in result.run.grid.shape)
         notes = dict.fromkeys(note for each in scaled.values() for note in _notes(each))
         texts = [f"outside the validated range (marked ~): {note}" for note in notes]
-        texts += result.stepped_notes
+        texts += (*result.stepped_notes, *result.moved_gauges)
         texts += (f"{each.building}: {each.words}" for each in result.unjudged)
         self.print_end(result, f"{cells} cells", "steps", texts)
 

@@ -165,7 +165,7 @@ class LayoutFile:
         """Return the message of a layout for another scenario, with a remedy."""
         hashes = (self.site_hash or "", scenario.site_hash)
         saved, asked = (f"hash {each[:_HASH_DIGITS]}" for each in hashes)
-        name = "a scenario without a name" if self.scenario is None else repr(self.scenario)
+        name = "a scenario without a name" if self.scenario is None else value_text(self.scenario)
         changed = ""
         if self.scenario == scenario.name:
             changed = f" (zone, catalogue or structures of {name} have changed since)"

@@ -10,9 +10,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from blast_env.documents import parse_json
-from blast_env.errors import BlastEnvError, shortened
-from blast_env.files import write_atomically
+from blast_env.errors import BlastEnvError, shortened, value_text
+from blast_env.files import read_regular, write_atomically
 from blast_env.particles.tables import COLLISION_COLUMNS, RecordedBlast, RunRecord
+from blast_env.reading import read_apart
 from blast_env.tables import Column
 from blast_env.values import path_of
 
@@ -20,6 +21,12 @@ METADATA_KEY: Final = b"blast_env"
 """Key of the run record, as JSON, in the metadata of the file."""
 
 SUFFIX: Final = ".parquet"
+
+MOST_BYTES: Final = 200_000_000
+"""Largest file that is read."""
+
+MOST_VALUES: Final = 20_000_000
+"""Most values of a table that is read: a million collisions."""
 
 
 def write_parquet(blast: RecordedBlast, path: str | Path) -> Path:
@@ -70,52 +77,106 @@ def write_table(
     return path
 
 
-def read_parquet(path: str | Path) -> tuple[pd.DataFrame, dict[str, Any]]:
-    """Read a file of `write_parquet`.
+def read_parquet(
+    path: str | Path, columns: Sequence[Column] = ()
+) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Read a file of `write_parquet`, in a separate process with limits on time and memory.
 
     Args:
         path: The file.
+        columns: Columns that it must have, among others.
 
     Returns:
         The collision table and the run record.
 
     Raises:
-        BlastEnvError: If the file is missing, damaged or no Parquet, or has no run record.
+        BlastEnvError: If the file is missing, damaged or no Parquet, has no run record, lacks a
+            column, or has one of another kind.
     """
     path = path_of(path)
-    frame, metadata = _read(path)
-    return frame, _run_record(path, metadata)
+    table = read_apart(str(path), checked_table, path, tuple(columns))
+    return table.to_pandas(ignore_metadata=True), _run_record(path, table.schema.metadata or {})
 
 
-def read_frame(path: Path, columns: Sequence[str]) -> pd.DataFrame:
-    """Read a Parquet file without a run record.
+def read_frame(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
+    """Read a Parquet file without a run record, as `read_parquet` does.
 
     Args:
         path: The file.
-        columns: The names of its columns.
+        columns: Its columns.
 
     Raises:
         BlastEnvError: If the file is missing, damaged or no Parquet, or holds another table.
     """
-    frame, _ = _read(path)
-    if list(frame.columns) != list(columns):
-        found = shortened(", ".join(map(str, frame.columns)))
-        raise BlastEnvError(f"{path}: has the columns {found}, must have {', '.join(columns)}")
+    table = read_apart(str(path), checked_table, path, tuple(columns))
+    names = [each.name for each in columns]
+    if table.column_names != names:
+        found = shortened(", ".join(table.column_names))
+        raise BlastEnvError(f"{path}: has the columns {found}, must have {', '.join(names)}")
+    frame: pd.DataFrame = table.to_pandas(ignore_metadata=True)
     return frame
 
 
-def _read(path: Path) -> tuple[pd.DataFrame, dict[bytes, bytes]]:
-    if not path.is_file():
-        raise BlastEnvError(f"{path}: there is no such file")
+def checked_table(path: Path, columns: Sequence[Column] = ()) -> pa.Table:
+    """Return the content of a Parquet file; it may take much memory, see `read_parquet`.
+
+    Args:
+        path: The file.
+        columns: Columns that it must have, among others.
+
+    Raises:
+        BlastEnvError: If the file is missing, damaged or no Parquet, has more than `MOST_VALUES`
+            values, lacks a column, or has one that holds neither numbers nor texts, or not those
+            of its meaning.
+    """
+    try:
+        content = read_regular(path, MOST_BYTES)
+    except BlastEnvError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
     try:
         # Not read_table: it reads a folder named "seed=3" as a partition, and adds a column.
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(pa.BufferReader(content)) as file:
+            _check_schema(path, file, columns)
             table = file.read()
-        # The metadata of pandas in the file are not needed, and would not be checked.
-        return table.to_pandas(ignore_metadata=True), table.schema.metadata or {}
+        table.validate(full=True)
+        _check_texts(path, table)
+    except BlastEnvError:
+        raise
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = shortened(str(error), 300)
         raise BlastEnvError(f"{path}: damaged or not a Parquet file: {reason}") from error
+    return table
+
+
+def _check_schema(path: Path, file: pq.ParquetFile, columns: Sequence[Column]) -> None:
+    """Refuse too many values, missing columns, and columns of the wrong kind, before reading."""
+    values = file.metadata.num_rows * file.metadata.num_columns
+    if values > MOST_VALUES:
+        raise BlastEnvError(f"{path}: has {values:,} values, must have at most {MOST_VALUES:,}")
+    known = {each.name: each for each in (*COLLISION_COLUMNS, *columns)}
+    kinds = {each.name: each.type for each in file.schema_arrow}
+    missing = [each.name for each in columns if each.name not in kinds]
+    if missing:
+        raise BlastEnvError(f"{path}: has no column {', '.join(missing)}")
+    for name, kind in kinds.items():
+        is_text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+        is_number = any(
+            check(kind)
+            for check in (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean)
+        )
+        wanted = known[name].is_text if name in known else is_text
+        if not (is_text if wanted else is_number):
+            what = "texts" if wanted else "numbers or truth values"
+            where = f"column {value_text(name)}"
+            raise BlastEnvError(f"{path}: {where} holds {shortened(str(kind))}, must hold {what}")
+
+
+def _check_texts(path: Path, table: pa.Table) -> None:
+    """Refuse texts that are missing; a missing number is NaN."""
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if column.null_count and not pa.types.is_floating(column.type):
+            where = f"column {value_text(name)}"
+            raise BlastEnvError(f"{path}: {where} has {column.null_count} missing values")
 
 
 def _arrow_table(frame: pd.DataFrame, columns: Sequence[Column], record: RunRecord) -> pa.Table:

@@ -45,7 +45,7 @@ class RecordedBlast(Protocol):
 
 COLLISION_COLUMNS: Final = (
     Column("time_s", "s", "time of the collision, from the detonation"),
-    Column("particle_type", "", "ExplosionBall or AirBall"),
+    Column("particle_type", "", "ExplosionBall or AirBall", True),
     Column("particle_id", "", "index of the ball in the scene"),
     Column("mass", "sim mass", "mass of the ball before the collision"),
     Column("vx", "sim units/s", "velocity to the right before the collision"),
@@ -57,8 +57,8 @@ COLLISION_COLUMNS: Final = (
     Column("angle_deg", "deg", "angle of incidence, 0 is head-on"),
     Column("normal_x", "", "unit normal out of the module, to the right"),
     Column("normal_y", "", "unit normal out of the module, upwards"),
-    Column("module_id", "", "module that was hit, named by its centre in metres"),
-    Column("structure", "", "structure that the module is part of"),
+    Column("module_id", "", "module that was hit, named by its centre in metres", True),
+    Column("structure", "", "structure that the module is part of", True),
     Column("earlier_collisions", "", "collisions of this ball before, with anything"),
     Column("first_contact", "", "whether this is the first hit on the module"),
 )

@@ -251,7 +251,7 @@ class MeasuredBlast:
         notes = [note for name in names for note in self.result.impulse(name).notes]
         late = [name for name, load in self.loads.items() if not load.known]
         notes += [f"{name}: {NOT_KNOWN}" for name in late]
-        notes += self.result.stepped_notes
+        notes += (*self.result.stepped_notes, *self.result.moved_gauges)
         return tuple(dict.fromkeys(notes))
 
     def _load(self, target: ReportedBuilding, walls: pd.DataFrame) -> TargetLoad:

@@ -52,7 +52,7 @@ def test_the_new_table_has_the_loads_of_the_present_engine(
     table = tmp_path / "old_blasts.parquet"
     write_table(rows(["[]"]), COLUMNS, {}, table)
     blast_again.main([table], tmp_path / "again", processes=1)
-    found = read_frame(tmp_path / "again" / table.name, NAMES)
+    found = read_frame(tmp_path / "again" / table.name, COLUMNS)
     blast = GasBlast(load_scenario(SITE), charge=Charge((10.0, 3.0), 20.0))
     loads = {each.name: each.impulse_pa_s for each in blast.run().loads().structures}
     assert dict(zip(found["structure"], found["impulse_pa_s"], strict=True)) == loads

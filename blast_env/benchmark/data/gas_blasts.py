@@ -5,7 +5,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
+from blast_env.errors import UnknownNameError, import_extra
 from blast_env.tables import Column
 from blast_env.values import path_of
 
@@ -21,22 +21,24 @@ TABLES: Final = (
 """Files of the set, named after the origin of their blasts."""
 
 COLUMNS: Final = (
-    Column("table", "", "file that the row is from: bundled or generated sites"),
-    Column("split", "", "train, validation or test; all rows of a site are in one"),
-    Column("scenario", "", "name of the site"),
-    Column("scenario_hash", "", "content hash of the scenario"),
-    Column("layout", "", "JSON: [row, column] per module, [row, column, item, turned] per piece"),
+    Column("table", "", "file that the row is from: bundled or generated sites", True),
+    Column("split", "", "train, validation or test; all rows of a site are in one", True),
+    Column("scenario", "", "name of the site", True),
+    Column("scenario_hash", "", "content hash of the scenario", True),
+    Column(
+        "layout", "", "JSON: [row, column] per module, [row, column, item, turned] per piece", True
+    ),
     Column("charge_x_m", "m", "where the charge went off, from the left border"),
     Column("charge_y_m", "m", "from the lower border"),
     Column("charge_height_m", "m", "height of its centre; 0: it lay on the ground"),
     Column("tnt_kg", "kg", "its mass"),
-    Column("structure", "", "name of the structure"),
+    Column("structure", "", "name of the structure", True),
     Column("protected", "", "whether its load counts"),
     Column("impulse_pa_s", "Pa s", "mean impulse on the walls that count"),
     Column("peak_pa", "Pa", "largest overpressure on them"),
     Column("unprotected_impulse_pa_s", "Pa s", "the same blast without a barrier; else missing"),
     Column("unprotected_peak_pa", "Pa", "the same for the overpressure"),
-    Column("engine", "", "engine with its version and fields"),
+    Column("engine", "", "engine with its version and fields", True),
 )
 """Columns of the set, with units."""
 
@@ -62,16 +64,16 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
     """
     import pandas as pd
 
-    from blast_env.particles.parquet import read_parquet
+    from blast_env.particles.parquet import checked_table, read_parquet
 
     if name != "gas_blasts":
         raise UnknownNameError("data set", name, ("gas_blasts",))
     tables = []
     for path in paths or sources():
-        own, _ = read_parquet(path)
-        missing = {each.name for each in COLUMNS[2:13]} - set(own.columns)
-        if missing:
-            raise BlastEnvError(f"{path}: has no column {', '.join(sorted(missing))}")
+        if paths:
+            own, _ = read_parquet(path, COLUMNS[2:13])
+        else:
+            own = checked_table(path_of(path)).to_pandas(ignore_metadata=True)
         tables.append(own.assign(table=path_of(path).stem))
     rows = pd.concat(tables, ignore_index=True)
     keys = [*_BLAST, "structure"]

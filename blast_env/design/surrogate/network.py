@@ -447,7 +447,8 @@ def packaged_surrogate() -> Surrogate:
     return load_surrogate(_PACKAGED)
 
 
-_Members = Annotated[list[list[list[float]]], Field(min_length=1, max_length=100)]
+_Weight = Annotated[float, Field(ge=-1e3, le=1e3)]
+_Members = Annotated[list[list[list[_Weight]]], Field(min_length=1, max_length=100)]
 
 
 class _File(BaseModel):
@@ -456,8 +457,8 @@ class _File(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     fit: Fit
-    mean: list[float]
-    scale: list[Annotated[float, Field(gt=0.0)]]
+    mean: list[Annotated[float, Field(ge=-1e6, le=1e6)]]
+    scale: list[Annotated[float, Field(ge=1e-6, le=1e6)]]
     members: _Members
     peak_members: _Members
 

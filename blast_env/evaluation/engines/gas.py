@@ -81,6 +81,7 @@ if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
 NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when the run ended"
 """Note on a load that is not known; `GasSettings.until` selects the loads a run waits for."""
 
+_AT_SURFACE_M: Final = 1e-6  # a gauge on a wall records the air before it
 _PROGRESS_CALLS: Final = 100
 
 _FINAL_CELL_M: Final = 0.25
@@ -333,9 +334,25 @@ class GasResult:
 
     @property
     def gauge_notes(self) -> tuple[str, ...]:
-        """Notes on gauges whose load is not known, one sentence each."""
+        """Notes on gauges whose load is not known or that were moved, one sentence each."""
         late = ~self.gauges["known"].to_numpy(dtype=bool)
-        return tuple(f"gauge {name}: {NOT_KNOWN}" for name in self.gauges["name"][late])
+        unknown = (f"gauge {name}: {NOT_KNOWN}" for name in self.gauges["name"][late])
+        return (*unknown, *self.moved_gauges)
+
+    @property
+    def moved_gauges(self) -> tuple[str, ...]:
+        """Notes on gauges inside a solid, which record the nearest air, one sentence each."""
+        notes = []
+        centres_m = self.gauges[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
+        for each, centre_m in zip(self.run.site.gauges, centres_m, strict=True):
+            beyond_m = np.abs(centre_m - each.position_m) - 0.5 * self.run.grid.cell_m
+            if beyond_m.max() > _AT_SURFACE_M:
+                x_m, y_m, z_m = centre_m.tolist()
+                notes.append(
+                    f"gauge {each.name}: lies inside a solid; its load is that of the nearest air,"
+                    f" at ({x_m:g}, {y_m:g}, {z_m:g}) m"
+                )
+        return tuple(notes)
 
     def history(self, gauge: str) -> "pd.DataFrame":
         """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.

@@ -35,9 +35,9 @@ _LOADS: Final = (
 )
 
 FACE_COLUMNS: Final = (
-    Column("structure", "", "name of the structure, or `barrier`"),
-    Column("face", "", "west, east, south, north, roof or underside"),
-    Column("module_id", "", "name of the module, made from its centre in metres"),
+    Column("structure", "", "name of the structure, or `barrier`", True),
+    Column("face", "", "west, east, south, north, roof or underside", True),
+    Column("module_id", "", "name of the module, made from its centre in metres", True),
     Column("x_m", "m", "centre, from the left border"),
     Column("y_m", "m", "centre, from the lower border"),
     Column("z_m", "m", "centre, above the ground"),

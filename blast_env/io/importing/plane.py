@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError, import_extra
+from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
 from blast_env.io.importing.site_map import MapCoordinates, SourceCoordinates
 from blast_env.site.sections import AnyGeoreference, DrawingGeoreference, MapGeoreference
 
@@ -52,7 +52,7 @@ class LocalPlane:
         outside = not np.isfinite([longitude, latitude]).all() or abs(latitude) > 90.0
         if outside or abs(longitude) > 180.0:
             raise BlastEnvError(
-                f"{words} is not on the Earth in {crs}: say with --crs which system the "
+                f"{words} is not on the Earth in {shortened(crs)}: say with --crs which system the "
                 "coordinates are of"
             )
         if abs(latitude) > _MOST_LATITUDE_DEG:
@@ -189,11 +189,14 @@ def _system(crs: str) -> CRS:
     try:
         system = CRS.from_user_input(crs)
     except CRSError as error:
+        reason = shortened(str(error).splitlines()[0])
         raise BlastEnvError(
-            f"crs is {crs!r}, which pyproj does not know: {str(error).splitlines()[0]}"
+            f"crs is {value_text(crs)}, which pyproj does not know: {reason}"
         ) from error
     if not (system.is_geographic or system.is_projected):
-        raise BlastEnvError(f"crs is {crs!r}, {system.type_name}, must be geographic or projected")
+        raise BlastEnvError(
+            f"crs is {value_text(crs)}, {system.type_name}, must be geographic or projected"
+        )
     return system
 
 
@@ -208,9 +211,10 @@ def _check_area_of_use(system: CRS, crs: str, words: str, place: tuple[float, fl
     beside = not (west - _FAR_DEG <= longitude <= east + _FAR_DEG)
     if (beside and not crosses) or not south - _FAR_DEG <= latitude <= north + _FAR_DEG:
         raise BlastEnvError(
-            f"{words} is at longitude {longitude:.4f}, latitude {latitude:.4f} in {crs}, which is "
-            f"for longitudes {west:g} to {east:g} and latitudes {south:g} to {north:g}: say with "
-            "--crs which system the coordinates are of"
+            f"{words} is at longitude {longitude:.4f}, latitude {latitude:.4f} in "
+            f"{shortened(crs)}, which is for longitudes {west:g} to {east:g} and latitudes "
+            f"{south:g} to {north:g}: say with --crs which system the "
+            "coordinates are of"
         )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
-from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word
+from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Rectangle
 from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
@@ -135,10 +135,10 @@ class Calibration(CalibrationSection):
     engine: str
     engine_version: str
     blast_env_version: str
-    facade_width_m: Annotated[float, Field(gt=0.0)]
-    ball_radius_m: Annotated[float, Field(gt=0.0)]
+    facade_width_m: Annotated[float, Field(ge=0.01, le=2000.0)]
+    ball_radius_m: Annotated[float, Field(ge=1e-6, le=100.0)]
     simulated: SimulatedQuantity = "impulse"
-    tnt_kg: Annotated[float, Field(gt=0.0)]
+    tnt_kg: Annotated[float, Field(ge=0.01, le=100_000.0)]
     tnt_range_kg: tuple[float, float] | None = None
     distances_m: Annotated[tuple[float, ...], Field(min_length=2)]
     seeds: Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)]
@@ -180,15 +180,15 @@ class Calibration(CalibrationSection):
         """
         if engine != self.engine:
             raise CalibrationError(
-                f"calibration {self.name!r} was made with engine {self.engine!r}, "
-                f"the simulation ran on {engine!r}"
+                f"calibration {value_text(self.name)} was made with engine"
+                f" {value_text(self.engine)}, the simulation ran on {engine!r}"
             )
         digest = parameters_digest(parameters, engine)
         if digest != self.parameters_digest:
             raise CalibrationError(
-                f"calibration {self.name!r} was made with the parameters of preset "
-                f"{self.preset!r} ({self.parameters_digest[:12]}), the simulation has others "
-                f"({digest[:12]}): use that preset without overrides, or calibrate anew"
+                f"calibration {value_text(self.name)} was made with the parameters of preset "
+                f"{value_text(self.preset)} ({self.parameters_digest[:12]}), the simulation has "
+                f"others ({digest[:12]}): use that preset without overrides, or calibrate anew"
             )
 
     def convert(
