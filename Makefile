@@ -38,6 +38,7 @@ test-browser: compiled
 attack: $(STAMP)
 	$(BIN)/python -m tests.attack.run files
 	$(BIN)/python -m tests.attack.run made
+	$(BIN)/python -m tests.attack.run hostile
 	$(BIN)/python -m tests.attack.run kills
 	$(BIN)/python -m tests.attack.run disks
 	$(BIN)/python -m tests.attack.run web

@@ -7,13 +7,17 @@ import resource
 import sys
 from bz2 import compress as bzip2
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
+
 from blast_env.errors import BlastEnvError
+from blast_env.geometry import Piece
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.layout import LayoutFile
+from blast_env.layout import LayoutFile, Placement
 from blast_env.site import load_scenario
 
 _REPAIR: Final = ImportOptions(repair=True)
@@ -79,6 +83,64 @@ def _zone_items() -> bytes:
     way = '[build_zone.access_way]\nwidth_m = 3.5\nbetween = "left_right"\n'
     zone = "[build_zone]\ncorner_m = [10.0, 0.0]\nrows = 1000\ncolumns = 1000\nstock = 9\n"
     return _toml((zone, way, items, _house(0, 900.0)), 1000.0)
+
+
+def _facades(count: int) -> bytes:
+    facade = "height_m = 2000.0\n[structures.facade]\nstorey_m = 2.0\nbay_m = 0.5\n"
+    houses = (
+        f"{_house(n, 1000.0, 1, 10.0 + 15 * n)}columns = 1000\n{facade}wall = 'brick_215'\n"
+        for n in range(count)
+    )
+    return _toml((each.replace("columns = 1\n", "") for each in houses), 2000.0)
+
+
+def _large_items() -> bytes:
+    item = (
+        '[[build_zone.items]]\nname = "i{}"\ncost = 1.0\nlength_modules = 500\n'
+        "thickness_modules = 250\nheight_m = 2.0\nstock = 5\n"
+    )
+    zone = "[build_zone]\ncorner_m = [10.0, 0.0]\nrows = 1000\ncolumns = 1000\n"
+    items = "".join(item.format(number) for number in range(5))
+    return _toml((zone, items, _house(0, 900.0)), 1000.0)
+
+
+def _driven(size: float, items: int = 0) -> bytes:
+    """Return a site with a vehicle that a rated gate or up to 20 rated items may stop."""
+    rating = "crash_rating = {{mass_kg = 7200.0, speed_km_h = {}.0, penetration_m = 1.0}}\n"
+    grounds = ((0.0, 40.0, 100.0), (40.0, size - 40.0, size))
+    ground = "".join(
+        f"[[charge.drivable]]\ncorner_m = [{x}, 0.0]\nsize_m = [{width}, {height}]\n"
+        for x, width, height in grounds
+    )
+    vehicle = (
+        '[[charge]]\nkind = "vehicle"\ntnt_kg = 1.0\nwidth_m = 2.0\n[[charge.entries]]\n'
+        f"start_m = [0.0, 10.0]\nend_m = [0.0, 90.0]\n{ground}[charge.motion]\n"
+        "mass_kg = 7000.0\nmax_speed_km_h = 80.0\nacceleration_m_s2 = 2.0\n"
+    )
+    zone = "[build_zone]\ncorner_m = [10.0, 0.0]\nrows = 200\ncolumns = 60\nstock = 20\n"
+    way = '[build_zone.access_way]\nwidth_m = 3.5\nbetween = "left_right"\n'
+    way += "[build_zone.access_way.gate]\ncorner_m = [10.0, 40.0]\nsize_m = [1.0, 5.0]\n"
+    catalogue = "".join(
+        f'[[build_zone.items]]\nname = "i{n}"\ncost = 1.0\nlength_modules = {4 + n}\n'
+        f"height_m = 2.0\nstock = 1\n{rating.format(30 + 2 * n)}"
+        for n in range(items)
+    )
+    head = _HEADER.format(size=size).partition("[[charge]]")[0]
+    end = catalogue or way + rating.format(48)
+    return f"{head}{vehicle}{zone}{end}{_house(0, size / 2, 4, size / 2)}".encode()
+
+
+def _parquet(columns: Mapping[str, Any]) -> bytes:
+    """Return a table with a run record; equal values take next to no room in it."""
+    import pyarrow as pa  # here and below, because it would count for all others
+    import pyarrow.parquet as pq
+
+    from blast_env.particles.parquet import METADATA_KEY
+
+    table = pa.table(columns).replace_schema_metadata({METADATA_KEY: "{}"})
+    with BytesIO() as file:
+        pq.write_table(table, file, compression="zstd")
+        return file.getvalue()
 
 
 def _geojson(*features: Mapping[str, Any]) -> bytes:
@@ -265,8 +327,42 @@ def _drawing(path: Path) -> None:
     import_site(path, _DRAWING)
 
 
+def _drawn(path: Path) -> None:
+    scenario = load_scenario(path)
+    items = scenario.zone.catalogue.names
+    layout = [Piece(3 + 9 * n, 30, name, False) for n, name in enumerate(items)]
+    Placement.of(scenario, layout).explain_vehicles()
+
+
+def _table(path: Path) -> None:
+    from blast_env.particles.parquet import read_parquet
+
+    read_parquet(path)
+
+
+def _runs(path: Path) -> None:
+    from blast_env.benchmark import Submission
+
+    Submission.load(path)
+
+
+def _record(path: Path) -> None:
+    from blast_env.app.records import BlastRecord, read_kept
+
+    if read_kept(BlastRecord, path) is None:
+        raise BlastEnvError("is damaged")
+
+
 READERS: Final[Mapping[str, Callable[[Path], None]]] = MappingProxyType(
-    {".toml": _scenario, ".json": _layout, ".dxf": _drawing}
+    {
+        ".toml": _scenario,
+        ".json": _layout,
+        ".dxf": _drawing,
+        ".drawn.toml": _drawn,
+        ".parquet": _table,
+        ".runs": _runs,
+        ".record": _record,
+    }
 )
 """What reads a file as the packages do, by its ending; the others are maps."""
 
@@ -295,6 +391,27 @@ FAMILIES: Final[Mapping[str, Maker]] = MappingProxyType(
         "a vehicle among 100 houses on 2 km.toml": lambda: _vehicles(2000.0),
         "30 vehicles on 2 km.toml": lambda: _vehicles(2000.0, 30),
         "20 items on 500 m.toml": _zone_items,
+        "a facade of 2,002,000 bays.toml": lambda: _facades(1),
+        "100 facades of 2,002,000 bays.toml": lambda: _facades(100),
+        "items of 500 x 250 modules.toml": _large_items,
+        "a vehicle with a motion on 2 km.toml": lambda: _driven(2000.0),
+        "a vehicle with a motion on 300 m.toml": lambda: _driven(300.0),
+        "a vehicle through a rated gate on 300 m.drawn.toml": lambda: _driven(300.0),
+        "20 rated items on 300 m.drawn.toml": lambda: _driven(300.0, 20),
+        "20 rated items on 400 m.drawn.toml": lambda: _driven(400.0, 20),
+        "a text of 1 MB, 1,600 times.parquet": lambda: _parquet(
+            {"structure": ["x" * 1_000_000] * 1600}
+        ),
+        "100,000,000 equal numbers.parquet": lambda: _parquet({"time_s": np.zeros(100_000_000)}),
+        "numbers for texts.parquet": lambda: _parquet({"structure": [1.0]}),
+        "texts for numbers.parquet": lambda: _parquet({"time_s": ["a"]}),
+        "bytes for numbers.parquet": lambda: _parquet({"time_s": [b"a"]}),
+        "missing texts.parquet": lambda: _parquet({"structure": ["a", None]}),
+        "lists for numbers.parquet": lambda: _parquet({"time_s": [[1.0]]}),
+        "13 MB of empty runs.runs": lambda: b'{"runs": [' + b"{}," * 4_400_000 + b"{}]}",
+        "19 MB of empty arrays.runs": lambda: b"[" + b"[]," * 6_400_000 + b"[]]",
+        "1 MB of empty runs.runs": lambda: b'{"runs": [' + b"{}," * 320_000 + b"{}]}",
+        "48 MB of empty arrays.record": lambda: b"[" + b"[]," * 16_000_000 + b"[]]",
         "40,000 escaped quotes.json": lambda: _OPEN.encode(),
         "300,000 empty arrays.json": lambda: f"[{_repeated('[],')}[]]".encode(),
         "150,000 cells in one place.json": lambda: f"[{_repeated('[0,0],')}[0,0]]".encode(),

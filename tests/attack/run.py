@@ -23,6 +23,7 @@ import typer
 from blast_env.errors import BlastEnvError
 from tests.attack.disks import outcome_after_full_device, size_of, small_device
 from tests.attack.formats import FORMATS, Format
+from tests.attack.hostile import FAMILIES as HOSTILE
 from tests.attack.kills import JOBS, outcome_after_kill, steps_and_outcome
 from tests.attack.made import FAMILIES, suffix_of
 from tests.attack.mutants import mutants
@@ -230,6 +231,29 @@ def made(
         cells = (name, f"{found.size / 1e6:.1f}", found.outcome)
         print(f"| {' | '.join(cells)} | {found.time_s:.1f} | {found.peak_bytes / 1e6:.0f} |")
         failed += not found.is_within
+    raise typer.Exit(1 if failed else 0)
+
+
+@app.command()
+def hostile(
+    only: Annotated[str, typer.Option(help="Families with this in their names.")] = "",
+) -> None:
+    """Read files of other kinds, with wrong numbers and texts; print how often it was refused."""
+    failed = 0
+    print("| family | tried | held | processor time, s |")
+    print("|---|---|---|---|")
+    for name, attempts in HOSTILE.items():
+        if only not in name:
+            continue
+        began_s, tried, through = process_time(), 0, list[str]()
+        with TemporaryDirectory() as folder:
+            for what, problem in attempts(Path(folder)):
+                tried += 1
+                through += [f"{what}: {problem}"] if problem else []
+        cells = (name, tried, tried - len(through), f"{process_time() - began_s:.0f}")
+        print(f"| {' | '.join(map(str, cells))} |", flush=True)
+        print("".join(f"    {each}\n" for each in through[:9]), end="", flush=True)
+        failed += len(through)
     raise typer.Exit(1 if failed else 0)
 
 

@@ -125,6 +125,7 @@ SMALLER: Final[dict[str, str]] = {
         f"{_TRAIN} --engine event {_CLUSTER}"
     ),
     "python -m tests.attack.run files": "--count 1",
+    "python -m tests.attack.run hostile": "--only methods",
     "python -m tests.attack.run kills": "--most 1",
     "python -m tests.attack.run disks": "--most 1",
     # docs/engineers/gas.md, docs/howto/pictures.md
