@@ -369,11 +369,11 @@ def force_words(found: Iterable[FacadeResponse]) -> str:
         strict=True,
     )
     carried = ", ".join(
-        f"{words} {np.concatenate(forces).max() * 1e-3:.1f} kN/m"
-        for words, forces in (("pane edges", edges), ("supports of wall panels", supports))
+        f"{np.concatenate(forces).max() * 1e-3:.1f} kN/m at {words}"
+        for words, forces in (("pane edges", edges), ("the supports of wall panels", supports))
         if sum(map(len, forces))
     )
-    return f"frames and connections are not assessed: they have to carry {carried}"
+    return f"frames and connections are not assessed; they have to carry {carried}"
 
 
 def peak_factor(cell_m: float, tnt_kg: float) -> float:
