@@ -140,7 +140,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
             teller.share(share)
             return
         best = placing.plain(progress.best.layout)
-        reduction = 100.0 * problem.reduction(progress.best)
+        reduction = 100.0 * progress.best.reduction(problem)
         text = f"{progress.blasts} of {progress.budget} blasts, best reduction {reduction:.1f} %"
         if best != teller.status.layout:
             teller.tell(share=share, text=text, layout=best)
@@ -150,7 +150,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
     result = method.propose(problem, task.budget, 0, report)
     if result.load is None:
         raise KeyboardInterrupt
-    reduction = 100.0 * problem.reduction(result.history[-1])
+    reduction = 100.0 * result.history[-1].reduction(problem)
     text = (
         f"reduction {reduction:.1f} % on the blasts of the search, after {result.blasts} of"
         f" {result.budget} ({task.engine.label}); blast the layout to confirm it"

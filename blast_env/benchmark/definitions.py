@@ -136,7 +136,7 @@ class Definition:
 def _charge(threat: Threat) -> object:
     charge = threat.charge
     if isinstance(charge, VehicleCharge):
-        return charge.source.model_dump(mode="json"), charge.rank
+        return charge.source.model_dump(mode="json", exclude={"threat"}), charge.rank
     return charge._asdict()
 
 

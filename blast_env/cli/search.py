@@ -211,7 +211,7 @@ class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions)
             task = progress.add_task(label, total=self.budget, best="-")
 
             def report(state: SearchProgress) -> None:
-                best = "-" if state.best is None else percent(problem.reduction(state.best))
+                best = "-" if state.best is None else percent(state.best.reduction(problem))
                 progress.update(task, completed=state.blasts, best=best)
 
             return method.propose(problem, self.budget, self.seed, report)

@@ -175,7 +175,7 @@ class Display:
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
-        if self._last_frame is None and episode.objective.evaluator.engine.medium:
+        if self._last_frame is None and episode.problem.evaluator.engine.medium:
             self._last_frame = _screening(episode, painter.size_px).last_frame()
         if self._last_frame is None:  # the engine gives no state of the blast to draw
             return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
@@ -203,11 +203,11 @@ class Display:
 
 def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | PressureScreening":
     """Return the film of the blast by the worst threat."""
-    shown, evaluator = _shown_threat(episode), episode.objective.evaluator
+    shown, evaluator = _shown_threat(episode), episode.problem.evaluator
     # Sorted as for the assessment: the order may change the last bits.
     layout = tuple(sorted(episode.placement.layout))
     blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
-    charges = len(episode.objective.case.charges)
+    charges = len(episode.problem.case.charges)
     remark = f": the worst of {charges} charges" if charges > 1 else ""
     if isinstance(blast, Blast):
         from blast_env.plots.placing import BlastScreening
@@ -220,9 +220,9 @@ def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | 
 
 def _shown_threat(episode: Episode) -> Threat:
     """Return the worst threat, with its first realisation."""
-    objective = episode.objective
-    case = objective.case
-    loads = np.array(objective.counted_loads(episode.placement.layout))
+    case = episode.problem.case
+    blasts = episode.problem.loads_with(episode.placement.layout)
+    loads = np.array([each.load(case.scenario.objective) for each in blasts])
     of_charges = loads.reshape(case.realisations, -1).mean(axis=0)
     return case.threats[int(of_charges.argmax())]
 
@@ -231,9 +231,9 @@ def _outcome(episode: Episode) -> str:
     """Return the loads and the reduction, in words."""
     protected, unprotected = episode.assess()
     reduction_percent = 100.0 * protected.reduction_from(unprotected)
-    of_all = "all charges: " if len(episode.objective.case.charges) > 1 else ""
+    of_all = "all charges: " if len(episode.problem.case.charges) > 1 else ""
     load = f"{protected.impulse_psi_s:.3g} psi s ({protected.impulse_pa_s:.3g} Pa s)"
-    counts = episode.objective.case.scenario.objective
+    counts = episode.problem.case.scenario.objective
     if counts.needs_peaks:
         load = f"{load}, {counts.noun} {counts.text(protected.load)}"
     return f"{of_all}{load}, reduction {reduction_percent:.0f} %"

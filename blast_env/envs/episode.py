@@ -28,9 +28,10 @@ from blast_env.envs.strategies import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, SeedRange, Threat
-from blast_env.evaluation.comparison import Assessment, Objective
+from blast_env.evaluation.comparison import Assessment
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
+from blast_env.evaluation.problem import DesignProblem
 from blast_env.geometry import Layout
 from blast_env.layout import Placement
 from blast_env.layout.placement import met_by_blasts
@@ -87,7 +88,7 @@ class Episode:
 
     Attributes:
         observable: The observable part of the episode before the end.
-        objective: Assesses layouts.
+        problem: Assesses layouts.
         observation: Observes the episode.
         initial: The layout at the start.
         placement: The modules placed so far.
@@ -101,7 +102,7 @@ class Episode:
     """
 
     observable: Observable
-    objective: Objective
+    problem: DesignProblem
     observation: EpisodeObservation
     initial: Layout
     placement: Placement
@@ -160,7 +161,7 @@ class Episode:
             after=self.placement.checked,
             begins=not self.begun,
             ended=self.ended,
-            objective=self.objective,
+            problem=self.problem,
         )
         self.begun = True
         terms = reward(transition)
@@ -178,7 +179,7 @@ class Episode:
             illegal: The consequences of an illegal action.
         """
         after = self._after(action, illegal)
-        case = self.objective.case
+        case = self.problem.case
         barrier = met_by_blasts(after.placement.layout)
         layouts = (barrier, ()) if after.ended else ()
         return tuple(
@@ -215,7 +216,7 @@ class Episode:
         Raises:
             BlastEnvError: As `BlastEvaluator.loads_of_many`.
         """
-        return self.objective.assess(self.placement.checked), self.objective.assess(())
+        return self.problem.assess(self.placement.checked), self.problem.assess(())
 
     def information(self) -> dict[str, Any]:
         """Return the information after every action and after `reset`."""
@@ -229,7 +230,7 @@ class Episode:
             evaluators: The evaluators, which count the blasts.
         """
         protected, unprotected = self.assess()
-        case = self.objective.case
+        case = self.problem.case
         seeds = [threat.seed for threat in case.threats]
         return {
             "impulse_psi_s": protected.impulse_psi_s,
@@ -238,8 +239,8 @@ class Episode:
             **_where_known(protected, unprotected),
             "reduction": protected.reduction_from(unprotected),
             "layout": self.placement.layout,
-            "scenario_hash": self.objective.evaluator.scenario_hash,
-            "calibration": self.objective.evaluator.calibration_name,
+            "scenario_hash": self.problem.evaluator.scenario_hash,
+            "calibration": self.problem.evaluator.calibration_name,
             "calibration_in_range": protected.in_range,
             "charges": case.charges_against(self.placement.layout),
             "blast_seeds": tuple(
@@ -329,7 +330,7 @@ class Task:
         placement = Placement.of(possible, options.layout)
         return Episode(
             observable=observable,
-            objective=Objective(evaluator, self._case(scenario, charges, seeds)),
+            problem=DesignProblem(evaluator, self._case(scenario, charges, seeds)),
             observation=self.observation.episode(observable),
             initial=placement.checked,
             placement=placement,

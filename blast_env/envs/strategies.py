@@ -9,7 +9,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.comparison import Objective
+from blast_env.evaluation.problem import DesignProblem
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
 from blast_env.site.vehicles import source_of
@@ -178,7 +178,7 @@ class Transition:
         after: The layout after it; the same, unless the action placed a module or a piece.
         begins: Whether it is the first action of the episode.
         ended: Whether the charge goes off now.
-        objective: Assesses layouts under the threats of the episode.
+        problem: Assesses layouts under the threats of the episode.
     """
 
     initial: Layout
@@ -186,12 +186,12 @@ class Transition:
     after: Layout
     begins: bool
     ended: bool
-    objective: Objective
+    problem: DesignProblem
 
     @property
     def term(self) -> str:
         """Name of the reward's term for the load: `impulse`, `peak` or `load`."""
-        return self.objective.case.scenario.objective.term
+        return self.problem.case.scenario.objective.term
 
 
 class Reward(Protocol):
@@ -230,7 +230,7 @@ class TerminalReward:
         The term of the load is named `impulse` (psi s), `peak` (psi) or `load` (both, without a
         unit).
         """
-        paid = transition.objective.paid
+        paid = transition.problem.paid
         load = deposit = 0.0
         if transition.begins != transition.ended:
             deposit = DEPOSIT * paid(())
@@ -252,7 +252,7 @@ class IncrementalReward:
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the term of the load, named as by `TerminalReward`."""
         load = 0.0
-        paid = transition.objective.paid
+        paid = transition.problem.paid
         if transition.after != transition.before:
             load += paid(transition.before) - paid(transition.after)
         if transition.begins:
@@ -273,7 +273,7 @@ class ReductionReward:
         """Return the term `reduction`, 0 before the end."""
         reduction = 0.0
         if transition.ended:
-            protected, unprotected = map(transition.objective.assess, (transition.after, ()))
+            protected, unprotected = map(transition.problem.assess, (transition.after, ()))
             reduction = float(np.nan_to_num(protected.reduction_from(unprotected)))
         return {"reduction": reduction}
 

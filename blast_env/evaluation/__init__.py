@@ -4,12 +4,12 @@ from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,
     Comparison,
-    Objective,
     compare,
 )
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad, StructureLoad
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError, Evaluators
 from blast_env.evaluation.grid_error import GridError, convergence_index
+from blast_env.evaluation.problem import DesignProblem
 from blast_env.evaluation.report import (
     LayoutEvaluation,
     ThreatOutcome,
@@ -35,13 +35,13 @@ __all__ = [
     "BudgetError",
     "Case",
     "Comparison",
+    "DesignProblem",
     "DiskCache",
     "Estimate",
     "Evaluators",
     "GridError",
     "LayoutEvaluation",
     "LoadsCache",
-    "Objective",
     "ParticleLoad",
     "SeedRange",
     "StructureLoad",

@@ -5,10 +5,10 @@ case in which no threat causes a load without a barrier (`check_something_arrive
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby, islice
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
@@ -66,6 +66,20 @@ class Assessment:
     in_range: bool
     level: LevelOfProtection | None = None
 
+    @classmethod
+    def of(cls, case: Case, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
+        """Return the assessment of a layout from its loads, one per threat of the case."""
+        combined, counts = case.combined, case.scenario.objective
+        sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
+        return cls(
+            impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
+            impulse_sim=combined(sums) if len(sums) == len(loads) else None,
+            peak_pa=combined([each.protected_peak_pa for each in loads]),
+            load=case.counted([each.load(counts) for each in loads], layout),
+            level=min(each.level for each in loads) if counts.kind == "response" else None,
+            in_range=all(each.in_range for each in loads),
+        )
+
     @property
     def impulse_psi_s(self) -> float:
         """The impulse in the paper's unit, psi*s."""
@@ -74,62 +88,6 @@ class Assessment:
     def reduction_from(self, unprotected: "Assessment") -> float:
         """Return the relative reduction of `load` from no barrier; NaN if that load is 0."""
         return reductions(self.load, unprotected.load).item()
-
-
-@dataclass(frozen=True, eq=False)
-class Objective:
-    """The objective values of layouts on a case, each computed once.
-
-    Attributes:
-        evaluator: Runs and caches the blasts; it holds the scenario.
-        case: The threats, and the rule that combines them into one number.
-    """
-
-    evaluator: BlastEvaluator
-    case: Case
-    _assessed: dict[Layout, Assessment] = field(default_factory=dict, init=False)
-
-    def assess(self, layout: Sequence[Element]) -> Assessment:
-        """Return the loads and the objective value of a layout, at one blast per threat not cached.
-
-        Args:
-            layout: (row, column) of the cells that hold a module, in any order.
-
-        Raises:
-            LayoutError: If the layout does not fit the build zone.
-        """
-        key = tuple(sorted(layout))
-        if key not in self._assessed:
-            loads, combined = self.loads(layout), self.case.combined
-            counts = self.case.scenario.objective
-            sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
-            self._assessed[key] = Assessment(
-                impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
-                impulse_sim=combined(sums) if len(sums) == len(loads) else None,
-                peak_pa=combined([each.protected_peak_pa for each in loads]),
-                load=self.case.counted([each.load(counts) for each in loads], layout),
-                level=min(each.level for each in loads) if counts.kind == "response" else None,
-                in_range=all(each.in_range for each in loads),
-            )
-        return self._assessed[key]
-
-    def paid(self, layout: Sequence[Element]) -> float:
-        """Return the objective value in the unit of rewards: psi s, psi, or dimensionless."""
-        return self.case.scenario.objective.paid(self.assess(layout).load)
-
-    def loads(self, layout: Sequence[Element]) -> list[BlastLoads]:
-        """Return the loads with a layout, one per threat of the case.
-
-        Raises:
-            LayoutError: If the layout does not fit the build zone.
-        """
-        pairs = [(layout, threat) for threat in self.case.threats]
-        return self.evaluator.loads_of_many(pairs)
-
-    def counted_loads(self, layout: Sequence[Element]) -> tuple[float, ...]:
-        """Return the loads with a layout in the unit of the objective, one per threat."""
-        counts = self.case.scenario.objective
-        return tuple(each.load(counts) for each in self.loads(layout))
 
 
 @dataclass(frozen=True, eq=False)

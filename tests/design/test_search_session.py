@@ -12,7 +12,6 @@ from blast_env.design.search.session import Plan, SearchEndedError, SearchSessio
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, Case, Threat
 from blast_env.evaluation.cases import practice_hidden, practice_visible
-from blast_env.evaluation.comparison import Objective
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
 from tests.design.search_cases import ballistic, small_problem, small_scenario
@@ -38,7 +37,7 @@ def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk)
     evaluator = BlastEvaluator(scenario, "event")
     case = practice_hidden(scenario, 3, 2, 1, risk)
     layout = ((9, 0), (10, 0), (11, 0))
-    expected = Objective(evaluator, case).assess(layout).impulse_pa_s
+    expected = DesignProblem(evaluator, case).assess(layout).impulse_pa_s
     found = DesignProblem(evaluator, case).load(layout)
     assert found == pytest.approx(expected, rel=1e-12)
 
@@ -185,7 +184,7 @@ def test_reductions_refer_to_the_threats_that_were_met(problem: DesignProblem) -
     for threats in (1, 4):
         it.assess([()], threats)
         assert it.best is not None
-        assert problem.reduction(it.best) == 0.0
+        assert it.best.reduction(problem) == 0.0
 
 
 @pytest.mark.parametrize(

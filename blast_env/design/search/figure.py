@@ -44,7 +44,7 @@ def search_figure(result: SearchResult, problem: DesignProblem) -> Figure:
     write_heading(
         figure,
         f"{scenario.name}, {result.method} search: reduction "
-        f"{100.0 * problem.reduction(best):.0f} % with "
+        f"{100.0 * best.reduction(problem):.0f} % with "
         f"{layout_counts(best.layout)}",
         f"{result.blasts:,} of {count_of('blast', result.budget)} spent"
         f"{', interrupted' if result.interrupted else ''}; engine "
@@ -65,7 +65,7 @@ def _draw_history(axes: Axes, result: SearchResult, problem: DesignProblem) -> N
         chosen = [(each, end) for each, end in zip(history, ends, strict=True)]
         chosen = [(each, end) for each, end in chosen if each.threats == count]
         blasts = np.array([(each.blasts, end) for each, end in chosen]).ravel()
-        reduction = np.repeat([problem.reduction(each) for each, _ in chosen], 2)
+        reduction = np.repeat([each.reduction(problem) for each, _ in chosen], 2)
         axes.plot(blasts, reduction, color=colour, linewidth=2.2, zorder=3)
         starts = [each.blasts for each, _ in chosen]
         axes.plot(
@@ -91,7 +91,7 @@ def _draw_history(axes: Axes, result: SearchResult, problem: DesignProblem) -> N
 def _draw_front(axes: Axes, front: Sequence[Candidate], problem: DesignProblem) -> None:
     """Draw the reduction over the number of modules or, with a catalogue, over the cost."""
     prices = [problem.price(each.layout) for each in front]
-    reduction = [problem.reduction(each) for each in front]
+    reduction = [each.reduction(problem) for each in front]
     axes.step(prices, reduction, where="post", color=unit_interval(QUIET_INK), linewidth=1.0)
     axes.plot(prices, reduction, "o", color=_BEST, markersize=6.0, zorder=3)
     has_items = bool(problem.scenario.zone.items)

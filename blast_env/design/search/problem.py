@@ -1,144 +1,16 @@
 """The contract of proposers (rules, searches and trained agents): problem, progress and result."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BudgetError, Case, Threat
-from blast_env.evaluation.cases import check_distinct
-from blast_env.evaluation.comparison import check_something_arrives
-from blast_env.geometry import Element, Layout, layout_text
-from blast_env.layout import Placement
-from blast_env.layout.placement import met_by_blasts
-from blast_env.runner import check_workers
+from blast_env.evaluation import DesignProblem
+from blast_env.geometry import Layout, layout_text
 from blast_env.site import AnyCharge, Scenario
 from blast_env.statistics import reductions
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
-
-
-@dataclass(eq=False)
-class DesignProblem:
-    """A case to search a layout for, the evaluator that runs its blasts, and their budget.
-
-    Attributes:
-        evaluator: Runs the blasts and caches their loads.
-        case: The scenario and the threats, and how their loads combine into one number. A search
-            may use only the first few threats, so different charges should come first.
-        processes: Worker processes; results do not depend on their number.
-        budget: Most blasts, each a distinct pair of layout and threat; `None` for any number.
-
-    Raises:
-        BlastEnvError: If a threat is repeated, the scenario has no build zone, or `processes` is
-            below 1.
-    """
-
-    evaluator: BlastEvaluator
-    case: Case
-    processes: int = 1
-    budget: int | None = None
-    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        check_distinct(self.case.threats)
-        if self.scenario.build_zone is None:
-            raise BlastEnvError(f"{self.scenario.name} has no build zone: no layout to search for")
-        check_workers("processes", self.processes)
-
-    @property
-    def scenario(self) -> Scenario:
-        """The scenario."""
-        return self.case.scenario
-
-    @property
-    def threats(self) -> tuple[Threat, ...]:
-        """The threats of the case."""
-        return self.case.threats
-
-    @property
-    def stock(self) -> int:
-        """Largest number of modules or pieces in a layout."""
-        return self.scenario.zone.stock
-
-    def price(self, layout: Layout) -> float:
-        """Return the number of modules of a layout or, with a catalogue, the cost of its pieces."""
-        return self.cost(layout) if self.scenario.zone.items else len(layout)
-
-    def cost(self, layout: Layout) -> float:
-        """Return the cost of a legal layout, in the unit of the zone's budget."""
-        return Placement(self.scenario, layout).cost
-
-    @property
-    def told(self) -> AnyCharge | None:
-        """The charge if it is known, that is, the same in all threats; otherwise `None`."""
-        known = set(self.case.charges)
-        return known.pop() if len(known) == 1 else None
-
-    @property
-    def blasts(self) -> int:
-        """Blasts spent, whether cached or not; those of `unprotected` are free."""
-        return len(self._asked)
-
-    def spend(self, pairs: Iterable[tuple[Layout, Threat]]) -> None:
-        """Count blasts that have not been spent before.
-
-        Raises:
-            BudgetError: If the total would exceed the budget; none is counted then.
-        """
-        asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
-        asked |= self._asked
-        if self.budget is not None and len(asked) > self.budget:
-            raise BudgetError(
-                f"the search asks for {len(asked):,} blasts in all, the budget is {self.budget:,}"
-            )
-        self._asked = asked
-
-    def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
-        """Return the load of each blast, in the unit of the scenario's objective.
-
-        Raises:
-            BudgetError: If the blasts exceed the budget.
-            LayoutError: If a layout does not fit the build zone.
-        """
-        self.spend(pairs)
-        return self._free(pairs)
-
-    def _free(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
-        loads = self.evaluator.loads_of_many(pairs, self.processes)
-        return [each.load(self.scenario.objective) for each in loads]
-
-    def load(self, layout: Sequence[Element]) -> float:
-        """Return the load of a layout over all threats, in the unit of the objective.
-
-        Raises:
-            BudgetError: As for `loads`.
-            LayoutError: If the layout does not fit the build zone.
-        """
-        pairs = [(tuple(layout), threat) for threat in self.threats]
-        return self.case.counted(self.loads(pairs), layout)
-
-    @cached_property
-    def unprotected(self) -> tuple[float, ...]:
-        """The load without a barrier, one per threat, in the unit of the objective.
-
-        These blasts are not charged to any budget.
-
-        Raises:
-            BlastEnvError: If nothing arrives: there is nothing to reduce.
-        """
-        bare = self._free([((), threat) for threat in self.threats])
-        check_something_arrives([self.case], np.array(bare))
-        return tuple(bare)
-
-    def reduction(self, candidate: "Candidate") -> float:
-        """Return the relative reduction of the load, under the threats of the candidate."""
-        bare = self.case.counted(self.unprotected[: candidate.threats])
-        return reductions(candidate.load, bare).item()
 
 
 @dataclass(frozen=True)
@@ -158,6 +30,11 @@ class Candidate:
     load: float
     threats: int
     cost: float
+
+    def reduction(self, problem: DesignProblem) -> float:
+        """Return the relative reduction of the load, under the threats of the candidate."""
+        bare = problem.case.counted(problem.unprotected[: self.threats])
+        return reductions(self.load, bare).item()
 
 
 @dataclass(frozen=True)
