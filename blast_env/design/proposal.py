@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from blast_env.calibration import kingery_bulmash
-from blast_env.design.search.problem import DesignProblem, Proposer, Report, SearchResult
+from blast_env.design.search.problem import Proposer, Report, SearchResult
 from blast_env.design.search.registry import find_proposer, layouts_by_rule, proposer_row
 from blast_env.envs.episode import find_realisations
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation import (
+    BlastEvaluator,
+    Case,
+    DesignProblem,
+    SeedRange,
+    Threat,
+    draw_threats,
+)
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal

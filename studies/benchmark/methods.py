@@ -117,7 +117,7 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
 
     torch.manual_seed(seed)
     sobol: Any = torch.quasirandom.SobolEngine(problem.space.keys, scramble=True, seed=seed)  # type: ignore[no-untyped-call]
-    first = max(problem.budget // 5, 4)
+    first = max(problem.most_blasts // 5, 4)
     places = sobol.draw(first, dtype=torch.float64)
     values = torch.tensor([[value(each.numpy())] for each in places], dtype=torch.float64)
     side, won, lost = 0.8, 0, 0
@@ -160,7 +160,7 @@ def mcbo_casmopolitan(problem: BenchmarkProblem, seed: int, value: Value) -> Non
 
     set_random_seed(seed)
     task = mcbo_task(problem)
-    first = max(problem.budget // 5, 4)
+    first = max(problem.most_blasts // 5, 4)
     bo = BO_ALGOS["Casmopolitan"].build_bo(task.get_search_space(), n_init=first)
     while True:
         asked = bo.suggest(1)

@@ -178,9 +178,12 @@ def _front(folder: Path) -> Format:
 def _loads(folder: Path) -> Format:
     cache = DiskCache(folder / "cache")
     key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
-    sums = {"impulse_sim": 5.0, "transferred_impulse_sim": 2.0}
     load = ParticleLoad(
-        *("building", True, 1.0, 0.01, None, 0.0, True), ("a note",), "building", **sums
+        *("building", True, 1.0, 0.01, None, 0.0, True),
+        ("a note",),
+        "building",
+        impulse_sim=5.0,
+        transferred_impulse_sim=2.0,
     )
     cache.add(key, BlastLoads((load,), np.arange(8.0)))
     (path,) = cache.folder.iterdir()

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.design.search.problem import DesignProblem
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.evaluation import BlastEvaluator, Case, Threat
+from blast_env.evaluation import BlastEvaluator, Case, DesignProblem, Threat
 from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk

@@ -8,7 +8,6 @@ from blast_env.design.search.methods import (
 )
 from blast_env.design.search.problem import (
     Candidate,
-    DesignProblem,
     LayoutAgent,
     Progress,
     Proposer,
@@ -25,6 +24,7 @@ from blast_env.design.search.registry import (
     proposers,
 )
 from blast_env.design.search.session import Plan, Search, SearchSession
+from blast_env.evaluation import DesignProblem
 from blast_env.geometry import Layout
 
 __all__ = [

@@ -14,10 +14,9 @@ from typing import Final
 import numpy as np
 
 from blast_env.design.search.moves import Moves, legal_part
-from blast_env.design.search.problem import DesignProblem
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BudgetError
+from blast_env.evaluation import BudgetError, DesignProblem
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import Placement
 from blast_env.layout.placement import met_by_blasts

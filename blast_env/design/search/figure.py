@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from blast_env.design.search.problem import Candidate, DesignProblem, SearchResult
+from blast_env.design.search.problem import Candidate, SearchResult
+from blast_env.evaluation import DesignProblem
 from blast_env.geometry import layout_counts
 from blast_env.plots.plan import QUIET_INK
 from blast_env.plots.site_plan import write_heading

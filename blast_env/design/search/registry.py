@@ -10,8 +10,9 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, Final
 
-from blast_env.design.search.problem import DesignProblem, Proposer, Report, SearchResult
+from blast_env.design.search.problem import Proposer, Report, SearchResult
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import DesignProblem
 from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario

@@ -9,8 +9,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.design.search.problem import Candidate, DesignProblem, Progress, Report, SearchResult
+from blast_env.design.search.problem import Candidate, Progress, Report, SearchResult
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import DesignProblem
 from blast_env.geometry import Layout
 from blast_env.layout.placement import met_by_blasts
 from blast_env.values import generator

@@ -11,7 +11,6 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.design.search.moves import Moves
 from blast_env.design.search.problem import (
-    DesignProblem,
     Progress,
     Report,
     SamplingAgent,
@@ -23,7 +22,7 @@ from blast_env.design.surrogate.correction import Correction
 from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, Threat
+from blast_env.evaluation import Case, DesignProblem, Threat
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import UnknownNameError
 from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.site import Scenario, save_scenario
@@ -83,12 +83,6 @@ def test_a_run_that_has_begun_takes_no_recorder(result: GasResult) -> None:
     assert loads is not None
     with pytest.raises(ValueError, match="record before the first"):
         result.run.record(loads.recorder)
-
-
-def test_particles_say_that_they_have_no_bays() -> None:
-    result = blast_env.simulate(site(FACADE), engine="event", charge=CHARGE)
-    with pytest.raises(BlastEnvError, match="no overpressure"):
-        _ = result.bays
 
 
 @pytest.mark.parametrize("until_s", [1e-6, 1e-3])

@@ -101,9 +101,3 @@ def test_modules_are_pieces_and_walls_as_high_as_the_air_are_none() -> None:
 def test_wrong_values_are_named(keys: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
         yard(items=[ITEMS[0] | keys, *ITEMS[1:]])
-
-
-def test_particles_push_no_piece() -> None:
-    found = blast_env.simulate("courtyard", engine="event")
-    with pytest.raises(BlastEnvError, match="no overpressure"):
-        _ = found.pieces
