@@ -14,6 +14,7 @@ def test_an_example_runs_and_prints_a_result(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(path), "16"])  # the budget of those that take one
     runpy.run_path(str(path), run_name="__main__")
     assert "%" in capsys.readouterr().out
 

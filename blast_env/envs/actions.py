@@ -1,28 +1,34 @@
-"""Action spaces: an action gives a complete placement, or the item first and then its place."""
+"""Action spaces: an action gives a complete placement, or a part of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import BoolArray, IntArray
+from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.geometry import Element
-from blast_env.site import Catalogue
+from blast_env.site import AnySource, Catalogue, Scenario
+from blast_env.site.zone import source_bounds_m
+from blast_env.units import MODULE_SIDE_M
 from blast_env.values import whole_number
 
 
 class Actions(Protocol):
     """A kind of action space: the sequence of choices that makes up a placement."""
 
-    def choices(self, catalogue: Catalogue) -> tuple[IntArray, ...]:
+    def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
         """Return the choices that lead to a variant and its lower left cell.
+
+        The number of options depends on the catalogue alone.
 
         Returns:
             For each choice, the index from 0 of the option that contains each variant and cell
-            (variants, rows, columns). One option per choice determines a single placement.
+            (variants, rows, columns). Of several placements that all choices leave, the one nearest
+            to the line of sight is taken.
         """
 
 
@@ -30,8 +36,9 @@ class Actions(Protocol):
 class PlaceAtOnce:
     """One action per placement: a variant and its lower left cell, as `Catalogue` numbers them."""
 
-    def choices(self, catalogue: Catalogue) -> tuple[IntArray, ...]:
+    def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
         """Return the only choice."""
+        catalogue = scenario.zone.catalogue
         return (np.arange(catalogue.finish).reshape(-1, *catalogue.shape),)
 
 
@@ -55,8 +62,9 @@ class ItemThenPlace:
         if self.block_cells is not None:
             whole_number("block_cells", self.block_cells, 1, 1000)
 
-    def choices(self, catalogue: Catalogue) -> tuple[IntArray, ...]:
+    def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
         """Return two choices, or three with blocks, without those that have a single option."""
+        catalogue = scenario.zone.catalogue
         variant, row, column = np.indices((len(catalogue.variants), *catalogue.shape))
         rows, columns = catalogue.shape
         side = self.block_cells or max(rows, columns, 1)
@@ -65,11 +73,77 @@ class ItemThenPlace:
         return tuple(each for each in (variant, block, cell) if each.any()) or (cell,)
 
 
+@dataclass(frozen=True)
+class RowAcrossSight:
+    """The variant and a row of cells across the line of sight, without the place in it.
+
+    A row is a column or a row of the build zone: whichever lies more across the line from the mean
+    place of the charge to the protected structures. There are as many rows as the shorter side of
+    the zone has cells. The same action again and again thus builds a straight wall, from the line
+    of sight outwards. Little has to be learnt, but not every layout can be built.
+    """
+
+    def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
+        """Return the only choice."""
+        catalogue = scenario.zone.catalogue
+        variant, *cells = np.indices((len(catalogue.variants), *catalogue.shape))
+        axis = int(_sight(scenario, scenario.charge).is_along_x)
+        count = min(catalogue.shape)
+        return (variant * count + cells[axis] * count // max(catalogue.shape[axis], 1),)
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """The line from the mean place of a charge to the mean of the protected structures' centres.
+
+    Attributes:
+        start_m: The place.
+        along: The vector to the structures, m.
+    """
+
+    start_m: FloatArray
+    along: FloatArray
+
+    @property
+    def is_along_x(self) -> bool:
+        return bool(abs(self.along[0]) >= abs(self.along[1]))
+
+    def beside_m(self, scenario: Scenario) -> FloatArray:
+        """Return the distance of each placement's centre from the line, along a row of cells."""
+        variants = scenario.zone.catalogue.variants
+        half_m = (
+            MODULE_SIDE_M / 2.0 * np.array([(each.columns - 1, each.rows - 1) for each in variants])
+        )
+        centres_m = np.stack(scenario.zone.centres_m)
+        from_start_m = centres_m[:, np.newaxis] + half_m.T[..., np.newaxis, np.newaxis]
+        from_start_m = from_start_m - self.start_m[:, np.newaxis, np.newaxis, np.newaxis]
+        ahead, aside = (0, 1) if self.is_along_x else (1, 0)
+        slope = self.along[aside] / self.along[ahead] if self.along[ahead] else 0.0
+        beside_m: FloatArray = np.abs(from_start_m[aside] - slope * from_start_m[ahead])
+        return beside_m.round(9)  # equal on both sides, whatever the rounding
+
+
+def _sight(scenario: Scenario, sources: Sequence[AnySource]) -> _Sight:
+    protected = [each for each in scenario.structures if each.protected]
+    places = _mean(
+        [source_bounds_m(each).centre for each in sources], [each.weight for each in sources]
+    )
+    target = _mean(
+        [each.rectangle_m.centre for each in protected], [each.weight for each in protected]
+    )
+    return _Sight(places, target - places)
+
+
+def _mean(places_m: Sequence[tuple[float, float]], weights: Sequence[float]) -> FloatArray:
+    return np.average(np.array(places_m), axis=0, weights=weights)
+
+
 ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
     {
         "place": PlaceAtOnce(),
         "item_then_place": ItemThenPlace(),
         "item_then_block": ItemThenPlace(block_cells=8),
+        "row": RowAcrossSight(),
     }
 )
 """The action spaces, by their names."""
@@ -96,24 +170,43 @@ class NumberedActions:
     """The numbered actions for a catalogue: the options of each choice in turn, then to finish.
 
     Attributes:
-        catalogue: The catalogue of modules or pieces.
+        scenario: The scenario.
+        sources: The place of the charge, or its possible places.
         choices: See `Actions.choices`.
         first: The first action of each choice (choices,).
         finish: The action that finishes; the others are below it.
     """
 
-    catalogue: Catalogue
+    scenario: Scenario
+    sources: tuple[AnySource, ...]
     choices: tuple[IntArray, ...]
     first: tuple[int, ...]
     finish: int
 
     @classmethod
-    def of(cls, actions: Actions, catalogue: Catalogue) -> "NumberedActions":
-        """Return the actions for a catalogue."""
-        choices = actions.choices(catalogue)
+    def of(
+        cls, actions: Actions, scenario: Scenario, sources: tuple[AnySource, ...] = ()
+    ) -> "NumberedActions":
+        """Return the actions for a scenario.
+
+        Args:
+            actions: The kind of action space.
+            scenario: The scenario.
+            sources: The place of the charge as shown to the agent; by default all of the scenario.
+        """
+        choices = actions.choices(scenario)
         counts = [int(each.max(initial=-1)) + 1 for each in choices]
         *first, finish = np.cumsum([0, *counts]).tolist()
-        return cls(catalogue, choices, tuple(first), finish)
+        return cls(scenario, sources or scenario.charge, choices, tuple(first), finish)
+
+    @property
+    def catalogue(self) -> Catalogue:
+        """The catalogue of modules or pieces."""
+        return self.scenario.zone.catalogue
+
+    @cached_property
+    def _beside_m(self) -> FloatArray:
+        return _sight(self.scenario, self.sources).beside_m(self.scenario)
 
     def mask(self, chosen: ActionChoice) -> NDArray[np.bool_]:
         """Return the mask of legal actions (actions,); finishing is legal before the first choice.
@@ -149,6 +242,8 @@ class NumberedActions:
             made += 1
         first = int(possible.argmax())
         if made == len(self.choices):
+            if np.count_nonzero(possible) > 1:
+                first = int(np.where(possible, self._beside_m, np.inf).argmin())
             return self.catalogue.element(first)
         possible.flags.writeable = False
         options = tuple(int(each.flat[first]) for each in self.choices[:made])

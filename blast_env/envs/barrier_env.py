@@ -60,6 +60,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     orientation, or a module of 0.5 m. Cells count row by row from the lower left corner. The last
     action finishes. `action_masks()` has the legal ones, `explain(element)` why a placement is not
     legal. With `action="item_then_place"` or `"item_then_block"` the variant comes before the cell.
+    `action="row"` has few actions: a variant and a row across the line of sight, whose legal place
+    nearest to the line is taken.
     An illegal action places the same item on the nearest legal cell (`invalid_action="nearest"`).
 
     ## Observation space
@@ -144,7 +146,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
             observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts per charge),
                 `"features"`, or an `Observation`.
-            action: `"place"`, `"item_then_place"`, `"item_then_block"`, or `Actions`.
+            action: `"place"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: Number of hidden charges per episode; default 16.
             realisations: Number of blasts per charge; default 2 for a visible charge, 1 for
@@ -196,7 +198,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             evaluators=Evaluators(found, cache),
         )
         self.task.evaluators.of(representative)  # an unsuitable engine fails here, not later
-        numbered = NumberedActions.of(self.task.actions, representative.zone.catalogue)
+        numbered = NumberedActions.of(self.task.actions, representative)
         self.action_space = spaces.Discrete(numbered.finish + 1)
         self.observation_space = self.task.observation.space(representative)
         if isinstance(self.observation_space, spaces.Dict):

@@ -334,7 +334,7 @@ class Task:
             observation=self.observation.episode(observable),
             initial=placement.checked,
             placement=placement,
-            actions=NumberedActions.of(self.actions, placement.catalogue),
+            actions=NumberedActions.of(self.actions, scenario, observable.sources),
         )
 
     def _case(

@@ -1,7 +1,6 @@
 """Action spaces that choose step by step: the same layouts and rewards as place by place."""
 
 import pickle
-from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -36,7 +35,7 @@ def yard_env(**arguments: Any) -> BlastBarrierEnv:
 
 
 def numbered(name: str, scenario: Scenario) -> NumberedActions:
-    return NumberedActions.of(ACTIONS[name], scenario.zone.catalogue)
+    return NumberedActions.of(ACTIONS[name], scenario)
 
 
 def actions_for(actions: NumberedActions, placement: Placement, element: Element) -> list[int]:
@@ -54,20 +53,23 @@ def actions_for(actions: NumberedActions, placement: Placement, element: Element
 
 
 def test_there_are_as_many_actions_as_items_and_places() -> None:
-    assert [numbered(name, yard()).finish for name in ACTIONS] == [4 * 84, 4 + 84, 4 + 2 + 48]
+    counts = [4 * 84, 4 + 84, 4 + 2 + 48, 4 * 6]
+    assert [numbered(name, yard()).finish for name in ACTIONS] == counts
     assert yard_env(action="item_then_place").action_space == gym.spaces.Discrete(4 + 84 + 1)
-    large = replace(yard().zone.catalogue, shape=(112, 43))
+    zone = yard().zone.model_copy(update={"rows": 112, "columns": 43})
+    large = yard().model_copy(update={"build_zone": zone})
     assert [NumberedActions.of(each, large).finish for each in ACTIONS.values()] == [
         4 * 4816,
         4 + 4816,
         4 + 14 * 6 + 64,
+        4 * 43,
     ]
     # Without a catalogue there is no item to choose, and 8 x 5 cells are one block.
-    assert [numbered(name, small_scenario()).finish for name in ACTIONS] == [40, 40, 40]
+    assert [numbered(name, small_scenario()).finish for name in ACTIONS] == [40, 40, 40, 5]
 
 
 @pytest.mark.parametrize("scenario", [yard(), glazed_yard(), small_scenario()])
-@pytest.mark.parametrize("name", list(ACTIONS))
+@pytest.mark.parametrize("name", ["place", *BY_CHOICE])
 def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Scenario) -> None:
     """By the masks, from an empty zone and from one in which something stands."""
     actions = numbered(name, scenario)
@@ -94,7 +96,7 @@ def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Sce
 
 def paid(env: BlastBarrierEnv, layout: Layout) -> tuple[list[float], dict[str, Any]]:
     env.reset(seed=0)
-    actions, rewards = NumberedActions.of(env.task.actions, env.placement.catalogue), []
+    actions, rewards = NumberedActions.of(env.task.actions, env.placement.scenario), []
     for element in layout:
         for action in actions_for(actions, env.placement, element):
             _, reward, ended, _, info = env.step(action)
@@ -157,7 +159,7 @@ def test_a_measure_needs_no_place() -> None:
     )
 
 
-@pytest.mark.parametrize("name", BY_CHOICE)
+@pytest.mark.parametrize("name", [*BY_CHOICE, "row"])
 def test_it_is_a_sound_environment(name: str) -> None:
     env = make(action=name, observation="features")
     check_env(env, skip_render_check=True)
@@ -176,6 +178,40 @@ def test_a_strategy_of_ones_own_is_taken_and_a_wrong_one_is_told() -> None:
         make(action=3)
     with pytest.raises(BlastEnvError, match="block_cells is 0, must be"):
         ItemThenPlace(block_cells=0)
+
+
+# --- Rows across the line of sight.
+
+
+def test_the_same_row_again_builds_a_straight_wall_from_the_line_of_sight_outwards() -> None:
+    env, first = make(blocks_scenario(), action="row", observation="features"), []
+    for y_m in (9.0, 7.5):
+        env.reset(seed=0, options={"charge_position_m": (3.0, y_m)})
+        for _ in range(3):  # the stock
+            env.step(2)
+        assert {column for _, column in env.placement.cells} == {2}
+        rows = [row for row, _ in env.placement.cells]
+        assert sorted(rows) == [*range(min(rows), min(rows) + 3)]
+        assert abs(rows[1] - rows[0]) == abs(rows[2] - rows[0]) == 1
+        first.append(rows[0])
+    assert first[1] < first[0]  # the line of sight has turned with the charge
+
+
+def test_a_row_of_pieces_has_no_gap() -> None:
+    env = yard_env(action="row")
+    env.reset(seed=0)
+    turned = 1  # the wall, along the columns of the zone
+    for _ in range(3):
+        env.step(turned * 6 + 1)
+    assert sorted(env.placement.layout) == [(row, 1, "wall", True) for row in (2, 5, 8)]
+
+
+def test_a_full_row_means_the_nearest_row() -> None:
+    env = make(blocks_scenario(keep_outs=[{**KEEP_OUT, "size_m": (1.0, 7.0)}]), action="row")
+    env.reset(seed=0)
+    assert env.action_masks()[:3].tolist() == [False, False, True]
+    _, _, _, _, info = env.step(0)
+    assert (env.placement.cells[0][1], info["illegal_actions"]) == (2, 1)
 
 
 # --- Illegal actions.
