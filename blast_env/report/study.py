@@ -426,7 +426,11 @@ class Runs:
         self.notes: list[str] = []
         self.digests: list[tuple[str, str]] = []
         self._found: dict[tuple[Cells, bool], list[Consequences]] = {}
-        self._evaluator = BlastEvaluator(scenario, options.coarse, cache=options.cache)
+        self._evaluators = {
+            size: BlastEvaluator(scenario, GasEngine.with_cells(size), cache=options.cache)
+            for size in options.sizes
+        }
+        self._evaluator = self._evaluators[options.cells[0]]
 
     def run_threats(self) -> None:
         """Run every threat with both sizes of cells, without and with the layout.
@@ -478,8 +482,8 @@ class Runs:
         measured = measure(blast, self.targets, partial(self.progress, label))
         self.notes += [f"{label}: {note}" for note in measured.notes]
         self.digests.append((label, measured.result.digest))
-        if cells == self.options.cells[0]:
-            self._evaluator.keep(layout, Threat(threat.charge, 0), measured.result.loads())
+        loads = measured.result.loads()
+        self._evaluators[cells].keep(layout, Threat(threat.charge, 0), loads)
         return measured
 
     def _pairs(

@@ -492,3 +492,6 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
         )
         assert one == other
     assert kept.blasts == 0
+    fine = BlastEvaluator(small_hut(), GasEngine.with_cells(options.cells[1]), cache=tmp_path)
+    fine.loads_of_many([((), threat), (LAYOUT, threat)])
+    assert fine.blasts == 0  # an evaluation after the report has them too
