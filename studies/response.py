@@ -5,12 +5,11 @@
 
 from collections.abc import Iterator
 from itertools import product
-from math import atan2, degrees, pi, sin
+from math import atan2, degrees, pi
 from typing import Annotated, Final
 
 import numpy as np
 import typer
-from scipy.integrate import solve_ivp
 
 from blast_env.arrays import FloatArray
 from blast_env.calibration import kingery_bulmash
@@ -66,21 +65,6 @@ def non_factored_loads() -> Iterator[Row]:
         yield pane, f"{load_kpa:.2f}", f"{own_kpa:.2f}", f"{own_kpa / load_kpa:.3f}"
 
 
-def load_factors() -> Iterator[Row]:
-    """Yield one row per duration: dynamic load factor of a triangle, closed and integrated."""
-    system = System(100.0, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, 1e12))
-    period = system.period_s
-    for share in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0):
-        td, w = share * period, 2.0 * np.pi / period
-        t = np.linspace(0.0, td + period, 200_001)
-        loaded = 1.0 - np.cos(w * t) + np.sin(w * t) / (w * td) - t / td
-        free = (np.sin(w * t) - np.sin(w * (t - td))) / (w * td) - np.cos(w * t)
-        closed = float(np.where(t <= td, loaded, free).max())
-        found = responses([system], np.array([0.0, td]), np.array([[_STATIC_PA, 0.0]]))
-        own = float(found.peak_m[0]) * _STIFFNESS_PA_M / _STATIC_PA
-        yield f"{share:g}", f"{closed:.3f}", f"{own:.3f}"
-
-
 def halved_peaks(impulse_pa_s: float = 60.0) -> Iterator[Row]:
     """Yield one row per pane: probability of breakage at two peaks of the same impulse."""
     for thickness_mm in (3.78, 5.56, 9.02):
@@ -92,56 +76,6 @@ def halved_peaks(impulse_pa_s: float = 60.0) -> Iterator[Row]:
             found = glazing_responses([pane], np.array([0.0, end_s, 2.0 * end_s]), history)
             shares.append(f"{100.0 * float(found.break_probability[0]):.1f} %")
         yield f"{thickness_mm:g} mm, 1.2 x 1.5 m", *shares
-
-
-def step_and_ramp_factors() -> Iterator[Row]:
-    """Yield one row per sustained load: dynamic load factor in closed form and integrated."""
-    system = System(100.0, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, 1e12))
-    for share in (0.0, 0.25, 0.75, 1.5, 3.2):
-        closed = 2.0 if share == 0.0 else 1.0 + abs(sin(pi * share)) / (pi * share)
-        rise_s, end_s = share * system.period_s, (share + 4.0) * system.period_s
-        times = [0.0, end_s] if share == 0.0 else [0.0, rise_s, end_s]
-        load = [_STATIC_PA] * 2 if share == 0.0 else [0.0, _STATIC_PA, _STATIC_PA]
-        found = responses([system], np.array(times), np.array([load]))
-        own = float(found.peak_m[0]) * _STIFFNESS_PA_M / _STATIC_PA
-        yield ("step" if share == 0.0 else f"ramp, {share:g}"), f"{closed:.3f}", f"{own:.3f}"
-
-
-def ductilities() -> Iterator[Row]:
-    """Yield one row per point of Biggs' chart of triangles: ductility by scipy, and here.
-
-    The last two rows are its asymptotes: an impulse, by energy, and a sudden sustained load, by
-    work.
-    """
-    mass = 100.0
-    for resistance, share in product((0.3, 0.5, 0.8, 1.2), (0.2, 0.6, 2.0)):
-        cap = resistance * _STATIC_PA
-        system = System(mass, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, cap))
-        td, yield_m = share * system.period_s, cap / _STIFFNESS_PA_M
-
-        def motion(
-            t: float, state: FloatArray, td: float = td, yield_m: float = yield_m
-        ) -> list[float]:
-            _, v, elastic = state
-            load = max(_STATIC_PA * (1.0 - t / td), 0.0)
-            yields = (elastic >= yield_m and v > 0.0) or (elastic <= -yield_m and v < 0.0)
-            return [v, (load - _STIFFNESS_PA_M * elastic) / mass, 0.0 if yields else v]
-
-        ends, step = td + 5.0 * system.period_s, system.period_s / 2000.0
-        solved = solve_ivp(motion, (0.0, ends), [0.0] * 3, max_step=step, rtol=1e-8)
-        found = responses([system], np.array([0.0, td]), np.array([[_STATIC_PA, 0.0]]))
-        own = float(found.peak_m[0]) / yield_m
-        point = f"resistance {resistance:g} of the peak, duration {share:g} of the period"
-        yield point, f"{solved.y[0].max() / yield_m:.2f}", f"{own:.2f}"
-    cap, yield_m = 1e4, 1e4 / _STIFFNESS_PA_M
-    system = System(mass, 1.0, Resistance.elastic_plastic(_STIFFNESS_PA_M, cap))
-    impulse, short_s = float(np.sqrt(2.0 * mass * cap * yield_m * 4.5)), system.period_s / 500.0
-    load = np.array([[2.0 * impulse / short_s, 0.0]])
-    own = float(responses([system], np.array([0.0, short_s]), load).peak_m[0]) / yield_m
-    yield "impulse of ductility 5, by energy", "5.00", f"{own:.2f}"
-    load = np.full((1, 2), 0.8 * cap)
-    own = float(responses([system], np.array([0.0, 60.0 * system.period_s]), load).peak_m[0])
-    yield "sudden load of 0.8 of the resistance that stays, by work", "2.50", f"{own / yield_m:.2f}"
 
 
 BEAM_LOAD: Final = (
@@ -348,12 +282,6 @@ def tables() -> None:
     """Print the tables that need no blast."""
     loads = ("annealed pane, least thickness", "E1300, kPa", "here, kPa", "ratio")
     print_line(markdown_table(loads, non_factored_loads()))
-    factors = ("duration over period", "closed form", "here")
-    print_line("\n" + markdown_table(factors, load_factors()))
-    stays = ("load that stays, rise over period", "closed form", "here")
-    print_line("\n" + markdown_table(stays, step_and_ramp_factors()))
-    charts = ("elastic-plastic system", "ductility", "here")
-    print_line("\n" + markdown_table(charts, ductilities()))
     peaks = ("annealed pane, 60 Pa s", "break, 8 kPa", "break, 4 kPa")
     print_line("\n" + markdown_table(peaks, halved_peaks()))
     beam = ("steel under the face", "strength over the static one", "deflection, mm")
