@@ -31,7 +31,7 @@ from blast_env.site.scene import Charge
 from blast_env.tables import markdown_table
 
 SITES: Final = ("guard_post", "clinic_front")
-MANY_BAYS: Final = "car_park"
+MANY_BAYS: Final = "street_front"
 FOUND: Final = Path(__file__).parent.parent / "docs" / "data" / "best_found"
 _LEAST: Final = 0.1  # of the largest impulse, for a bay to count
 

@@ -49,7 +49,7 @@ from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_e
 from blast_env.evaluation.comparison import Comparison
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.engines.contract import BlastLoads
-from blast_env.evaluation.grid_error import GridError, points, with_errors
+from blast_env.evaluation.grid_error import GridError, points, with_errors, worse
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.io.export import LayoutPlan, check_target, export_layouts, is_file
@@ -346,7 +346,7 @@ def impulse_text(error: GridError) -> str:
         return f"{words}: {walled}"
     gone = reductions(*map(impulse_of, error.fine)).item()
     share = with_errors(percent(gone), points(error.of_reduction(impulse_of)))
-    return f"{words}: {bare} without barrier, {walled} with, reduction {share}"
+    return f"{words}: {bare} without barrier, {walled} with, reduction {share}{worse(gone)}"
 
 
 def _number(load: float, error: float) -> str:
@@ -397,7 +397,8 @@ def print_means(
         sampled: The samples of the intervals.
     """
     reduction = share_text(comparison.reduction, comparison.reduction_error, sampled)
-    print_line(f"protected structures, by weight: mean reduction {reduction}")
+    words = worse(comparison.reduction.value)
+    print_line(f"protected structures, by weight: mean reduction {reduction}{words}")
     share = f"{100.0 * (1.0 - comparison.cvar_level):.3g} %"
     bare_error, bare_cvar = comparison.unprotected_mean_error, comparison.unprotected_cvar
     for words, load, error, cvar in (

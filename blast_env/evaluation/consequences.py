@@ -21,7 +21,6 @@ reflected pressure round the edges of a small wall, and coarse cells underestima
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import cbrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -36,7 +35,7 @@ from blast_env.evaluation.engines.oblique_walls import STEPPED, stepped_building
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.places import BayPlaces, bay_places
-from blast_env.evaluation.standing import Stood, standing_of
+from blast_env.evaluation.standing import Stood, bay_standings
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element, Layout
 from blast_env.layout.build_scene import charge_against
@@ -73,8 +72,6 @@ _CLIPPED: Final = (
     " Bulmash's sharp peaks of the same impulse: use smaller cells"
 )
 
-_OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal
-
 _BREACH: Final = "so close that walls may be breached: the response covers bending only"
 
 
@@ -109,18 +106,9 @@ class BuildingResponse:
     @cached_property
     def standings(self) -> tuple[Stood, ...]:
         """The standing of the load on each bay."""
-        places, scale = self.places, cbrt(self.charge.tnt_kg)
-        cells = cells_of(self.peak_factor)
-        return tuple(
-            standing_of(
-                float(distance_m) / scale,
-                bool(seen),
-                cells,
-                self.known.get(each.bay.name, True),
-                each.bay.line is not None and min(map(abs, each.bay.line.normal)) > _OBLIQUE,
-            )
-            for each, distance_m, seen in zip(self.on_cells.bays, *places, strict=True)
-        )
+        assert self.site is not None, "the response was made without a site"
+        bays = [each.bay for each in self.on_cells.bays]
+        return bay_standings(self.site, bays, cells_of(self.peak_factor), self.known)
 
     @property
     def deciding_bay(self) -> int:
@@ -429,12 +417,7 @@ CASE_COLUMNS: Final = (
 )
 """The first columns in tables of bays and of pieces under several charges."""
 
-BAY_CASE_COLUMNS: Final = (
-    *CASE_COLUMNS,
-    *LOADED_BAY_COLUMNS,
-    Column("standing", "", "of the load: measured, verified, approximate or outside"),
-    Column("reason", "", "reason for the standing"),
-)
+BAY_CASE_COLUMNS: Final = (*CASE_COLUMNS, *LOADED_BAY_COLUMNS)
 """The columns of `bay_table`."""
 
 

@@ -36,6 +36,8 @@ FACTOR: Final = 3.0
 RATIO: Final = 2.0
 """Ratio of the sizes of the cells of an engine and of its `Engine.coarser`."""
 
+_SHOWN: Final = 0.0005  # the least share that is not printed as 0.0 %
+
 LoadOf: TypeAlias = Callable[[BlastLoads], float]
 """Selects a number from the loads of a blast: that of a building, or the objective."""
 
@@ -195,3 +197,8 @@ def with_errors(value: str, cells: str = "", sampled: str = "") -> str:
 def points(error: float) -> str:
     """Return an error of a share in percentage points; empty for NaN."""
     return "" if isnan(error) else f"{100.0 * error:.1f}"
+
+
+def worse(reduction: float) -> str:
+    """Return words on a negative reduction, in brackets; empty for any other."""
+    return " (the barrier makes it worse)" if reduction <= -_SHOWN else ""

@@ -8,10 +8,24 @@
 | outside | a scaled distance without comparison, or an impulse not captured |
 """
 
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import NamedTuple
+from math import cbrt
+from typing import Final, NamedTuple
 
+from blast_env.evaluation.places import bay_places
 from blast_env.gas.settings import CHECKED_CELLS, CHECKED_SCALED_DISTANCE
+from blast_env.response.facade import Bay
+from blast_env.site.scene import BlastSite
+from blast_env.tables import Column
+
+STANDING_COLUMNS: Final = (
+    Column("standing", "", "of the load: measured, verified, approximate or outside"),
+    Column("reason", "", "reason for the standing"),
+)
+"""The standing of the load of a row."""
+
+_OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal
 
 
 class Standing(IntEnum):
@@ -71,3 +85,27 @@ def standing_of(
     if not is_seen:
         return Stood(Standing.VERIFIED, "in the shade: compared with experiments and other codes")
     return Stood(Standing.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse")
+
+
+def bay_standings(
+    site: BlastSite, bays: Sequence[Bay], cells: float, known: Mapping[str, bool]
+) -> tuple[Stood, ...]:
+    """Return the standings of the loads on bays.
+
+    Args:
+        site: The site with its charge, structures and barrier.
+        bays: The bays.
+        cells: Cells per m/kg^(1/3) of the charge.
+        known: Whether the loads on bays are known, by bay; those that are not named are.
+    """
+    places, scale = bay_places(site, bays), cbrt(site.charge.tnt_kg)
+    return tuple(
+        standing_of(
+            float(distance_m) / scale,
+            bool(seen),
+            cells,
+            known.get(each.name, True),
+            each.line is not None and min(map(abs, each.line.normal)) > _OBLIQUE,
+        )
+        for each, distance_m, seen in zip(bays, *places, strict=True)
+    )

@@ -18,7 +18,7 @@ from blast_env.evaluation.capacity import mass_near
 from blast_env.evaluation.consequences import verdict_word
 from blast_env.evaluation.engines.bays import bay_rows
 from blast_env.evaluation.engines.pieces import outcome_words
-from blast_env.evaluation.grid_error import FACTOR, ORDER
+from blast_env.evaluation.grid_error import FACTOR, ORDER, worse
 from blast_env.evaluation.probability import level_probability, probability_text
 from blast_env.files import scratch_folder, write_atomically
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -491,8 +491,7 @@ def _css(text: str) -> Markup:
 
 def _gone(share: float) -> str:
     """Return a reduction; a negative one in words."""
-    worse = " (the barrier makes it worse)" if share <= -0.0005 else ""
-    return _percent(share) + worse
+    return _percent(share) + worse(share)
 
 
 def _points(share: float) -> str:

@@ -14,6 +14,7 @@ from blast_env.evaluation.grid_error import (
     final_engine,
     points,
     with_errors,
+    worse,
 )
 from blast_env.site import load_scenario
 from blast_env.statistics import reductions
@@ -134,3 +135,8 @@ def test_several_cases_have_that_of_the_worst_charge() -> None:
     assert coarser.blasts == 2
     assert 0.0 < found.reduction_error < 0.05
     assert 0.0 < found.mean_error < 0.1 * found.mean.value
+
+
+@pytest.mark.parametrize(("reduction", "says"), [(-0.02, True), (-0.0004, False), (0.3, False)])
+def test_a_barrier_that_adds_load_is_called_worse(reduction: float, says: bool) -> None:
+    assert ("makes it worse" in worse(reduction)) is says

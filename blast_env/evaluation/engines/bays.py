@@ -7,6 +7,7 @@ touches, as in a wall between two parts of a building, have none and are left ou
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import cbrt
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas_tables import KNOWN_COLUMN
+from blast_env.evaluation.standing import STANDING_COLUMNS, bay_standings
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
@@ -52,7 +54,7 @@ BAY_COLUMNS: Final = (
 )
 """One row per bay; values for components that a bay lacks are empty."""
 
-LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN)
+LOADED_BAY_COLUMNS: Final = (*BAY_COLUMNS, KNOWN_COLUMN, *STANDING_COLUMNS)
 """One row per bay under a blast."""
 
 
@@ -145,7 +147,14 @@ class BayLoads:
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
         known = self.known(run)
-        rows = [row | {"known": known[str(row["bay"])]} for row in bay_rows(self.response)]
+        cells = cbrt(run.site.charge.tnt_kg) / run.grid.cell_m
+        standings = bay_standings(run.site, [each.bay for each in self.bays], cells, known)
+        rows = [
+            row
+            | {"known": known[str(row["bay"])]}
+            | {"standing": stood.standing.label, "reason": stood.reason}
+            for row, stood in zip(bay_rows(self.response), standings, strict=True)
+        ]
         return table_of(rows, LOADED_BAY_COLUMNS)
 
     def known(self, run: "GasRun") -> dict[str, bool]:
