@@ -397,7 +397,7 @@ def test_a_report_that_is_stopped_has_what_was_done(
     assert not re.search(r"\b(coarse|fine) m\b", page)
     shown = f"{100.0 * stopped.pairs[-1].reduction:.1f} %"
     error = f"{shown} \N{PLUS-MINUS SIGN} {100.0 * stopped.grid_error:.1f}"
-    assert (error in page) == ("\N{PLUS-MINUS SIGN}" in page) == (cells[0] != cells[1])
+    assert (error in page) == (cells[0] != cells[1])
 
 
 @pytest.mark.usefixtures("_without_pictures")
