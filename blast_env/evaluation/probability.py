@@ -33,7 +33,7 @@ from blast_env.evaluation.grid_error import GridError
 from blast_env.evaluation.scaling import MASS_RANGE, load_factors
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
-from blast_env.response.facade import LoadDraws, drawn_levels, respond
+from blast_env.response.facade import LoadDraws, drawn_levels, pushes, respond
 from blast_env.response.sdof import impulses
 from blast_env.values import generator
 
@@ -236,7 +236,7 @@ class _Component:
         filled, own_pa = facade.bays[self.index], facade.pressure_pa[self.index]
         filled = replace(filled, wall=None) if self.is_window else replace(filled, glazing=None)
         found = []
-        for pressure_pa in (np.maximum(own_pa, 0.0), own_pa):
+        for pressure_pa in (pushes(facade.time_s, own_pa[np.newaxis])[0], own_pa):
             for each in {max(factor, 1.0), 1.0}:
                 times_s = facade.time_s / each
                 done = respond([filled], times_s, each * pressure_pa[np.newaxis])

@@ -476,7 +476,7 @@ def respond(
     walled = [index for index, each in enumerate(bays) if each.wall is not None]
     panes = _panes(bays)
     panels = _panels(bays)
-    pushed_pa = _pushes(time_s, pressure_pa)
+    pushed_pa = pushes(time_s, pressure_pa)
     return FacadeResponse(
         bays=tuple(bays),
         time_s=time_s,
@@ -537,7 +537,7 @@ def drawn_levels(
     return np.asarray(4 - np.minimum(damage, 4.0).astype(np.int64))
 
 
-def _pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
+def pushes(time_s: FloatArray, pressure_pa: FloatArray) -> FloatArray:
     """Return the histories without suction, until the maximum of each one's impulse."""
     last = impulses(time_s, pressure_pa).argmax(axis=-1)
     counts = np.arange(len(time_s)) <= last[:, np.newaxis]
