@@ -15,7 +15,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.site import Scenario, save_scenario
 from tests.gas_sites import glazed_hut
 
-FACADE = {"storey_m": 2.0, "glazing": "low", "wall": "brick_215"}
+FACADE = {"storeys": 2, "glazing": "low", "wall": "brick_215"}
 LOW = {"kind": "glazing", "title": "low window", "source": "made up", "thickness_mm": 3.78}
 LOW |= {"width_m": 0.9, "height_m": 0.8, "sill_m": 0.5}
 CHARGE = blast_env.Charge((2.0, 8.5), 5.0)
