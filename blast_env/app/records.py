@@ -169,7 +169,7 @@ class Picture(Kept):
     label: str
 
 
-class Verdict(Kept):
+class BuildingVerdict(Kept):
     """The response of a building with a facade to a blast.
 
     Attributes:

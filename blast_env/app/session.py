@@ -17,10 +17,10 @@ from blast_env.app.jobs import Workers, jobs_of, settle
 from blast_env.app.offers import title_of
 from blast_env.app.records import (
     BlastRecord,
+    BuildingVerdict,
     DesignSettings,
     EngineRecord,
     Row,
-    Verdict,
     VerdictRow,
     blast_key,
     comparison,
@@ -84,7 +84,9 @@ class Session:
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
-    _verdicts: dict[tuple[str, str], tuple[Verdict, ...]] = field(default_factory=dict, init=False)
+    _verdicts: dict[tuple[str, str], tuple[BuildingVerdict, ...]] = field(
+        default_factory=dict, init=False
+    )
 
     @classmethod
     def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
@@ -430,7 +432,7 @@ class Session:
             row.model_copy(update={"building": titled(row.building)}) for row in verdict_rows(found)
         ]
 
-    def verdicts_on(self, shown: Shown, threat: NamedThreat) -> tuple[Verdict, ...]:
+    def verdicts_on(self, shown: Shown, threat: NamedThreat) -> tuple[BuildingVerdict, ...]:
         """Return the verdicts of a blast on the buildings with their current facades."""
         if not any(each.facade for each in self.scenario.structures):
             return ()

@@ -13,7 +13,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from blast_env.app.records import BlastRecord, Verdict, VerdictRow
+from blast_env.app.records import BlastRecord, BuildingVerdict, VerdictRow
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.consequences import BuildingResponse, Consequences, by_building
 from blast_env.evaluation.governing import Severity, governing
@@ -97,7 +97,7 @@ class FacadeVerdict:
         factor = peak_factor(self.cell_m, self.site.charge.tnt_kg)
         return by_building(self.scenario, found, self.site, factor)
 
-    def verdicts(self) -> tuple[Verdict, ...]:
+    def verdicts(self) -> tuple[BuildingVerdict, ...]:
         """Return the verdict on each building, in numbers."""
         return tuple(map(_verdict, self.buildings()))
 
@@ -132,10 +132,10 @@ def picture_name(number: int, digest: str) -> str:
     return _NAME.format(number, digest)
 
 
-def _verdict(building: BuildingResponse) -> Verdict:
+def _verdict(building: BuildingResponse) -> BuildingVerdict:
     facade = building.facade
     draws = level_probability(Consequences((building,)), Uncertainty(), _DRAWS)
-    return Verdict(
+    return BuildingVerdict(
         building=building.building,
         level=facade.level_of_protection,
         level_on_cells=building.on_cells.level_of_protection,
@@ -151,14 +151,14 @@ def _verdict(building: BuildingResponse) -> Verdict:
 
 
 def verdict_rows(
-    records: Sequence[tuple[str, BlastRecord, Sequence[Verdict]]],
+    records: Sequence[tuple[str, BlastRecord, Sequence[BuildingVerdict]]],
 ) -> Iterator[VerdictRow]:
     """Yield the rows of the buildings; with several threats, the worst of them first.
 
     Args:
         records: Name of the layout, the blast, and the verdicts on it.
     """
-    found: dict[tuple[str, str], list[tuple[str, Verdict, tuple[str, ...]]]] = {}
+    found: dict[tuple[str, str], list[tuple[str, BuildingVerdict, tuple[str, ...]]]] = {}
     for name, record, verdicts in records:
         for verdict in verdicts:
             flags = tuple(why for building, why in record.unchecked if building == verdict.building)
@@ -172,11 +172,13 @@ def verdict_rows(
         yield from (_verdict_row(name, *each) for each in own)
 
 
-def _severity(verdict: Verdict) -> Severity:
+def _severity(verdict: BuildingVerdict) -> Severity:
     return Severity(4 - verdict.level, verdict.total_damage, verdict.impulse_pa_s)
 
 
-def _verdict_row(layout: str, threat: str, verdict: Verdict, flags: tuple[str, ...]) -> VerdictRow:
+def _verdict_row(
+    layout: str, threat: str, verdict: BuildingVerdict, flags: tuple[str, ...]
+) -> VerdictRow:
     level = LevelOfProtection(verdict.level).label
     if verdict.level_on_cells > verdict.level:
         level += f"; {LevelOfProtection(verdict.level_on_cells).label} on the cells"

@@ -23,7 +23,6 @@ from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import (
     MARGIN,
     Advice,
-    AdviceVerdict,
     MeasureKind,
     advise_until,
     best_of,
@@ -32,7 +31,7 @@ from blast_env.design.search.advice import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
-from blast_env.evaluation.consequences import Consequences, consequences, verdict_word
+from blast_env.evaluation.consequences import Consequences, Verdict, consequences
 from blast_env.evaluation.engines.contract import JUDGE, Engine, find_engine
 from blast_env.evaluation.grid_error import GridError, final_engine, grid_error
 from blast_env.evaluation.probability import (
@@ -49,7 +48,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.models import SCHEMA_VERSION
 
-_BARELY: Final = AdviceVerdict.PASSES_BARELY
+_BARELY: Final = Verdict.PASSES_BARELY
 _PROBABLE_MARGIN: Final = 0.3
 """Margin in damage levels after a layout failed before a judge who wants a probability."""
 
@@ -135,12 +134,12 @@ class AdviseCommand(ChargeOptions):
         shares: dict[Layout, float] = {}
         wanted = scenario.objective.target_probability
 
-        def verdict(layout: Layout) -> AdviceVerdict:
+        def verdict(layout: Layout) -> Verdict:
             if layout not in judged:
                 judged[layout] = consequences(scenario, layout, charges, judge)
                 likely = level_probability(judged[layout], Uncertainty(mass=self.mass_error))
                 shares[layout] = likely.of(target)
-            found = _verdict_of(judged[layout], target)
+            found = judged[layout].verdict(target)
             return found if shares[layout] >= (wanted or 0.0) else min(found, _BARELY)
 
         found: list[Advice] = []
@@ -153,7 +152,7 @@ class AdviseCommand(ChargeOptions):
                 found.append(advise_until(*arguments, progress, rounds=rounds, margin=margin))
         best = best_of(found, verdict)
         error = _error(problem, best.layout, judged, judge)
-        passes = verdict(best.layout) is AdviceVerdict.PASSES
+        passes = verdict(best.layout) is Verdict.PASSES
         print_line(_answer(scenario, target, best, found, judged, shares[best.layout], passes))
         self._print(scenario, target, best, found, judged, shares, judge, error)
         if self.out is not None:
@@ -234,8 +233,8 @@ class AdviseCommand(ChargeOptions):
                 str(each.blasts),
                 min(levels).label,
                 "yes" if each.passes else "no",
-                verdict_word(seen.passes_on_cells(target), seen.is_flagged).lower(),
-                seen.verdict(target).lower(),
+                Verdict.of(seen.passes_on_cells(target)).word(seen.is_flagged).lower(),
+                seen.verdict_word(target).lower(),
                 probability_text(shares[each.layout], DRAWS),
             )
         result_console().print(table)
@@ -259,13 +258,6 @@ def _error(
     if judge.coarser != problem.evaluator.engine:
         coarser = BlastEvaluator(problem.scenario, judge).coarser()
     return grid_error(coarser, problem.case, met_by_blasts(layout), threat, of_both)
-
-
-def _verdict_of(seen: Consequences, target: LevelOfProtection) -> AdviceVerdict:
-    if seen.passes(target):
-        return AdviceVerdict.PASSES
-    barely = seen.passes_on_cells(target)
-    return AdviceVerdict.PASSES_BARELY if barely else AdviceVerdict.FAILS
 
 
 def _answer(

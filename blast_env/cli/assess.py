@@ -36,11 +36,11 @@ from blast_env.evaluation.consequences import (
     BuildingResponse,
     Consequences,
     Neighbour,
+    Verdict,
     bay_table,
     consequences,
     other_glazing,
     piece_table,
-    verdict_word,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
@@ -146,7 +146,9 @@ class AssessCommand(ChargeOptions):
         for each in required:
             for name, judged in reversed(found.items()):
                 kept = all(each.kept_by(response.facade) for response in judged.responses)
-                print_line(f"{each.words}, {name}: {verdict_word(kept, judged.is_flagged).lower()}")
+                print_line(
+                    f"{each.words}, {name}: {Verdict.of(kept).word(judged.is_flagged).lower()}"
+                )
         error = _grid_error(scenario, layouts, found, coarse, coarser)
         uncertainty = Uncertainty.of(self.mass_error, error)
         for name, judged in reversed(found.items()):
@@ -230,7 +232,7 @@ class AssessCommand(ChargeOptions):
         for name, glazing in other_glazing(scenario).items():
             other = judged.with_glazing(glazing)
             for building in other.buildings:
-                passes = verdict_word(other.level(building) >= target, other.is_flagged)
+                passes = Verdict.of(other.level(building) >= target).word(other.is_flagged)
                 words = building_words(scenario, building)
                 table.add_row(name, words, *_row(other, building), passes.lower())
         result_console().print(table)

@@ -20,6 +20,7 @@ reflected pressure round the edges of a small wall, and coarse cells underestima
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
@@ -73,6 +74,36 @@ _CLIPPED: Final = (
 )
 
 _BREACH: Final = "so close that walls may be breached: the response covers bending only"
+
+
+class Verdict(IntEnum):
+    """Verdict on a layout; larger is better.
+
+    Attributes:
+        FAILS: The layout misses the target.
+        PASSES_BARELY: It reaches the target, but not with peaks unclipped by the cell size, or not
+            with the required probability.
+        PASSES: It reaches the target either way.
+    """
+
+    FAILS = 0
+    PASSES_BARELY = 1
+    PASSES = 2
+
+    @classmethod
+    def of(cls, passes: bool, on_cells: bool = False) -> "Verdict":
+        """Return the verdict with sharp peaks, and with those on the cells if it fails."""
+        return cls.PASSES if passes else cls.PASSES_BARELY if on_cells else cls.FAILS
+
+    def word(self, flagged: bool = False) -> str:
+        """Return the word for the verdict, which marks a pass with notes as flagged.
+
+        Args:
+            flagged: Whether there is a note on the loads or walls.
+        """
+        if self is not Verdict.PASSES:
+            return "DOES NOT COMPLY"
+        return "COMPLIES (flagged)" if flagged else "COMPLIES"
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,8 +365,7 @@ class Consequences:
         Args:
             target: The required level of the buildings.
         """
-        fails = not self.passes(target)
-        return _CLIPPED if fails and self.passes_on_cells(target) else ""
+        return _CLIPPED if self.verdict(target) is Verdict.PASSES_BARELY else ""
 
     @property
     def worst_neighbours(self) -> tuple[Neighbour, ...]:
@@ -355,13 +385,17 @@ class Consequences:
         """Return whether all buildings reach a level under every charge."""
         return all(self.level(building) >= target for building in self.buildings)
 
-    def verdict(self, target: LevelOfProtection) -> str:
-        """Return the verdict on whether all buildings reach a level; see `verdict_word`."""
-        return verdict_word(self.passes(target), self.is_flagged)
+    def verdict(self, target: LevelOfProtection) -> Verdict:
+        """Return the verdict on whether all buildings reach a level."""
+        return Verdict.of(self.passes(target), self.passes_on_cells(target))
+
+    def verdict_word(self, target: LevelOfProtection) -> str:
+        """Return the verdict in a word; see `Verdict.word`."""
+        return self.verdict(target).word(self.is_flagged)
 
     def verdict_words(self, target: LevelOfProtection) -> str:
         """Return the verdict with the level: `DOES NOT COMPLY: level of protection below Low`."""
-        return f"{self.verdict(target)}: {self.level_words_for(target)}"
+        return f"{self.verdict_word(target)}: {self.level_words_for(target)}"
 
     def level_words_for(self, target: LevelOfProtection) -> str:
         """Return whether all buildings reach a level: `level of protection below Low`."""
@@ -526,18 +560,6 @@ def consequences_of(
         result.unjudged,
         (BlastLoads(result.structure_loads, result.module_impulse_n_s),),
     )
-
-
-def verdict_word(passes: bool, flagged: bool) -> str:
-    """Return the word for a verdict, which marks a pass with notes as flagged.
-
-    Args:
-        passes: Whether all requirements are fulfilled.
-        flagged: Whether there is a note on the loads or walls.
-    """
-    if not passes:
-        return "DOES NOT COMPLY"
-    return "COMPLIES (flagged)" if flagged else "COMPLIES"
 
 
 def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ import tomli_w
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation.capacity import mass_near
-from blast_env.evaluation.consequences import verdict_word
+from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.engines.bays import bay_rows
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.grid_error import FACTOR, ORDER, worse
@@ -131,7 +131,7 @@ def report_html(study: Study, commands: list[str]) -> str:
         "pressure": lambda pa: _number(units.pressure_of(pa)),
         "titled": study.scenario.title_of,
         "counted": lambda load: _counted(load, units),
-        "word": lambda passes, flagged: verdict_word(passes, flagged).lower(),
+        "word": lambda passes, flagged: Verdict.of(passes).word(flagged).lower(),
         "percent": _percent,
         "gone": _gone,
         "noun_of": counted,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from blast_env.evaluation.consequences import (
     BarrierResponse,
     Consequences,
+    Verdict,
     other_glazing,
-    verdict_word,
 )
 from blast_env.report.outcomes import Limit, LoadPair
 from blast_env.report.study import Study
@@ -105,7 +105,7 @@ class ReportVerdict:
     @property
     def word(self) -> str:
         """The verdict in a word."""
-        return "NO VERDICT" if self.passes is None else verdict_word(self.passes, self.flagged)
+        return "NO VERDICT" if self.passes is None else Verdict.of(self.passes).word(self.flagged)
 
 
 def verdict_of(study: Study) -> ReportVerdict:

@@ -12,7 +12,6 @@ import blast_env
 from blast_env.cli import app
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import (
-    AdviceVerdict,
     MeasureKind,
     advise,
     advise_until,
@@ -22,6 +21,7 @@ from blast_env.design.search.advice import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case
+from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.probability import LevelProbability
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import Placement, load_layout
@@ -132,11 +132,11 @@ def test_what_a_judge_fails_is_searched_for_again_with_a_margin() -> None:
     problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
     once = advise(problem, MeasureKind.TOGETHER, 12)
 
-    def judge(layout: Layout) -> AdviceVerdict:
-        return AdviceVerdict.FAILS if layout == once.layout else AdviceVerdict.PASSES
+    def judge(layout: Layout) -> Verdict:
+        return Verdict.FAILS if layout == once.layout else Verdict.PASSES
 
     found = advise_until(judge, problem, MeasureKind.TOGETHER, 12, rounds=3, margin=0.05)
-    assert judge(found.layout) is AdviceVerdict.PASSES
+    assert judge(found.layout) is Verdict.PASSES
     assert found.passes
     assert found.best.damage < once.best.damage - 0.05
     assert found.best.cost > once.best.cost

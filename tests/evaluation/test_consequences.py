@@ -72,14 +72,14 @@ def test_a_charge_that_the_engine_was_not_checked_for_is_named(found: Consequenc
 def test_no_verdict_passes_without_the_flags_of_its_loads(found: Consequences) -> None:
     """5 kg on cells of 0.5 m."""
     below = LevelOfProtection.BELOW_STANDARDS
-    assert found.verdict(below) == "COMPLIES (flagged)"
+    assert found.verdict_word(below) == "COMPLIES (flagged)"
     assert replace(found, unchecked=()).is_flagged == any(
         not each for each in found.responses[0].known.values()
     )
     bare = Consequences((replace(found.responses[0], known={}),))
-    assert bare.verdict(below) == "COMPLIES"
-    assert bare.verdict(LevelOfProtection.HIGH) == "DOES NOT COMPLY"
-    assert replace(bare, unchecked=(("kiosk", "too near"),)).verdict(below) == "COMPLIES"
+    assert bare.verdict_word(below) == "COMPLIES"
+    assert bare.verdict_word(LevelOfProtection.HIGH) == "DOES NOT COMPLY"
+    assert replace(bare, unchecked=(("kiosk", "too near"),)).verdict_word(below) == "COMPLIES"
 
 
 def test_bending_alone_is_no_verdict_on_a_wall_that_may_be_breached() -> None:

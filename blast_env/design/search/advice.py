@@ -6,7 +6,7 @@ best choice of the other measures, and the choices are compared without further 
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 from itertools import combinations
 from math import inf
 from typing import Final
@@ -17,6 +17,7 @@ from blast_env.design.search.moves import Moves, legal_part
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError, DesignProblem
+from blast_env.evaluation.consequences import Verdict
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import Placement
 from blast_env.layout.placement import met_by_blasts
@@ -41,21 +42,6 @@ _TOO_LITTLE: Final = 1e-9
 
 _FEWER_SHARE: Final = 0.4
 """Share of the changes that remove a piece, because the cheapest layout that passes is sought."""
-
-
-class AdviceVerdict(IntEnum):
-    """Verdict of a judge on a layout; larger is better.
-
-    Attributes:
-        FAILS: The layout misses the target.
-        PASSES_BARELY: It reaches the target, but not with peaks unclipped by the cell size, or not
-            with the required probability.
-        PASSES: It reaches the target either way.
-    """
-
-    FAILS = 0
-    PASSES_BARELY = 1
-    PASSES = 2
 
 
 class MeasureKind(StrEnum):
@@ -233,7 +219,7 @@ def advise(
 
 
 def advise_until(
-    judge: Callable[[Layout], AdviceVerdict],
+    judge: Callable[[Layout], Verdict],
     problem: DesignProblem,
     kind: MeasureKind,
     budget: int,
@@ -268,7 +254,7 @@ def advise_until(
         every.append(found)
         if progress is not None:
             progress(len(every) / rounds)
-        if not found.passes or judge(found.layout) is AdviceVerdict.PASSES:
+        if not found.passes or judge(found.layout) is Verdict.PASSES:
             break
         below = found.best.damage - margin
         begin_with = (*begin_with, found.layout)
@@ -279,7 +265,7 @@ def advise_until(
     )
 
 
-def best_of(found: Iterable[Advice], judge: Callable[[Layout], AdviceVerdict]) -> Advice:
+def best_of(found: Iterable[Advice], judge: Callable[[Layout], Verdict]) -> Advice:
     """Return the result with the best verdict; among equals the cheapest or nearest to passing."""
     return min(found, key=lambda each: (-judge(each.layout), each.best))
 
