@@ -37,7 +37,7 @@ RANGES = ItemSiteRanges()
 
 @pytest.fixture(scope="module")
 def item_sites() -> tuple[Scenario, ...]:
-    return tuple(generate_site(seed, RANGES) for seed in range(12))
+    return tuple(generate_site(seed, RANGES) for seed in range(16))
 
 
 def test_a_seed_is_a_site_and_the_old_family_keeps_its_seeds(
