@@ -146,7 +146,6 @@ def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Pat
         (("--budget", "0"), "greater than or equal to 1"),
         (("--out", "layout.json"), "layout.json: cannot be a folder"),
         (("--method", "surogate"), "did you mean 'surrogate'"),
-        (("--method", "surrogate"), "courtyard has no catalogue"),
         (("--surrogate", "own.json"), "--surrogate is for --method surrogate, not genetic"),
         (("--method", "surrogate", "--surrogate", "own.json"), "own.json: there is no such file"),
         (
