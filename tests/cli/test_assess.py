@@ -62,7 +62,7 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(site: Path) -> None:
     lines = run(site, "--tnt-kg", "1", "--target", "very low", "--cell", "0.5").splitlines()
     verdict = next(k for k, line in enumerate(lines) if "glazed_room, no barrier" in line)
     assert "COMPLIES (flagged): level of protection at least Very low" in lines[verdict]
-    assert lines[verdict + 1].startswith("flag: control_room: 1 of 1 charges are outside")
+    assert any(line.startswith("flag: control_room: 1 of 1 charges are outside") for line in lines)
     assert not any(line.endswith("complies") for line in lines)
 
 
