@@ -150,7 +150,7 @@ SMALLER: Final[dict[str, str]] = {
         "--random-layouts 1 --charges 1 --seeds 1"
     ),
     "python -m studies.gas definition": "--scenario control_room --until 0.05",
-    "python -m studies.gas ending --generated 9": "--generated 0 --times 1.1",
+    "python -m studies.gas ending --generated 5": "--generated 0 --times 1.1",
     "python -m studies.gas oblique": "--angles 20 --until 0.02",
     "python -m studies.gas cells --scenario visitor_entrance --random-layouts 0 --finest 0.125": (
         "--sizes 0.5 --finest 0.5"
