@@ -28,8 +28,8 @@ STANDING_COLUMNS: Final = (
 _OBLIQUE: Final = 1e-6  # of the smaller part of a unit normal
 
 
-class Standing(IntEnum):
-    """The standing of a load; a lower value is better."""
+class LoadStanding(IntEnum):
+    """Standing of a load; a lower value is better."""
 
     MEASURED = 0
     VERIFIED = 1
@@ -50,7 +50,7 @@ class Stood(NamedTuple):
         reason: The reason, in words.
     """
 
-    standing: Standing
+    standing: LoadStanding
     reason: str
 
     @property
@@ -73,18 +73,20 @@ def standing_of(
     """
     low, high = CHECKED_SCALED_DISTANCE
     if not is_known:
-        return Stood(Standing.OUTSIDE, "impulse not yet captured at the end of the run")
+        return Stood(LoadStanding.OUTSIDE, "impulse not yet captured at the end of the run")
     if not low <= scaled_m <= high:
         words = f"scaled distance {scaled_m:.2g} m/kg^(1/3), checked from {low:g} to {high:g}"
-        return Stood(Standing.OUTSIDE, words)
+        return Stood(LoadStanding.OUTSIDE, words)
     if cells < CHECKED_CELLS:
         words = f"{cells:.2g} cells per m/kg^(1/3), checked from {CHECKED_CELLS:g}"
-        return Stood(Standing.APPROXIMATE, words)
+        return Stood(LoadStanding.APPROXIMATE, words)
     if is_stepped:
-        return Stood(Standing.APPROXIMATE, "an oblique wall, modelled in steps")
+        return Stood(LoadStanding.APPROXIMATE, "an oblique wall, modelled in steps")
     if not is_seen:
-        return Stood(Standing.VERIFIED, "in the shade: compared with experiments and other codes")
-    return Stood(Standing.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse")
+        return Stood(
+            LoadStanding.VERIFIED, "in the shade: compared with experiments and other codes"
+        )
+    return Stood(LoadStanding.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse")
 
 
 def bay_standings(
