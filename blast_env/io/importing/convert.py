@@ -7,6 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
+
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.io.importing.buildings import prepared
 from blast_env.io.importing.dxf import read_dxf
@@ -29,6 +31,7 @@ from blast_env.response.components import catalogue
 from blast_env.site import Scenario, SimulationSection
 from blast_env.site.checks import charge_radius_m
 from blast_env.site.models import MOST_NOTE, MOST_NOTES, SCHEMA_VERSION
+from blast_env.site.sections import SegmentSource
 from blast_env.values import STEERING, path_of
 
 with import_extra("maps", "maps and drawings"):
@@ -63,7 +66,16 @@ class ImportedSite:
     def notes(self) -> tuple[str, ...]:
         """Changes, guesses, omissions and missing data, one line each."""
         if self.scenario.build_zone is not None:
-            return self.ledger.notes
+            zone = shapely.box(*self.scenario.build_zone.rectangle_m)
+            lines = [
+                shapely.LineString(each.segment_m)
+                for each in self.scenario.charge
+                if isinstance(each, SegmentSource)
+            ]
+            over = int(np.sum(shapely.intersects(lines, zone)))
+            words = f"the build zone lies over {over} parts of streets: barriers may stand there"
+            words += ", unless keep_outs of the file keep them free"
+            return (*self.ledger.notes, *([words] if over else []))
         zone = "there is no build zone: say one with --zone, --zone-around or --zone-from"
         return (*self.ledger.notes, zone)
 

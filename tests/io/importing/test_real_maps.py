@@ -302,6 +302,9 @@ def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
     south = house.outline.bounds[1]
     assert sorted(south - y for y in near) == pytest.approx([9.0, 15.0], abs=0.15)
     assert not entries(site, Deed.GUESSED, "widths of streets")
+    assert not any("lies over" in note for note in site.notes)
+    wide = imported(extract.write(tmp_path), zone_around_m=10.0, margin_m=20.0, **HOUSE_1)
+    assert any("lies over 1 parts of streets" in note for note in wide.notes)
 
 
 def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
