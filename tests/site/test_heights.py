@@ -93,7 +93,7 @@ def test_each_new_key_counts_in_the_hash_unless_no_result_depends_on_it(path: Ke
         ),
         (
             {"kind": "drawing", "x_m": 0.0, "y_m": 0.0, "metres_per_unit": 0.0},
-            ["georeference.metres_per_unit: is 0.0, must be greater than 0"],
+            ["georeference.metres_per_unit: is 0.0, must be at least 1e-12"],
         ),
         (4, ["georeference: is 4, must be a table"]),
     ],

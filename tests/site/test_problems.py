@@ -20,7 +20,7 @@ from tests.site.documents import (
     [
         (("structures", 0, "rows"), -3, "structures[0].rows: is -3, must be at least 1"),
         (("structures", 0, "rows"), 2.0, "structures[0].rows: is 2.0, must be a whole number"),
-        (("structures", 0, "weight"), 0, "structures[0].weight: is 0, must be greater than 0"),
+        (("structures", 0, "weight"), 0, "structures[0].weight: is 0, must be at least 1e-06"),
         (("site", "width_m"), "ten", "site.width_m: is 'ten' (a string), must be a number"),
         (("site", "width_m"), "10", "site.width_m: is '10' (a string), must be a number"),
         (("site", "width_m"), True, "site.width_m: is true (a truth value), must be a number"),

@@ -129,7 +129,7 @@ _ITEM = {"name": "wall", "length_modules": 3, "thickness_modules": 1, "height_m"
         ({"structures": ["fence", "fence"]}, ".structures[1]", "removes already"),
         ({"structures": []}, ".structures", "must have at least 1"),
         ({"name": "wall"}, ".name", "already the name of build_zone.items[0]"),
-        ({"cost": 0.0}, ".cost", "must be greater than 0"),
+        ({"cost": 0.0}, ".cost", "must be at least 1e-06"),
     ],
 )
 def test_what_cannot_be_taken_away_is_refused(

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.importing import ImportOptions, convert, dxf, geojson, import_site, osm, site_map
+from blast_env.io.importing import ImportOptions, dxf, geojson, import_site, osm, site_map
 from blast_env.io.importing.ledger import Deed
 from blast_env.site import ScenarioError
 from tests.io.importing.maps import BLOCK, LAYERS, Places, charge, outline, rectangle, written
@@ -341,11 +341,6 @@ def test_extract_that_cuts_a_building_says_so(tmp_path: Path) -> None:
     assert "--protect is 'baker', which is left out: way 2" in error_of(
         path, replace(HALL, protect=("baker",))
     )
-
-
-def test_nothing_is_imported_by_names_that_do_not_exist() -> None:
-    """Every reader is reached by its suffixes."""
-    assert set(convert._READERS) == {".geojson", ".json", ".dxf", *osm.SUFFIXES}
 
 
 @pytest.mark.parametrize(
