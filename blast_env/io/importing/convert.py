@@ -66,13 +66,13 @@ class ImportedSite:
     def notes(self) -> tuple[str, ...]:
         """Changes, guesses, omissions and missing data, one line each."""
         if self.scenario.build_zone is not None:
-            zone = shapely.box(*self.scenario.build_zone.rectangle_m)
+            ground = shapely.box(*self.scenario.build_zone.rectangle_m)
             lines = [
                 shapely.LineString(each.segment_m)
                 for each in self.scenario.charge
                 if isinstance(each, SegmentSource)
             ]
-            over = int(np.sum(shapely.intersects(lines, zone)))
+            over = int(np.sum(shapely.intersects(lines, ground)))
             words = f"the build zone lies over {over} parts of streets: barriers may stand there"
             words += ", unless keep_outs of the file keep them free"
             return (*self.ledger.notes, *([words] if over else []))

@@ -135,7 +135,7 @@ def with_courtyards(things: Sequence[Thing], ledger: Ledger) -> list[Thing]:
     texts = shapely.STRtree([each.geometry for each in things if each.role is Role.NAME])
     shapes = np.array([things[k].geometry for k in outlines], dtype=object)
     areas = shapely.area(shapes)
-    whole = shapely.area(shapely.polygons(shapely.get_exterior_ring(shapes)))
+    whole = np.asarray(shapely.area(shapely.polygons(shapely.get_exterior_ring(shapes))))
     inner, outer = shapely.STRtree(shapes).query(shapes, "within")
     deep: dict[int, list[int]] = {}
     fillings: dict[int, int] = {}
