@@ -10,7 +10,7 @@ from typing import Annotated, Final
 import typer
 
 from blast_env.cli.command import FOLDER, Command, option
-from blast_env.cli.output import message_console, printable
+from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
@@ -19,6 +19,7 @@ from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAM
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
 from blast_env.site.sections import PointM
+from blast_env.values import printable
 
 CLUSTER_HELP: Final = (
     "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of "
