@@ -271,7 +271,7 @@ class FolderStore:
             raise BlastEnvError(
                 f"{path}: would have {len(packed)} bytes, must have at most {_MOST_ENTRY_BYTES}"
             )
-        with suppress(OSError):  # whatever is no file there: a link would lead elsewhere
+        with suppress(OSError):  # a link would lead elsewhere
             if path.is_symlink() or (path.exists() and not path.is_file()):
                 path.unlink()
         with write_atomically(path, self.durable) as temporary:

@@ -35,7 +35,7 @@ def plain_text(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text from elsewhere for a terminal: what controls it is escaped."""
+    """Return a text from elsewhere for a terminal, with control characters escaped."""
     return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
@@ -48,7 +48,7 @@ _MARKUP: Final = re.compile(r"[\\`\[\]{}$]")
 
 
 def markup_text(text: str) -> str:
-    """Return a text from elsewhere for a line of Markdown or HTML, where nothing of it is markup.
+    """Return a text from elsewhere for a line of Markdown or HTML, with all markup escaped.
 
     Emphasis, which does no harm, is left.
     """

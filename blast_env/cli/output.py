@@ -248,7 +248,7 @@ class ResultTable(Table):
             self.add_column(printable(header), justify=side)
 
     def add_row(self, *cells: Any, **options: Any) -> None:
-        """Add a row, with what would control the terminal escaped."""
+        """Add a row, with control characters escaped."""
         super().add_row(*(printable_line(str(each)) for each in cells), **options)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
