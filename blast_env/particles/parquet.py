@@ -140,7 +140,7 @@ def checked_table(path: Path, columns: Sequence[Column] = ()) -> pa.Table:
             table = file.read()
         table.validate(full=True)
         _check_texts(path, table)
-    except BlastEnvError:
+    except (BlastEnvError, MemoryError):
         raise
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = shortened(str(error), 300)

@@ -389,7 +389,7 @@ def _special(folder: Path) -> Tries:
 
 
 METHODS: Final = (
-    *("os:system", "os:getcwd", "builtins:print", "builtins:pow", "math:pi", "os:nothing"),
+    *("os:system", "os:getcwd", "builtins:len", "builtins:pow", "math:pi", "os:nothing"),
     *("nothing:at_all", ":", "x:", "json:dumps", "builtins:memoryview"),
 )
 """In the place of a method."""

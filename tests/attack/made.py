@@ -139,8 +139,14 @@ def _parquet(columns: Mapping[str, Any]) -> bytes:
 
     table = pa.table(columns).replace_schema_metadata({METADATA_KEY: "{}"})
     with BytesIO() as file:
-        pq.write_table(table, file, compression="zstd")
+        pq.write_table(table, file, compression="zstd", store_schema=False)
         return file.getvalue()
+
+
+def _one_text() -> Any:
+    import pyarrow as pa
+
+    return pa.DictionaryArray.from_arrays(np.zeros(1600, dtype=np.int32), ["x" * 1_000_000])
 
 
 def _geojson(*features: Mapping[str, Any]) -> bytes:
@@ -399,10 +405,8 @@ FAMILIES: Final[Mapping[str, Maker]] = MappingProxyType(
         "a vehicle through a rated gate on 300 m.drawn.toml": lambda: _driven(300.0),
         "20 rated items on 300 m.drawn.toml": lambda: _driven(300.0, 20),
         "20 rated items on 400 m.drawn.toml": lambda: _driven(400.0, 20),
-        "a text of 1 MB, 1,600 times.parquet": lambda: _parquet(
-            {"structure": ["x" * 1_000_000] * 1600}
-        ),
-        "100,000,000 equal numbers.parquet": lambda: _parquet({"time_s": np.zeros(100_000_000)}),
+        "a text of 1 MB, 1,600 times.parquet": lambda: _parquet({"structure": _one_text()}),
+        "30,000,000 equal numbers.parquet": lambda: _parquet({"time_s": np.zeros(30_000_000)}),
         "numbers for texts.parquet": lambda: _parquet({"structure": [1.0]}),
         "texts for numbers.parquet": lambda: _parquet({"time_s": ["a"]}),
         "bytes for numbers.parquet": lambda: _parquet({"time_s": [b"a"]}),
