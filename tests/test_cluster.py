@@ -203,6 +203,6 @@ def test_an_address_without_a_scheduler(
 def test_another_file_is_no_scheduler_file(content: str, tmp_path: Path) -> None:
     path = tmp_path / "scheduler.json"
     path.write_text(content)
-    message = f"^cluster {re.escape(repr(str(path)))}: is no scheduler file: "
+    message = r"^cluster '.*': is no scheduler file: "  # a long path is cut
     with pytest.raises(BlastEnvError, match=message), on_cluster(path):
         pass
