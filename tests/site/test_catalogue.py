@@ -418,7 +418,7 @@ def test_cost_name_and_words_of_the_stock_list_can_be_changed(tmp_path: Path) ->
         ),
         (
             {"from_catalogue": "planter", "cost": 0.0},
-            "cost: is 0.0, must be greater than 0",
+            "cost: is 0.0, must be at least 1e-06",
         ),
     ],
 )
