@@ -289,7 +289,7 @@ class AgentComparison:
 
     @property
     def verdict(self) -> str:
-        """What the layout takes off and costs, and its lead over rules and random layouts."""
+        """The reduction and cost of the layout, and its lead over rules and random layouts."""
         others = self.results[RANDOM], self.results[self.best_rule], self.best_rule_each
         leads = [self.agent.difference(each).scaled(100.0) for each in others]
         if isnan(leads[0].low):

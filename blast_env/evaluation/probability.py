@@ -20,7 +20,6 @@ without sharper peaks, as in a verdict; which of them is found without draws.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import isnan, log, nan, sqrt
 from typing import Final
 
@@ -33,7 +32,7 @@ from blast_env.evaluation.grid_error import GridError
 from blast_env.evaluation.scaling import MASS_RANGE, load_factors
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
-from blast_env.response.facade import LoadDraws, drawn_levels, pushes, respond
+from blast_env.response.facade import LoadDraws, drawn_levels, pushes
 from blast_env.response.sdof import impulses
 from blast_env.values import generator
 
@@ -190,7 +189,7 @@ def _latin(draws: int, seed: int) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Component:
-    """A component of a bay under a charge, with the history that decides."""
+    """A component of a bay under a charge."""
 
     response: BuildingResponse
     index: int
@@ -223,26 +222,24 @@ class _Component:
             quantiles[:, 3],
             np.exp(uncertainty.panels * normal[:, 4]),
         )
-        facade = self.response.on_cells
-        pressure_pa, factor = self._deciding_history
-        sharper = replace(draws, peaks=factor * draws.peaks, durations=draws.durations / factor)
+        facade, levels = self.response.on_cells, np.full(len(mass), int(LevelOfProtection.HIGH))
         filled = facade.bays[self.index]
-        return drawn_levels(filled, self.is_window, facade.time_s, pressure_pa, sharper)
+        for pressure_pa, factor in self._histories:
+            sharper = replace(draws, peaks=factor * draws.peaks, durations=draws.durations / factor)
+            found = drawn_levels(filled, self.is_window, facade.time_s, pressure_pa, sharper)
+            levels = np.minimum(levels, found)
+        return levels
 
-    @cached_property
-    def _deciding_history(self) -> tuple[FloatArray, float]:
-        """The history with or without suction, and the factor on peaks, of the worst response."""
-        facade, factor = self.response.on_cells, self.response.peak_factor
-        filled, own_pa = facade.bays[self.index], facade.pressure_pa[self.index]
-        filled = replace(filled, wall=None) if self.is_window else replace(filled, glazing=None)
-        found = []
-        for pressure_pa in (pushes(facade.time_s, own_pa[np.newaxis])[0], own_pa):
-            for each in {max(factor, 1.0), 1.0}:
-                times_s = facade.time_s / each
-                done = respond([filled], times_s, each * pressure_pa[np.newaxis])
-                found.append((done.worst_number, pressure_pa, each))
-        _, pressure_pa, each = max(found, key=lambda item: item[0])
-        return pressure_pa, each
+    @property
+    def _histories(self) -> list[tuple[FloatArray, float]]:
+        """The histories with and without suction, each with the factors on its peak.
+
+        The worst one differs from draw to draw.
+        """
+        facade, own_pa = self.response.on_cells, self.response.on_cells.pressure_pa[self.index]
+        pushed_pa = pushes(facade.time_s, own_pa[np.newaxis])[0]
+        factors = {max(self.response.peak_factor, 1.0), 1.0}
+        return [(each, factor) for each in (pushed_pa, own_pa) for factor in factors]
 
 
 def _deciding(responses: Sequence[BuildingResponse], count: int) -> Iterator[_Component]:
