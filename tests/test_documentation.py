@@ -46,7 +46,9 @@ def test_the_code_of_a_page_runs(
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for block in CODE[page]:
-        compiled = compile(block.source, str(block), "exec")
+        shorter = exceptions.CODE_SHORTENED.get((page, block.number), ("", ""))
+        assert shorter[0] in block.source
+        compiled = compile(block.source.replace(*shorter), str(block), "exec")
         known = (page, block.number) in exceptions.CODE_NOT_RUN
         if page not in exceptions.CODE_OF_THE_BUILD and not known:
             exec(compiled, names)

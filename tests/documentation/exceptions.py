@@ -257,6 +257,11 @@ CODE_OF_THE_BUILD: Final = {
 }
 """Pages whose code `make docs` runs and `make test` compiles only, and why."""
 
+CODE_SHORTENED: Final = {
+    ("README.md", 1): ("seeds=range(4)", "seeds=range(2), cell_m=0.5"),  # not on final cells
+}
+"""Parts of blocks of Python that are replaced to take less time, by page and number."""
+
 CODE_NOT_RUN: Final = {
     ("docs/researchers/libraries.md", 6): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
