@@ -240,7 +240,7 @@ def learning_curve(training: DemoTraining) -> Figure:
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.add_subplot(xlabel="steps of training", ylabel="reduction of the proposal (%)")
     axes.plot(steps, 100.0 * np.array(by_gas), marker="o", label="by gas dynamics")
-    axes.plot(steps, 100.0 * np.array(guessed), ls="--", label="as the surrogate guesses")
+    axes.plot(steps, 100.0 * np.array(guessed), ls="--", label="by the surrogate's guess")
     axes.set_title(f"{AGENT} on {training.scenario.name}; first point: random layouts", fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend()
@@ -390,13 +390,13 @@ def print_comparison(comparison: AgentComparison) -> None:
     cases = comparison.agent.cases
     table = ResultTable(
         f"{cases[0].scenario.name}: charges of {', '.join(each.name for each in cases)}, which the "
-        f"training has not met; judged by the engine {comparison.engine}\n(Pa s: mean load on the "
-        "protected structures; ahead: in percentage points, paired)",
+        f"training has not met; judged by the engine {comparison.engine}",
         HEADERS,
     )
     for row in comparison.rows():
         table.add_row(*row)
     result_console().print(table)
+    print_line("Pa s: mean load on the protected structures; ahead: percentage points, paired")
 
 
 def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[Path]:

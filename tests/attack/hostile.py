@@ -27,6 +27,8 @@ from blast_env.design.surrogate.network import Surrogate, load_surrogate
 from blast_env.design.surrogate.walls import site_of
 from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import simulate
+from blast_env.evaluation.engines.gas import GasResult
 from blast_env.evaluation.free_field import FreeFieldRun
 from blast_env.files import FolderStore
 from blast_env.io.importing import import_site
@@ -405,12 +407,46 @@ def _methods(_: Path) -> Tries:
     yield from ((name, method_outcome(name)) for name in METHODS)
 
 
+def gauge_site(position_m: Sequence[float]) -> Scenario:
+    """Return a small site with one solid 0.5 m high and a gauge."""
+    document = site_document()
+    document["structures"][0]["height_m"] = 0.5
+    del document["structures"][0]["facade"]
+    document["gauges"] = [{"name": "gauge", "position_m": list(position_m)}]
+    return Scenario.from_document(document, "gauge")
+
+
+def gauge_outcome(position_m: Sequence[float]) -> str:
+    """Run a blast with a gauge; return what is wrong, such as a gauge moved in silence."""
+
+    def run() -> GasResult:
+        found = simulate(gauge_site(position_m), engine="gas", cell_m=0.5, until=0.001)
+        assert isinstance(found, GasResult)
+        return found
+
+    left, bottom, right, top = gauge_site(position_m).structures[0].rectangle_m
+    x_m, y_m, z_m = position_m
+    inside = left < x_m < right and bottom < y_m < top and z_m < 0.5
+    wrong = "was moved in silence" if inside else "has a note, although it is in the air"
+    return outcome(run, lambda found: "" if bool(found.moved_gauges) == inside else wrong)
+
+
+def _gauges(_: Path) -> Tries:
+    left, bottom, right, top = gauge_site((1.0, 1.0, 1.0)).structures[0].rectangle_m
+    for x_m in np.linspace(left - 0.75, right + 0.75, 6):
+        for y_m in np.linspace(bottom - 0.75, top + 0.75, 6):
+            for z_m in (0.2, 0.4, 0.7):
+                place = (float(x_m), float(y_m), z_m)
+                yield f"gauge at {place}", gauge_outcome(place)
+
+
 FAMILIES: Final[Mapping[str, Callable[[Path], Tries]]] = MappingProxyType(
     {
         "pipes, devices, sockets, sparse files": _special,
         "numbers that are none or out of bounds": _numbers,
         "texts that control, mark up or are long": _texts,
         "functions in the place of methods": _methods,
+        "gauges in and beside a solid": _gauges,
     }
 )
 """By names for a table."""

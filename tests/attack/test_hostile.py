@@ -133,17 +133,13 @@ def test_messages_quote_little_of_a_long_text(tmp_path: Path) -> None:
 
 
 def test_a_gauge_that_is_moved_out_of_a_solid_is_said_to_be() -> None:
-    document = hostile.site_document()
-    document["structures"][0]["height_m"] = 0.5
-    places = {"inside": [22.0, 10.0, 0.3], "wall": [20.0, 10.0, 0.2], "air": [15.0, 10.0, 1.0]}
-    document["gauges"] = [{"name": name, "position_m": at} for name, at in places.items()]
-    del document["structures"][0]["facade"]
-    site = Scenario.from_document(document, "test")
+    site = hostile.gauge_site((22.0, 10.0, 0.3))
     result = simulate(site, engine="gas", cell_m=0.5, until=0.001)
     assert isinstance(result, GasResult)
     (note,) = result.moved_gauges
-    assert "gauge inside: lies inside a solid" in note
+    assert "gauge gauge: lies inside a solid" in note
     assert note in result.gauge_notes
+    assert hostile.gauge_outcome((15.0, 10.0, 1.0)) == ""
 
 
 @pytest.mark.parametrize("name", ["os:system", "builtins:pow", "math:pi", "nothing:at_all"])
