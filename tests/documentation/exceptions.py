@@ -139,6 +139,8 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env screen site.toml --glazing window_laminated_6 --wall brick_215 --mass backpack --gas"
     " --cells coarse": "--cells uniform --cell 1",
     "python -m studies.response angles": "--width 12",
+    # docs/researchers/training.md
+    "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --no-rules",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites": "clinic_front",

@@ -1,0 +1,117 @@
+"""PPO and MaskablePPO with the defaults of their libraries on the default site, beside the rules.
+
+`python -m studies.first_hour` prints the table of docs/researchers/training.md.
+"""
+
+from collections.abc import Iterator
+from time import process_time
+from typing import Annotated, Any, Final
+
+import gymnasium as gym
+import numpy as np
+import torch
+import typer
+from blast_agents.training.environments import ThreatPool
+from sb3_contrib import MaskablePPO
+from stable_baselines3 import PPO
+
+from blast_env.arrays import FloatArray
+from blast_env.cli.output import print_line
+from blast_env.design.search import layouts_by_rule
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.evaluation.store import LoadsCache
+from blast_env.statistics import mean_estimate
+
+HELD_OUT: Final = range(10_000, 10_048)
+"""Seeds of the episodes of the judgement."""
+
+Agent = PPO | MaskablePPO
+
+
+def environment(action: str, realisations: int | None = None) -> BlastBarrierEnv:
+    """Return the default site with what the page recommends, apart from the action space."""
+    return BlastBarrierEnv(
+        reward="relative",
+        observation="features",
+        action=action,
+        realisations=realisations,
+        cache=LoadsCache(8192),
+    )
+
+
+def trained(algorithm: type[Agent], action: str, steps: int, seed: int) -> Agent:
+    """Return an agent of the library's defaults, on 128 threats."""
+    pool: gym.Env[Any, Any] = ThreatPool(environment(action, realisations=1), 128, seed)
+    agent: Agent = algorithm("MlpPolicy", pool, seed=seed, device="cpu")
+    agent.learn(steps)
+    return agent
+
+
+def reductions(env: BlastBarrierEnv, agent: Agent | None, rng: np.random.Generator) -> FloatArray:
+    """Return the reduction in each held-out episode by an agent, or by random legal actions."""
+    found = []
+    for seed in HELD_OUT:
+        observation, info = env.reset(seed=seed)
+        ended = False
+        while not ended:
+            if agent is None:
+                action = rng.choice(np.flatnonzero(info["action_mask"]))
+            elif isinstance(agent, MaskablePPO):
+                masks = env.action_masks()
+                action, _ = agent.predict(observation, deterministic=True, action_masks=masks)
+            else:
+                action, _ = agent.predict(observation, deterministic=True)
+            observation, _, ended, _, info = env.step(np.int64(action))
+        found.append(info["reduction"])
+    return np.array(found)
+
+
+def by_rules(env: BlastBarrierEnv) -> Iterator[tuple[str, FloatArray]]:
+    """Yield each rule with its reduction in each held-out episode."""
+    found: dict[str, list[float]] = {}
+    for seed in HELD_OUT:
+        env.reset(seed=seed)
+        scenario = env.placement.scenario
+        (charge,) = env.step(env.action_space.n - 1)[-1]["charges"]  # type: ignore[attr-defined]
+        for name, layout in layouts_by_rule(scenario, charge).items():
+            env.reset(seed=seed, options={"layout": layout})
+            *_, info = env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
+            found.setdefault(name, []).append(info["reduction"])
+    for name, each in found.items():
+        yield name, np.array(each)
+
+
+def report(name: str, of_episodes: FloatArray) -> None:
+    """Print a mean reduction with its 95 % interval."""
+    value, low, _ = mean_estimate(of_episodes).scaled(100.0)
+    print_line(f"{name}: {value:.1f} % +- {value - low:.1f}")
+
+
+def main(
+    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 12_288,
+    algorithm: Annotated[
+        list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
+    ] = None,
+    action: Annotated[list[str] | None, typer.Option(help="Action spaces.")] = None,
+    seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
+    rules: Annotated[bool, typer.Option(help="Also judge rules and random actions.")] = True,
+) -> None:
+    """Train and judge on 48 held-out threats; print one line for each rule and agent."""
+    torch.set_num_threads(1)
+    if rules:
+        judge = environment("place")
+        for name, each in by_rules(judge):
+            report(name, each)
+        report("random", reductions(judge, None, np.random.default_rng(0)))
+    known = {each.__name__: each for each in (PPO, MaskablePPO)}
+    for space in action or ["row"]:
+        for kind in algorithm or known:
+            for seed in range(seeds):
+                began_s = process_time()
+                agent = trained(known[kind], space, steps, seed)
+                name = f"{kind}, {space}, seed {seed}, {process_time() - began_s:.0f} CPU s"
+                report(name, reductions(environment(space), agent, np.random.default_rng(0)))
+
+
+if __name__ == "__main__":
+    typer.run(main)
