@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
@@ -695,3 +696,75 @@ def test_layers_of_a_map_are_no_layers_of_a_drawing(layer: str, tmp_path: Path) 
     extract.way(3, rectangle(20, 0, 8, 6), building="yes", height="3", layer=layer)
     site = imported(extract.write(tmp_path), buildings_from=("building",), **HOUSE_1)
     assert len(site.buildings) == (2 if layer == "1" else 1)
+
+
+def test_relation_of_a_building_leaves_its_parts_as_they_are(tmp_path: Path) -> None:
+    extract = Extract()
+    extract.way(1, rectangle(0, 0, 20, 10), building="yes", name="Hall")
+    extract.way(3, rectangle(0, 0, 10, 10), **{"building:part": "yes", "height": "30"})
+    extract.way(4, rectangle(10, 0, 10, 10), **{"building:part": "yes", "height": "6"})
+    members = [(1, "outline"), (3, "part"), (4, "part")]
+    extract.relation(6, members, type="building")
+    street = [extract.node(x, -12.0) for x in (-20.0, 30.0)]
+    extract.way_of(2, street, highway="residential", width="8")
+    site = imported(extract.write(tmp_path), protect=("Hall",))
+    assert {each.place: each.height_m for each in site.buildings} == {"way 3": 30.0, "way 4": 6.0}
+
+
+@given(st.lists(st.tuples(SHAPES, KINDS), max_size=10))
+@settings(max_examples=15, deadline=None, derandomize=True)
+def test_every_way_of_an_extract_is_on_the_ledger(
+    tmp_path_factory: pytest.TempPathFactory,
+    drawn: list[tuple[tuple[str | None, int, int, int], dict[str, str]]],
+) -> None:
+    extract = town()
+    numbers = range(10, 10 + len(drawn))
+    for number, ((kind, x, y, side), tags) in zip(numbers, drawn, strict=True):
+        if kind == "LineString":
+            extract.way_of(number, [extract.node(x, y), extract.node(x + side, y)], **tags)
+        else:
+            extract.way(number, rectangle(x, y, side, side), **tags)
+    site = imported(extract.write(tmp_path_factory.mktemp("maps")), **HOUSE_1)
+    fates = site.ledger.of(Deed.READ, Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+    tagged = {f"way {number}" for number, (_, tags) in zip(numbers, drawn, strict=True) if tags}
+    assert {each.place for each in fates} >= {"way 1", "way 2", *tagged}
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["closed", "open", "line", "circle", "point", "text", "ray", "mesh"]),
+            st.integers(-20, 20),
+            st.integers(10, 40),
+            st.integers(1, 6),
+            st.sampled_from(["HOUSES", "TREES"]),
+        ),
+        max_size=10,
+    )
+)
+@settings(max_examples=15, deadline=None, derandomize=True)
+def test_every_entity_of_a_drawing_is_on_the_ledger(
+    tmp_path_factory: pytest.TempPathFactory, drawn: list[tuple[str, int, int, int, str]]
+) -> None:
+    path, document = drawing(tmp_path_factory.mktemp("drawings"))
+    space = document.modelspace()
+    space.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES"))
+    handles = []
+    for kind, x, y, side, layer in drawn:
+        of, ring = of_layer(layer), rectangle(x, y, side, side)
+        make = {
+            "closed": partial(space.add_lwpolyline, ring, close=True, dxfattribs=of),
+            "open": partial(space.add_lwpolyline, ring[:3], dxfattribs=of),
+            "line": partial(space.add_line, (x, y), (x + side, y), dxfattribs=of),
+            "circle": partial(space.add_circle, (x, y), side, dxfattribs=of),
+            "point": partial(space.add_point, (x, y), dxfattribs=of),
+            "text": partial(space.add_text, "A", dxfattribs=of),
+            "ray": partial(space.add_ray, (x, y), (1.0, 0.0), dxfattribs=of),
+            "mesh": partial(space.add_3dface, [(a, b, 0.0) for a, b in ring], dxfattribs=of),
+        }
+        handles.append(make[kind]().dxf.handle)
+    document.saveas(path)
+    site = imported(path, **DRAWN)
+    fates = site.ledger.of(Deed.READ, Deed.MERGED, Deed.CLOSED, Deed.LEFT_OUT, Deed.PASSED)
+    named = {word for each in fates for word in each.place.split()}
+    assert {*handles} <= named
