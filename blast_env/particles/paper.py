@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from blast_env.particles.calibration import (
+from blast_env.particles.calibration.laws import (
+    Fit,
     LinearLaw,
     PowerLaw,
     ProportionalLaw,
@@ -16,9 +17,8 @@ from blast_env.particles.calibration import (
     fit_metrics,
     fit_power_law,
     fit_proportional,
-    paper_table,
 )
-from blast_env.particles.calibration.laws import Fit
+from blast_env.particles.calibration.references import paper_table
 
 CELLS: Final = ("scaled", "abs", "pct")
 """The computed cells of a row of Tables 1 to 3, by their names in `paper_table`."""

@@ -6,14 +6,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from blast_env.evaluation.free_field import CalibrationReport
-from blast_env.particles.calibration import (
+from blast_env.calibration import (
     PAPER_UFC_LABEL,
     LinearLaw,
     ProportionalLaw,
     ScalingLaw,
     paper_table,
 )
+from blast_env.evaluation.free_field import CalibrationReport
 from blast_env.particles.calibration.model import SimulatedQuantity
 from blast_env.particles.paper import PAPER_LAWS
 from blast_env.plots.plan import INK

@@ -13,10 +13,10 @@ from typing import IO, Final
 
 import numpy as np
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.files import write_atomically
-from blast_env.particles.calibration import LoadUnit
 from blast_env.particles.run import BlastRun
 from blast_env.plots.canvas import Frame
 from blast_env.plots.frames import FramePainter

@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.calibration import LoadUnit
 from blast_env.evaluation.engines import Blast
-from blast_env.particles.calibration import LoadUnit
 from blast_env.particles.run import BallStates
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.plan import (

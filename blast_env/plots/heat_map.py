@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.geometry import Rectangle
-from blast_env.particles.calibration import LoadUnit
 from blast_env.plots.plan import (
     BARRIER,
     INK,

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.calibration import LoadUnit
 from blast_env.errors import import_extra
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.geometry import Element, layout_counts
-from blast_env.particles.calibration import LoadUnit
 from blast_env.site.balls import CollisionType, distance_to_rectangle
 from blast_env.site.scene import Charge, Scene
 from blast_env.site.structure import Colour

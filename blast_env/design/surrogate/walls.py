@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
+from blast_env.calibration import kingery_bulmash
 from blast_env.design.surrogate.relations import RELATIONS, relations
 from blast_env.design.surrogate.ways import SHARES, Ways
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.contract import structure_response
 from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
-from blast_env.particles.calibration import kingery_bulmash
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.facade import NamedBay
