@@ -12,8 +12,7 @@ class _Commands(LazyGroup):
 
     summaries = {  # noqa: RUF012  # annotated in the base class
         "simulate": "Run one blast and print the load on each structure.",
-        "validate": "Check scenario files for errors, and print the uses and limits of each.",
-        "draw": "Draw the plan and the oblique view of a site, with a layout if one is given.",
+        "draw": "Check scenario files, and draw the plan and the oblique view of each site.",
         "calibrate": (
             "Run blasts at many distances, fit the three laws, and store one as a calibration."
         ),
@@ -30,18 +29,17 @@ class _Commands(LazyGroup):
             "combined."
         ),
         "search": "Search for the layout with the least load on the protected structures.",
-        "bench": "Time blasts and the environment on this machine, and measure the memory.",
         "train": ("Train an agent that proposes layouts, or resume an interrupted training."),
         "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
         "propose": "Propose a layout for any site in seconds without a blast.",
         "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",
-        "paper": "Recompute the paper's Tables 1 to 4 and Figure 5 from its own columns.",
         "import": "Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.",
         "app": (
             "Open a local web page to design on: draw a site, place barriers, blast, compare, "
             "search."
         ),
     }
+    functions = ("draw",)
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 
 

@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, ClassVar, Final, Union, get_args, get_origin, get_type_hints
 
@@ -30,6 +31,44 @@ MARKUP: Final = "markdown"
 
 _UNITS: Final = re.compile(r"_(m|m2|deg)$")
 _COUNTS: Final = MappingProxyType({2: "two", 3: "three", 4: "four"})
+
+
+_TARGETS: Final = "blast_env.targets"
+"""Key of the targets of a command in the metadata of its context."""
+
+
+def writes(*suffixes: str) -> Callable[..., Path | None]:
+    """Return the callback of an option that names a file or folder to write.
+
+    Args:
+        suffixes: The allowed suffixes of a file; none for a folder.
+    """
+
+    def note(
+        context: typer.Context, parameter: typer.CallbackParam, value: Path | None
+    ) -> Path | None:
+        if value is not None:
+            note_target(context, Target(parameter.opts[0], value, suffixes))
+        return value
+
+    return note
+
+
+def note_target(context: typer.Context, target: Target) -> None:
+    """Add a target to those that are checked before a command runs."""
+    context.meta.setdefault(_TARGETS, []).append(target)
+
+
+class ShellCommand(TyperCommand):
+    """A command that turns errors of the user into messages, and checks its targets first."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command."""
+        # Here, because the list of commands is shown without this import.
+        from blast_env.cli.output import user_errors
+
+        with user_errors(), checked_targets(ctx.meta.get(_TARGETS, ())):
+            return super().invoke(ctx)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,12 +277,15 @@ class LazyCommand(TyperCommand):
         module, _, kind = self._place.partition(":")
         application = typer.Typer(rich_markup_mode=MARKUP, add_completion=False)
         found: Any = getattr(import_module(module), kind)
-        call = found if inspect.isfunction(found) else function_of(found)
-        application.command(self.name)(call)
+        if inspect.isfunction(found):
+            application.command(self.name, cls=ShellCommand)(found)
+            hints = get_type_hints(found)
+            numbers = {name for name in hints if {int, float} & {*_leaves([hints[name]])}}
+        else:
+            application.command(self.name)(function_of(found))
+            numbers = {each.name for each in options_of(found) if each.is_number}
         command = typer.main.get_command(application)
         assert isinstance(command, TyperCommand)
-        known = () if inspect.isfunction(found) else options_of(found)
-        numbers = {each.name for each in known if each.is_number}
         for parameter in command.params:
             if parameter.name in numbers:
                 _check_numbers(parameter)
@@ -266,13 +308,16 @@ class LazyGroup(TyperGroup):
 
     summaries: ClassVar[Mapping[str, str]] = {}
     modules: ClassVar[Mapping[str, str]] = {}
+    functions: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.commands = {
             name: LazyCommand(
                 name,
-                f"{__package__}.{self.modules.get(name, name)}:{name.capitalize()}Command",
+                f"{__package__}.{self.modules.get(name, name)}:{name.capitalize()}Command"
+                if name not in self.functions
+                else f"{__package__}.{self.modules.get(name, name)}:{self.modules.get(name, name)}",
                 summary,
             )
             for name, summary in self.summaries.items()

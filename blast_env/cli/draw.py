@@ -1,49 +1,82 @@
-"""`blast-env draw`: a site and a layout, before any blast."""
+"""`blast-env draw`: checks of scenario files, and pictures of their sites before any blast."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from blast_env.cli.command import Command, argument, option
-from blast_env.cli.options import SCENARIO_HELP
+import typer
+
+from blast_env.cli.command import writes
 from blast_env.cli.output import print_line
 from blast_env.cli.targets import PICTURES
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.suitability import suitability
 from blast_env.layout import Placement, load_layout
-from blast_env.site import load_scenario
+from blast_env.site import find_problems, load_scenario
 
 
-@dataclass(frozen=True, kw_only=True)
-class DrawCommand(Command):
-    """Draw the plan and the oblique view of a site, with a layout if one is given.
+def draw(
+    scenarios: Annotated[list[str], typer.Argument(help="Bundled names, or scenario files.")],
+    layout: Annotated[
+        Path | None, typer.Option(help="Layout file; without it, the empty site.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Picture to write: .png, .svg, .pdf.",
+            show_default="the scenario's name, .png",
+            callback=writes(*PICTURES),
+        ),
+    ] = None,
+    view: Annotated[str, typer.Option(help="both, plan or oblique.")] = "both",
+    corner: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            help="Corner of the viewpoint: southwest, southeast, northeast, northwest.",
+            show_default="on the side of the charges",
+        ),
+    ] = None,
+    check_only: Annotated[
+        bool, typer.Option("--check-only", help="Check the files, and draw nothing.")
+    ] = False,
+) -> None:
+    """Check scenario files, and draw the plan and the oblique view of each site.
 
-    Heights are to scale. No blast is run.
+    The command prints the uses and limits of each file, or its errors; the exit code is 1 if one
+    has any. Heights are to scale. No blast is run.
     """
+    for option, path in (("--layout", layout), ("--out", out)):
+        if path is not None and len(scenarios) > 1:
+            raise BlastEnvError(f"{option} is for one scenario: there are {len(scenarios)}")
+    if [name for name in scenarios if not _is_sound(name)]:
+        raise typer.Exit(1)
+    if not check_only:
+        for name in scenarios:
+            _draw(name, layout, view, corner, out)
 
-    scenario: str = argument(SCENARIO_HELP)
-    layout: Path | None = option(None, "Layout file; without it, the empty site.")
-    out: Path | None = option(
-        None,
-        "Picture to write: .png, .svg, .pdf.",
-        writes=PICTURES,
-        show_default="the scenario's name, .png",
-    )
-    view: str = option("both", "both, plan or oblique.")
-    corner: str | None = option(
-        None,
-        "Corner of the viewpoint: southwest, southeast, northeast, northwest.",
-        flag="--from",
-        show_default="on the side of the charges",
-    )
 
-    def __call__(self) -> None:
-        """Draw the picture."""
-        scenario = load_scenario(self.scenario)
-        elements = () if self.layout is None else load_layout(self.layout, scenario)
-        # Here, because pictures need the extra `render`.
-        from blast_env.plots.figures import save_figure
-        from blast_env.plots.site_picture import site_picture
+def _is_sound(name: str) -> bool:
+    """Print the problems of a file, or its uses and limits; return whether it has none."""
+    problems = find_problems(name)
+    for problem in problems:
+        print_line(f"{name}: {problem}")
+    if problems:
+        return False
+    found = suitability(name)
+    print_line(f"{name}: good for {'; '.join(found.uses)}", style="green")
+    for limit in found.limits:
+        print_line(f"{name}: note: {limit}")
+    return True
 
-        for sentence in Placement.of(scenario, elements).explain_vehicles():
-            print_line(sentence)
-        figure = site_picture(scenario, elements, self.view, self.corner)
-        out = Path(f"{scenario.name}.png") if self.out is None else self.out
-        print_line(f"wrote {save_figure(figure, out)}")
+
+def _draw(name: str, layout: Path | None, view: str, corner: str | None, out: Path | None) -> None:
+    scenario = load_scenario(name)
+    elements = () if layout is None else load_layout(layout, scenario)
+    # Here, because pictures need the extra `render`.
+    from blast_env.plots.figures import save_figure
+    from blast_env.plots.site_picture import site_picture
+
+    for sentence in Placement.of(scenario, elements).explain_vehicles():
+        print_line(sentence)
+    figure = site_picture(scenario, elements, view, corner)
+    print_line(f"wrote {save_figure(figure, out or Path(f'{scenario.name}.png'))}")

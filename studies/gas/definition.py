@@ -8,11 +8,11 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.speed import street
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.solver import Gas, Recorder
 from blast_env.geometry import Layout
 from blast_env.site import Scenario, load_scenario
+from studies.bench import street
 from studies.gas.cells import engine_with
 
 STREET: Final = "street of 100 m, 500 kg"

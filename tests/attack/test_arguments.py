@@ -182,7 +182,7 @@ def test_what_looks_like_markup_is_shown_as_it_is(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     save_scenario(BALLISTIC_COURTYARD, "[red]a.toml")
-    assert invoke("validate", "[/x]") == (1, "[/x]: must be a .toml file\n")
+    assert invoke("draw", "[/x]") == (1, "[/x]: must be a .toml file\n")
     code, output = invoke(
         "simulate", "[red]a.toml", "--engine", "event", "--excel", "[b]:smile:.xlsx"
     )

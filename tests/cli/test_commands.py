@@ -19,16 +19,6 @@ from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.plots import film
 from tests.scenarios import BALLISTIC_COURTYARD
 
-COMMANDS = (
-    "simulate",
-    "validate",
-    "calibrate",
-    "evaluate",
-    "search",
-    "bench",
-    "train",
-)
-
 
 def run(*arguments: str | Path) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
@@ -149,17 +139,21 @@ def test_an_interruption_leaves_nothing_half_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_validate_reports_all_problems_of_all_files(tmp_path: Path) -> None:
+def test_draw_reports_all_problems_of_all_files(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "scenarios" / "courtyard.toml").read_text()
     bad = tmp_path / "bad.toml"
     bad.write_text(text.replace("width_m", "widht_m").replace("stock = 16", "stock = -1"))
-    result = run("validate", "courtyard", bad)
+    result = run("draw", "courtyard", bad)
     assert result.exit_code == 1
     assert "courtyard: good for simulate" in result.stdout
     output = result.stdout.replace("\n", " ")
     assert "site.widht_m: unknown key, did you mean 'width_m'?" in output
     assert "build_zone.stock: is -1, must be at least 1" in output
-    assert run("validate", "courtyard").exit_code == 0
+    assert "wrote" not in output
+    assert run("draw", "--check-only", "courtyard").exit_code == 0
+    result = run("draw", "courtyard", bad, "--out", tmp_path / "site.png")
+    assert result.exit_code == 2
+    assert "--out is for one scenario: there are 2" in result.stderr
 
 
 def calibrate(*arguments: str, out: Path) -> Result:

@@ -210,15 +210,15 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.check_sites --family item_sites --sites 12 --random-layouts 3 --threats 1"
     " --no-rejected --picture docs/pictures/item_sites.png": "--sites 2 --random-layouts 2",
     # docs/studies
-    "blast-env bench --engine gas --processes 1 --no-environment --repeats 3"
+    "python -m studies.bench --engine gas --no-environment --repeats 3"
     " --scenario visitor_entrance --scenario control_room --scenario school_and_clinic"
     " --scenario hotel_forecourt --scenario shopping_street --scenario courtyard"
     " --scenario street_front": "--repeats 1 --no-memory --scenario visitor_entrance",
     "python -m studies.engines": "--seeds 3 --scene courtyard",
-    "blast-env bench --repeats 3": (
-        "--engine event --repeats 1 --processes 1 --no-memory --no-environment"
+    "python -m studies.bench --repeats 3": (
+        "--engine event --repeats 1 --no-memory --no-environment"
     ),
-    "blast-env bench --site large": "--length 20",
+    "python -m studies.bench --site large": "--length 20",
     "blast-env calibrate --name ballistic_kb_100kg --reference reflected_impulse"
     " --distances 8,10,12.5,16,20,25,32,40 --seeds 32": "--seeds 2 --distances 8,16,32",
     "blast-env calibrate --name collisional_kb --preset collisional --reference reflected_impulse"
@@ -231,7 +231,7 @@ SMALLER: Final[dict[str, str]] = {
 NOT_RUN: Final[dict[str, str]] = {
     "blast-env --install-completion": "changes the shell of whoever runs it",
     "blast-env import FILE --out site.toml": "FILE is a placeholder; the page's next commands run",
-    "blast-env validate FILE...": "FILE is a placeholder; docs/start.md has a file to validate",
+    "blast-env draw --check-only FILE...": "FILE is a placeholder; docs/start.md has a file",
     "python -m studies.blast_again docs/data/close_site_blasts.parquet --layouts 4": (
         "200 sites; tests/studies/test_blast_again.py"
     ),

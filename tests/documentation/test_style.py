@@ -15,7 +15,7 @@ A first sentence. A second one, with `code. That` ends, and [a link](page.md#par
 - Another item
   goes on.
 
-    blast-env bench   # no sentence. None.
+    python -m studies.bench   # no sentence. None.
 
 | a table. | It has none. |
 |---|---|

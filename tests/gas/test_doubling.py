@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.speed import street
 from blast_env.gas.doubling import DoublingSolver, shape_to_double, with_double_cells
 from blast_env.gas.faces import exposed_faces
 from blast_env.gas.grid import FaceKind, GasGrid
@@ -14,6 +13,7 @@ from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
 from blast_env.gas.settings import CELLS
 from blast_env.gas.solver import Gas, GasSolver, Settling
 from blast_env.gas.source import GasCharge, set_charge
+from studies.bench import street
 
 CELL_M = 0.5
 CHARGE = GasCharge(20.0, (4.0, 8.0, 0.0))

@@ -1,43 +1,58 @@
-"""Speed of blasts and of the environment on this machine, as `blast-env bench` measures it.
+"""Processor time and memory of blasts and of the environment on this machine.
 
-Processor times are of one core and do not depend on other processes; wall times need idle cores.
+Processor times are medians on one core, which do not depend on other processes.
 """
 
 import os
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
-from math import ceil
 from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
-from time import perf_counter, process_time
-from typing import TYPE_CHECKING, Any, Final
+from time import process_time
+from typing import Annotated, Any, Final
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode
+import typer
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.engines import simulate
-from blast_env.runner import run_all
-from blast_env.site import Scenario
-from blast_env.units import MODULE_SIDE_M
-
-if TYPE_CHECKING:  # Numba takes half a second to import
-    from blast_env.evaluation.engines.gas import GasEngine
-    from blast_env.gas.cost import CostGuess
+from blast_env.cli.output import print_line, print_table, progress_bar, user_errors
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.engines import ENGINE_NAMES, find_engine, simulate
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.gas.cost import CostGuess
+from blast_env.gas.settings import CELLS, UNIFORM
+from blast_env.site import Scenario, load_scenario
+from blast_env.units import MODULE_SIDE_M, MS_PER_S
 
 ENV_ID: Final = "BlastBarrier-v0"
+LARGE: Final = "large"
+"""In the place of a scenario: streets of `LENGTHS_M`."""
 
-_LOT_S: Final = 3.0
-"""Least work per process, in seconds of processor time: shorter lots measure the start-up."""
-
-_SHORTEST_M: Final = 20.0
+LENGTHS_M: Final = (20.0, 50.0, 100.0)
+_LONGEST_M: Final = 200.0
+_LONGEST_UNIFORM_M: Final = 100.0
 _PACKAGES: Final = ("numpy", "numba", "pymunk")
+_BLAST_HEADERS: Final = (
+    *("scenario", "engine", "simulated (ms)", "steps", "CPU (ms)", "blasts per CPU s"),
+    *("million cell updates per CPU s", "memory (MB)"),
+)
+_ENVIRONMENT_HEADERS: Final = (
+    *("scenario", "engine", "steps", "episode (ms)", "placing (ms)", "blast and reward (ms)"),
+)
+_SITE_HEADERS: Final = (
+    *("site", "cells", "smallest", "steps estimated", "steps", "CPU estimated (s)", "CPU (s)"),
+    *("million cell updates per CPU s", "memory estimated (MB)", "memory (MB)"),
+)
+_ELSEWHERE: Final = (
+    "elsewhere, million cell updates per s: rhoCentralFoam 1.3 (a core), MFC 59 (96 cores) and 222 "
+    "(an H100), AthenaK above 1,000 (a Grace Hopper)"
+)
 
 
 @dataclass(frozen=True)
@@ -192,21 +207,21 @@ class SiteCost:
 
     site: str
     cells: str
-    told: "CostGuess"
+    told: CostGuess
     steps: int
     cell_updates: int
     cpu_s: float
     memory_mb: float
 
 
-def site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
+def site_cost(scenario: Scenario, engine: GasEngine) -> SiteCost:
     """Run a blast on a site, in a separate process."""
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(_site_cost, (scenario, engine))
 
 
-def _site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
-    engine.blast(street(_SHORTEST_M)).run()  # compiles code that is not on disk yet
+def _site_cost(scenario: Scenario, engine: GasEngine) -> SiteCost:
+    engine.blast(street(LENGTHS_M[0])).run()  # compiles code that is not on disk yet
     began = process_time()
     result = engine.blast(scenario).run()
     cpu_s = process_time() - began
@@ -222,50 +237,6 @@ def _site_cost(scenario: Scenario, engine: "GasEngine") -> SiteCost:
 
 
 @dataclass(frozen=True)
-class Crowd:
-    """Rates of the same blasts in one process and in several at once, by wall time.
-
-    Attributes:
-        processes: Number of processes.
-        alone_per_s: Blasts per second of one process.
-        together_per_s: Blasts per second of all processes together.
-    """
-
-    processes: int
-    alone_per_s: float
-    together_per_s: float
-
-    @property
-    def ratio(self) -> float:
-        """The rate of all processes as a multiple of that of one."""
-        return self.together_per_s / self.alone_per_s
-
-
-def crowd(scenario: Scenario, engine: str, cpu_s: float, processes: int) -> Crowd:
-    """Run lots of blasts in one worker process, then in several at once.
-
-    Args:
-        scenario: The scenario.
-        engine: Name of the engine.
-        cpu_s: Approximate processor time of one blast.
-        processes: Number of processes at once.
-    """
-    lot = max(2, ceil(_LOT_S / cpu_s))
-    rates = []
-    for count in (1, processes):
-        run_all(partial(_blasts, scenario, engine, 1), range(count), processes)  # load the code
-        began = perf_counter()
-        run_all(partial(_blasts, scenario, engine, lot), range(count), processes)
-        rates.append(count * lot / (perf_counter() - began))
-    return Crowd(processes, *rates)
-
-
-def _blasts(scenario: Scenario, engine: str, count: int, first_seed: int) -> None:
-    for seed in range(count):
-        simulate(scenario, seed=count * first_seed + seed, engine=engine)
-
-
-@dataclass(frozen=True)
 class EnvironmentCost:
     """The cost of an episode of random legal placements; medians of processor times.
 
@@ -274,16 +245,12 @@ class EnvironmentCost:
         episode_s: Time of the whole episode.
         blast_s: Time of its last step, with the blasts and the reward.
         steps: Number of steps per episode.
-        vector_steps_per_s: Steps per second, by wall time, of all environments of the vector.
-        environments: Number of environments in the vector, each in its process.
     """
 
     engine: str
     episode_s: float
     blast_s: float
     steps: int
-    vector_steps_per_s: float
-    environments: int
 
     @property
     def placing_s(self) -> float:
@@ -291,16 +258,13 @@ class EnvironmentCost:
         return self.episode_s - self.blast_s
 
 
-def environment_cost(
-    scenario: Scenario, engine: str, episodes: int, environments: int
-) -> EnvironmentCost:
-    """Time the environment in one process, and in a vector of processes.
+def environment_cost(scenario: Scenario, engine: str, episodes: int) -> EnvironmentCost:
+    """Time the environment.
 
     Args:
         scenario: The scenario; it needs a build zone, and a calibration where the engine does.
         engine: Name of the engine.
         episodes: Number of timed episodes, after one to warm up.
-        environments: Number of processes of the vector.
 
     Raises:
         BlastEnvError: If the environment cannot be made of the scenario.
@@ -311,14 +275,7 @@ def environment_cost(
     played = [_episode(env, rng, seed) for seed in range(1, episodes + 1)]
     env.close()
     whole_s, blast_s, steps = zip(*played, strict=True)
-    return EnvironmentCost(
-        engine=engine,
-        episode_s=median(whole_s),
-        blast_s=median(blast_s),
-        steps=round(median(steps)),
-        vector_steps_per_s=_vector_steps_per_s(scenario, engine, episodes, environments),
-        environments=environments,
-    )
+    return EnvironmentCost(engine, median(whole_s), median(blast_s), round(median(steps)))
 
 
 def _episode(
@@ -343,31 +300,6 @@ def random_action(mask: FloatArray | NDArray[Any], rng: np.random.Generator) -> 
     return int(rng.choice(free)) if len(free) else len(mask) - 1
 
 
-def _vector_steps_per_s(scenario: Scenario, engine: str, episodes: int, count: int) -> float:
-    make = partial(gym.make, ENV_ID, scenario=scenario, engine=engine)
-    mode = AutoresetMode.SAME_STEP
-    envs = AsyncVectorEnv([make] * count, context="spawn", autoreset_mode=mode)
-    rng = np.random.default_rng(0)
-    try:
-        envs.reset(seed=0)
-        _play(envs, rng, 1)
-        began = perf_counter()
-        return _play(envs, rng, episodes) / (perf_counter() - began)
-    finally:
-        envs.close()
-
-
-def _play(envs: AsyncVectorEnv, rng: np.random.Generator, episodes: int) -> int:
-    """Return the steps of all environments until each has ended the given number of episodes."""
-    ended, steps = np.zeros(envs.num_envs, dtype=np.int64), 0
-    while ended.min() < episodes:
-        masks: Sequence[NDArray[Any]] = envs.call("action_masks")
-        _, _, over, _, _ = envs.step(np.array([random_action(mask, rng) for mask in masks]))
-        ended += over
-        steps += envs.num_envs
-    return steps
-
-
 def hardware() -> str:
     """Return the processor, the number of cores and the versions on which the speed depends."""
     packages = ", ".join(f"{name} {version(name)}" for name in _PACKAGES)
@@ -381,3 +313,134 @@ def _processor() -> str:
         lines = []
     models = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     return next(models, platform.processor() or platform.machine())
+
+
+def _print_blasts(costs: Sequence[BlastCost], repeats: int) -> None:
+    rows = [
+        (
+            each.scenario,
+            each.engine,
+            f"{MS_PER_S * each.simulated_s:.0f}",
+            f"{each.steps:,}",
+            f"{MS_PER_S * each.cpu_s:.1f}",
+            f"{1.0 / each.cpu_s:.2f}",
+            "-" if each.cell_updates is None else f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
+            "-" if each.memory_mb is None else f"{each.memory_mb:.0f}",
+        )
+        for each in costs
+    ]
+    print_table(f"a blast: medians of {repeats} seeds", _BLAST_HEADERS, rows, 2)
+
+
+def _print_environments(pairs: Sequence[tuple[Scenario, str]], repeats: int) -> None:
+    rows, left_out = [], []
+    for scenario, engine in pairs:
+        try:
+            cost = environment_cost(scenario, engine, repeats)
+        except BlastEnvError as error:
+            left_out.append(f"{scenario.name}, {engine}: no environment: {error}")
+            continue
+        times_s = (cost.episode_s, cost.placing_s, cost.blast_s)
+        milliseconds = (f"{MS_PER_S * each:.1f}" for each in times_s)
+        rows.append((scenario.name, engine, str(cost.steps), *milliseconds))
+    title = f"{ENV_ID}: random placements, medians of {repeats} episodes"
+    print_table(title, _ENVIRONMENT_HEADERS, rows, 2)
+    for line in left_out:
+        print_line(line)
+
+
+def _sites(names: Sequence[str], lengths_m: Sequence[float]) -> Iterator[Scenario]:
+    for name in names:
+        if name != LARGE:
+            yield load_scenario(name)
+            continue
+        for length_m in lengths_m or LENGTHS_M:
+            if not LENGTHS_M[0] <= length_m <= _LONGEST_M:
+                bounds = f"{LENGTHS_M[0]:g} to {_LONGEST_M:g}"
+                raise BlastEnvError(f"--length is {length_m:g}, must be {bounds}")
+            yield street(length_m)
+
+
+def _print_sites(sites: Sequence[Scenario], cells: Sequence[str]) -> None:
+    pairs = [
+        (scenario, GasEngine(cells=each))
+        for scenario in sites
+        for each in cells or CELLS
+        if each != UNIFORM or scenario.site.width_m <= _LONGEST_UNIFORM_M
+    ]
+    rows = []
+    with progress_bar("blasts") as progress:
+        for scenario, engine in pairs:
+            each = site_cost(scenario, engine)
+            rows.append(
+                (
+                    each.site,
+                    each.cells,
+                    f"{each.told.cells:,}",
+                    f"{each.told.steps:,}",
+                    f"{each.steps:,}",
+                    f"{each.told.seconds:.1f}",
+                    f"{each.cpu_s:.1f}",
+                    f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
+                    f"{1e-6 * each.told.memory_bytes:.0f}",
+                    f"{each.memory_mb:.0f}",
+                )
+            )
+            progress(len(rows) / len(pairs))
+    print_table("a blast by gas dynamics, without a barrier", _SITE_HEADERS, rows, 2)
+    print_line(_ELSEWHERE)
+
+
+def main(
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="A scenario, else courtyard. May be repeated.")
+    ] = None,
+    engine: Annotated[
+        list[str] | None, typer.Option(help="Engine, else all of them. May be repeated.")
+    ] = None,
+    repeats: Annotated[int, typer.Option(help="Blasts or episodes of each.", min=1)] = 5,
+    memory: Annotated[bool, typer.Option(help="Measure the memory of a process, too.")] = True,
+    environment: Annotated[bool, typer.Option(help=f"Time {ENV_ID}, too.")] = True,
+    site: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Only the cost of a blast by gas dynamics there, beside its estimate: a scenario, "
+            "or `large` for streets. May be repeated."
+        ),
+    ] = None,
+    cells: Annotated[
+        list[str] | None,
+        typer.Option(help="With --site: how cells grow, else each way. May be repeated."),
+    ] = None,
+    length: Annotated[
+        list[float] | None,
+        typer.Option(help="With --site large: 20 to 200 m, else 20, 50 and 100. May be repeated."),
+    ] = None,
+) -> None:
+    """Time blasts and the environment on this machine, and measure the memory."""
+    with user_errors():
+        if length and LARGE not in (site or ()):
+            raise BlastEnvError("--length needs --site large")
+        if cells and not site:
+            raise BlastEnvError("--cells needs --site")
+        if site:
+            sites = list(_sites(site, length or ()))
+            print_line(hardware())
+            _print_sites(sites, cells or ())
+            return
+        scenarios = [load_scenario(each) for each in scenario or ("courtyard",)]
+        engines = [find_engine(each).name for each in engine or ENGINE_NAMES]
+        print_line(hardware())
+        pairs = [(each, name) for each in scenarios for name in engines]
+        costs: list[BlastCost] = []
+        with progress_bar("blasts") as progress:
+            for each, name in pairs:
+                costs.append(blast_cost(each, name, repeats, memory=memory))
+                progress(len(costs) / len(pairs))
+        _print_blasts(costs, repeats)
+        if environment:
+            _print_environments(pairs, repeats)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,29 +1,33 @@
-"""`blast-env bench`, and what it measures."""
+"""The cost of blasts and environments, and the tables of it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from typer import Typer
+from typer.testing import CliRunner, Result
 
 from blast_env import Scenario, load_scenario, simulate
-from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import speed
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.speed import (
-    Crowd,
+from blast_env.layout.build_scene import draw_charge
+from studies import bench
+from studies.bench import (
     SiteCost,
     blast_cost,
-    crowd,
     environment_cost,
     random_action,
     site_cost,
     street,
 )
-from blast_env.layout.build_scene import draw_charge
 from tests.envs.small import small_document
 from tests.gas_sites import hut
+
+
+def run(*arguments: str) -> Result:
+    app = Typer()
+    app.command()(bench.main)
+    return CliRunner().invoke(app, arguments)
 
 
 def small() -> Scenario:
@@ -46,23 +50,14 @@ def test_a_blast_of_gas_counts_its_cells() -> None:
 
 
 def test_memory_is_that_of_a_process_of_its_own() -> None:
-    assert 50.0 < speed.peak_memory_mb(small(), "event") < 1000.0
-
-
-def test_blasts_are_counted_by_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed, "_LOT_S", 0.1)
-    found = crowd(small(), "event", 0.02, 2)
-    assert found.processes == 2
-    assert 0.0 < found.ratio < 20.0
-    assert Crowd(2, alone_per_s=4.0, together_per_s=7.0).ratio == 1.75
+    assert 50.0 < bench.peak_memory_mb(small(), "event") < 1000.0
 
 
 def test_an_episode_is_its_placements_and_its_blast() -> None:
-    cost = environment_cost(small(), "event", episodes=1, environments=1)
+    cost = environment_cost(small(), "event", episodes=1)
     assert cost.steps == 3  # the stock
     assert 0.0 < cost.placing_s < cost.episode_s
     assert cost.blast_s + cost.placing_s == pytest.approx(cost.episode_s)
-    assert cost.vector_steps_per_s > 0.0
 
 
 def test_random_actions_are_legal_and_finish_when_nothing_is_free() -> None:
@@ -74,18 +69,18 @@ def test_random_actions_are_legal_and_finish_when_nothing_is_free() -> None:
 
 def test_a_scenario_without_a_build_zone_has_no_environment() -> None:
     with pytest.raises(BlastEnvError, match="build zone"):
-        environment_cost(load_scenario("free_field"), "event", 1, 1)
+        environment_cost(load_scenario("free_field"), "event", 1)
 
 
 def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("blast_env.cli.bench.load_scenario", lambda _: small())
-    options = ("--engine", "event", "--repeats", "1", "--processes", "1", "--no-memory")
-    result = CliRunner().invoke(app, ["bench", *options, "--no-environment"])
+    monkeypatch.setattr("studies.bench.load_scenario", lambda _: small())
+    options = ("--engine", "event", "--repeats", "1", "--no-memory")
+    result = run(*options, "--no-environment")
     assert result.exit_code == 0, result.output
     for words in ("cores", "pymunk 7", "blasts per CPU s", small().name, "event"):
         assert words in result.stdout
     assert "gas" not in result.stdout
-    refused = CliRunner().invoke(app, ["bench", "--engine", "steam"])
+    refused = run("--engine", "steam")
     assert refused.exit_code == 2
     assert "steam" in refused.output
 
@@ -121,9 +116,9 @@ def test_the_command_prints_a_row_for_each_site_and_way_of_growing(
     def known(scenario: Scenario, engine: GasEngine) -> SiteCost:
         return replace(cost, site=scenario.name, cells=str(engine.cells))
 
-    monkeypatch.setattr("blast_env.cli.bench.site_cost", known)
+    monkeypatch.setattr("studies.bench.site_cost", known)
     own = ("--site", "large", "--length", "20", "--site", "visitor_entrance")
-    result = CliRunner().invoke(app, ["bench", *own, "--cells", "coarse"])
+    result = run(*own, "--cells", "coarse")
     assert result.exit_code == 0, result.output
     rows = [line.split()[:2] for line in result.output.splitlines()]
     assert ["street_20_m", "coarse"] in rows
@@ -141,6 +136,6 @@ def test_the_command_prints_a_row_for_each_site_and_way_of_growing(
     ],
 )
 def test_wrong_options_of_large_sites_are_named(options: tuple[str, ...], words: str) -> None:
-    refused = CliRunner().invoke(app, ["bench", *options])
+    refused = run(*options)
     assert refused.exit_code == 2
     assert words in " ".join(refused.output.split())

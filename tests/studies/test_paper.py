@@ -1,17 +1,20 @@
-"""`blast-env paper`, run in this process."""
+"""The paper's tables, from its columns."""
 
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from typer import Typer
 from typer.testing import CliRunner, Result
 
-from blast_env.cli import app
 from blast_env.particles.paper import LINEAR, comparison_table
+from studies import paper
 
 
 def run(*arguments: str) -> Result:
-    return CliRunner().invoke(app, ("paper", *arguments))
+    app = Typer()
+    app.command()(paper.main)
+    return CliRunner().invoke(app, arguments)
 
 
 def test_the_paper_s_tables_are_printed_and_written(tmp_path: Path) -> None:
