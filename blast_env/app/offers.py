@@ -11,7 +11,7 @@ from blast_env.site import AnyCharge, Scenario
 from blast_env.site.vehicles import source_of
 
 PACKAGED: Final = "package"
-"""The proposer of `blast-env propose`: a surrogate, or the best rule."""
+"""The proposer of `blast-env search --method package`."""
 
 
 def offered(scenario: Scenario, runs: Iterable[str] = ()) -> Mapping[str, str]:

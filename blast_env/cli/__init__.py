@@ -31,7 +31,6 @@ class _Commands(LazyGroup):
         "search": "Search for the layout with the least load on the protected structures.",
         "train": ("Train an agent that proposes layouts, or resume an interrupted training."),
         "judge": "Run submissions to the benchmark again by gas dynamics, and show the standings.",
-        "propose": "Propose a layout for any site in seconds without a blast.",
         "report": "Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.",
         "import": "Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.",
         "app": (
@@ -39,7 +38,7 @@ class _Commands(LazyGroup):
             "search."
         ),
     }
-    functions = ("draw",)
+    functions = ("draw", "search")
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 
 

@@ -1,15 +1,16 @@
 """Options that commands and studies share, with one name and one meaning in all."""
 
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from types import MappingProxyType
+from typing import Annotated, Any, Final
 
 import typer
 
-from blast_env.cli.command import FOLDER, Command, option
+from blast_env.cli.command import FOLDER, Command, option, writes
 from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
@@ -19,14 +20,110 @@ from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAM
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
 from blast_env.site.sections import PointM
-from blast_env.values import printable
+from blast_env.values import plain_number, printable
 
-CLUSTER_HELP: Final = (
-    "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of "
-    "worker processes (docs/howto/cluster.md)."
+SCENARIO_HELP: Final = "Bundled name, or a scenario file."
+ENGINE_HELP: Final = (
+    f"Engine: {', '.join(ENGINE_NAMES)}. {JUDGE} is gas dynamics, "
+    f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
 )
+BY_SITE: Final = f"{JUDGE} where the site states heights, else particles"
+CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
+CELLS_HELP: Final = (
+    "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
+    "for search; fine: later, for final results."
+)
+FINAL_CELLS: Final = "uniform of 0.25 m, fine on sites wider than 40 m"
+UNTIL_HELP: Final = (
+    "Loads that a blast of gas dynamics waits for. structures: those protected; walls: all; "
+    "gauges; or a number of seconds."
+)
+CHARGE: Final = "X,Y[,KG]"
+"""The form of a charge in all commands."""
 
-ClusterAddress = Annotated[str | None, typer.Option("--cluster", help=CLUSTER_HELP)]
+ScenarioArgument = Annotated[str, typer.Argument(help=SCENARIO_HELP)]
+LayoutOption = Annotated[
+    Path | None, typer.Option("--layout", help="Layout file; without it, the empty site.")
+]
+ChargeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--charge",
+        help="Place of the charge, m, and its mass, kg TNT, instead of drawn ones.",
+        metavar=CHARGE,
+    ),
+]
+TntOption = Annotated[
+    float | None,
+    typer.Option(
+        "--tnt-kg", help="Mass of the charge, kg TNT, instead of the scenario's.", metavar="KG"
+    ),
+]
+DrawsOption = Annotated[
+    int,
+    typer.Option("--charges", help="Draws of the charge; each place counts once.", min=1),
+]
+EngineOption = Annotated[str, typer.Option("--engine", help=ENGINE_HELP)]
+CellOption = Annotated[float | None, typer.Option("--cell", help=CELL_HELP)]
+CellsOption = Annotated[
+    str | None, typer.Option("--cells", help=CELLS_HELP, show_default="uniform")
+]
+FinalCellOption = Annotated[
+    float | None,
+    typer.Option(
+        "--cell", help="Side of the cells of gas dynamics, m; else 0.25, for final statements."
+    ),
+]
+FinalCellsOption = Annotated[
+    str | None, typer.Option("--cells", help=CELLS_HELP, show_default=FINAL_CELLS)
+]
+TARGET_HELP: Final = "Required level of protection; else the scenario's, else {}."
+TargetOption = Annotated[str | None, typer.Option("--target", help=TARGET_HELP.format("low"))]
+MassErrorOption = Annotated[
+    float,
+    typer.Option(
+        "--mass-error",
+        help="Half the width of the 95 % interval of the charges' masses, as a share, for the "
+        "probability of the level.",
+        min=0.0,
+        max=0.3,
+    ),
+]
+RequireOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--require",
+        help="Requirement beside or instead of the level: a level of protection, 'gsa 3a', "
+        "'iso D', 'peak KPA' or 'impulse PA_S'. May be repeated.",
+    ),
+]
+CvarOption = Annotated[
+    float,
+    typer.Option(
+        "--cvar-level", help="Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
+    ),
+]
+ProcessesOption = Annotated[int, typer.Option("--processes", help="Worker processes.", min=1)]
+ClusterAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        help="Address or scheduler file of a Dask cluster, which then runs the blasts in the place "
+        "of worker processes (docs/howto/cluster.md).",
+    ),
+]
+CacheOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--cache",
+        help="Folder in which blasts are kept for the next run.",
+        callback=writes(),
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary of the result as JSON.")]
+JsonAllOption = Annotated[
+    bool, typer.Option("--json-all", help="Print the complete result as JSON.")
+]
 
 
 @contextmanager
@@ -44,39 +141,54 @@ def running_on(cluster: str | None) -> Iterator[None]:
         yield
 
 
-SCENARIO_HELP: Final = "Bundled name, or a scenario file."
-ENGINE_HELP: Final = (
-    f"Engine: {', '.join(ENGINE_NAMES)}. {JUDGE} is gas dynamics, "
-    f"{' and '.join(CALIBRATED_ENGINES)} are the paper's particles."
-)
-BY_SITE: Final = f"{JUDGE} where the site states heights, else particles"
-CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.5."
-CELLS_HELP: Final = (
-    "Whether cells of gas dynamics grow with the blast. uniform: no; on large sites coarse: soon, "
-    "for search; fine: later, for final results."
-)
-FINAL_CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.25, for final statements."
-FINAL_CELLS: Final = "uniform of 0.25 m, fine on sites wider than 40 m"
-UNTIL_HELP: Final = (
-    "Loads that a blast of gas dynamics waits for. structures: those protected; walls: all; "
-    "gauges; or a number of seconds."
-)
-CHARGE: Final = "X,Y[,KG]"
-"""The form of a charge in all commands."""
+def resume_words(cache: Path | None) -> str:
+    """Return the way to resume after Ctrl-C: from the cached blasts, if there is a cache."""
+    if cache is None:
+        return "with --cache FOLDER the blasts would have been kept for the next call"
+    return f"the same command resumes with the blasts kept in {cache}"
 
-GivenCharge = tuple[float, float] | tuple[float, float, float]
-"""Place of a charge, m, with its mass, kg TNT, unless the scenario's is meant."""
 
-TARGET_HELP: Final = "Required level of protection; else the scenario's, else {}."
-MASS_ERROR_HELP: Final = (
-    "Half the width of the 95 % interval of the charges' masses, as a share, for the probability "
-    "of the level."
-)
-REQUIRE_HELP: Final = (
-    "Requirement beside or instead of the level: a level of protection, 'gsa 3a', 'iso D', "
-    "'peak KPA' or 'impulse PA_S'. May be repeated."
-)
-CVAR_HELP: Final = "Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
+_COUNTS: Final = MappingProxyType({2: "two", 3: "three", 4: "four"})
+
+
+def numbers(option: str, text: str, form: str) -> tuple[Any, ...]:
+    """Return the numbers of a text with commas.
+
+    Args:
+        option: The option, for the error.
+        text: Its value.
+        form: The form of its value, such as `X,Y[,KG]`: brackets enclose a number that may be left
+            out.
+
+    Raises:
+        BlastEnvError: If the text has another form.
+    """
+    most = form.count(",") + 1
+    counts = range(most - form.count("["), most + 1)
+    with suppress(BlastEnvError):
+        found = tuple(plain_number(option, part) for part in text.split(","))
+        if len(found) in counts:
+            return found
+    words = " or ".join(_COUNTS[each] for each in counts)
+    raise BlastEnvError(f"{option} is {text!r}, must be {words} numbers as {form}")
+
+
+def refuse_given(context: typer.Context, names: Collection[str], reason: str) -> None:
+    """Refuse options on the command line that do not apply.
+
+    Args:
+        context: The context of the command.
+        names: The parameters of these options.
+        reason: The reason, after the option in the error.
+
+    Raises:
+        BlastEnvError: If one of them was given.
+    """
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        source = context.get_parameter_source(name)
+        if name in names and source is not None and source.name == "COMMANDLINE":
+            raise BlastEnvError(f"{parameter.opts[0]} {reason}")
 
 
 def wanted_level(
@@ -98,11 +210,78 @@ def wanted_level(
     return otherwise if target is None else target
 
 
+@dataclass(frozen=True)
+class GivenCharge:
+    """The place and the mass of the charge, where the user gives them.
+
+    Attributes:
+        place_m: The place, m.
+        mass_kg: The mass, kg TNT.
+    """
+
+    place_m: PointM | None
+    mass_kg: float | None
+
+    @classmethod
+    def of(cls, charge: str | None, tnt_kg: float | None) -> "GivenCharge":
+        """Return the charge of the options `--charge` and `--tnt-kg`.
+
+        Raises:
+            BlastEnvError: If the charge has another form, or the mass is given twice.
+        """
+        if charge is None:
+            return cls(None, tnt_kg)
+        x_m, y_m, *own_kg = numbers("--charge", charge, CHARGE)
+        if own_kg and tnt_kg is not None:
+            raise BlastEnvError(
+                f"--charge has the mass {own_kg[0]:g} kg, and --tnt-kg is {tnt_kg:g}: give one of "
+                "them"
+            )
+        return cls((x_m, y_m), own_kg[0] if own_kg else tnt_kg)
+
+    def fixed(self, scenario: Scenario, drawn: AnyCharge) -> AnyCharge:
+        """Return a charge with the given place and mass, if any.
+
+        Args:
+            scenario: The scenario.
+            drawn: The charge drawn without them; with a given place, it is in no vehicle.
+
+        Raises:
+            ScenarioError: If it is out of bounds, or not clear of a structure or the border.
+        """
+        options = ResetOptions(charge_position_m=self.place_m, tnt_kg=self.mass_kg)
+        if not options.fix_charge:
+            return drawn
+        charge = options.charge(drawn)
+        if not isinstance(charge, VehicleCharge):
+            scenario.with_charge(charge)  # refuses a place that is not clear
+        return charge
+
+    def fixed_charges(self, scenario: Scenario, draws: int) -> list[AnyCharge]:
+        """Return the drawn charges, each place once, with the given place and mass.
+
+        Args:
+            scenario: The scenario.
+            draws: Number of draws.
+        """
+        threats = one_of_each_charge(draw_threats(scenario, range(draws)))
+        return list(dict.fromkeys(self.fixed(scenario, threat.charge) for threat in threats))
+
+
+# legacy
+CLUSTER_HELP: Final = "Address or scheduler file of a Dask cluster, which then runs the blasts in the place of worker processes (docs/howto/cluster.md)."  # noqa: E501
+FINAL_CELL_HELP: Final = "Side of the cells of gas dynamics, m; else 0.25, for final statements."
+GivenChargeNumbers = tuple[float, float] | tuple[float, float, float]
+MASS_ERROR_HELP: Final = "Half the width of the 95 % interval of the charges' masses, as a share, for the probability of the level."  # noqa: E501
+REQUIRE_HELP: Final = "Requirement beside or instead of the level: a level of protection, 'gsa 3a', 'iso D', 'peak KPA' or 'impulse PA_S'. May be repeated."  # noqa: E501
+CVAR_HELP: Final = "Level of the CVaR: 0.8 is the mean of the worst 20 % of the loads."
+
+
 @dataclass(frozen=True, kw_only=True)
 class ChargeOptions(Command):
     """The place and the mass of the charge, if the user gives them."""
 
-    charge: GivenCharge | None = option(
+    charge: GivenChargeNumbers | None = option(
         None, "Place of the charge, m, and its mass, kg TNT, instead of drawn ones.", metavar=CHARGE
     )
     tnt_kg: float | None = option(

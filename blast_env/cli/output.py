@@ -39,6 +39,11 @@ _LINE_EVERY_S: Final = 30.0
 _EXIT_OF_SIGNALS: Final = 128  # of shells; the number of the signal is added
 _BETWEEN: Final = 2  # characters between columns
 
+NOTHING_HALF_WRITTEN: Final = "no file was left half-written"
+
+LAYOUT_NAME: Final = "layout.json"
+"""File of the layout in the folder of `--out`."""
+
 LAYOUT_PICTURE: Final = "layout.png"
 """File of the picture of a layout in the folder of `--out`."""
 
@@ -103,7 +108,7 @@ def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
         try:
             yield
         except KeyboardInterrupt:
-            parts: tuple[str, ...] = ("no file was left half-written", resume() if resume else "")
+            parts: tuple[str, ...] = (NOTHING_HALF_WRITTEN, resume() if resume else "")
         except InterruptedCommandError as interrupted:
             parts = interrupted.parts
         except BlastEnvError as error:
@@ -114,6 +119,20 @@ def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
     text = "; ".join(part for part in parts if part)
     message_console().print(printable(f"interrupted: {text}"), style="yellow")
     raise typer.Exit(_EXIT_OF_SIGNALS + (SIGTERM if terminated else SIGINT))
+
+
+@contextmanager
+def resumable(words: str | Callable[[], str]) -> Iterator[None]:
+    """End an interruption of the block with the way to resume.
+
+    Args:
+        words: The way to resume, or a function that returns it; empty if there is none.
+    """
+    try:
+        yield
+    except KeyboardInterrupt as interruption:
+        resume = words if isinstance(words, str) else words()
+        raise InterruptedCommandError(NOTHING_HALF_WRITTEN, resume) from interruption
 
 
 @contextmanager

@@ -13,8 +13,10 @@ from blast_env.cli.options import (
     SCENARIO_HELP,
     TARGET_HELP,
     CacheOptions,
-    GivenCharge,
     ProcessOptions,
+)
+from blast_env.cli.options import (
+    GivenChargeNumbers as GivenCharge,
 )
 from blast_env.cli.output import (
     InterruptedCommandError,

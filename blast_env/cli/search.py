@@ -1,42 +1,49 @@
-"""`blast-env search`: the layout with the least load, for a budget of blasts."""
+"""`blast-env search`: the layout with the least load, for a budget of blasts, or for none."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import cycle, islice
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
+import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from blast_env.cli.command import FOLDER, option
+from blast_env.cli.command import writes
 from blast_env.cli.options import (
-    CELL_HELP,
-    CELLS_HELP,
-    CVAR_HELP,
-    ENGINE_HELP,
     SCENARIO_HELP,
-    CacheOptions,
-    ChargeOptions,
-    ClusterOptions,
-    ProcessOptions,
+    CacheOption,
+    CellOption,
+    CellsOption,
+    ChargeOption,
+    ClusterAddress,
+    CvarOption,
+    EngineOption,
+    GivenCharge,
+    ProcessesOption,
+    TntOption,
+    refuse_given,
+    resume_words,
     running_on,
 )
 from blast_env.cli.output import (
+    LAYOUT_NAME,
     LAYOUT_PICTURE,
     InterruptedCommandError,
-    ResultTable,
     message_console,
     percent,
     print_cost,
     print_line,
+    print_table,
     print_written,
     progress_bar,
-    result_console,
+    resumable,
     save_layout_picture,
     save_pictures,
 )
+from blast_env.cli.proposal import PACKAGE, package_proposal, verify_proposal
 from blast_env.design.search import (
     DesignProblem,
     Proposer,
@@ -51,7 +58,6 @@ from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
-    Case,
     LayoutEvaluation,
     SeedRange,
     Threat,
@@ -59,7 +65,7 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
-from blast_env.evaluation.engines import JUDGE, Engine, find_engine
+from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.layout import load_layout, write_layout
@@ -68,178 +74,166 @@ from blast_env.site import Scenario, load_scenario
 from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
 
-if TYPE_CHECKING:
-    from blast_env.design.surrogate import Surrogate
-
 ThreatName = Literal["visible", "hidden"]
 
-LAYOUT_NAME: Final = "layout.json"
-"""File of the layout in the folder of `--out`."""
-
 _SURROGATE: Final = "surrogate"
-_NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "surrogate")
-"""Options that do not affect the result, or are recorded in another form."""
+_NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
+"""Options that do not affect the layout."""
+
+_WITH_BLASTS: Final = (
+    *("seed", "threat", "threats", "realisations", "risk", "cvar_level", "engine", "cell_m"),
+    *("start_from", "surrogate", "held_out", "cluster", "cache"),
+)
+"""Options of the searches by blasts alone."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SearchCommand(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions):
+def search(
+    context: typer.Context,
+    method: Annotated[
+        str, typer.Option(help=f"{', '.join(proposers())}. package runs no blast.")
+    ] = "genetic",
+    scenario: Annotated[str, typer.Option(help=SCENARIO_HELP)] = "courtyard",
+    budget: Annotated[
+        int | None,
+        typer.Option(
+            help="Most blasts that may be spent; with --verify, on the comparison: it limits the "
+            "rules, then the charges.",
+            show_default=f"{DEFAULT_BUDGET}; with --verify as many as are needed",
+            min=1,
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Decides threats and search.", min=0)] = 0,
+    threat: Annotated[
+        ThreatName,
+        typer.Option(help="visible: one known charge; hidden: a layout for all possible charges."),
+    ] = "visible",
+    threats: Annotated[
+        int | None, typer.Option(help="Charges of a hidden threat; 16 unless given.", min=1)
+    ] = None,
+    realisations: Annotated[
+        int | None,
+        typer.Option(
+            help="Particle blasts per charge; 2 (visible) or 1 (hidden) unless given.", min=1
+        ),
+    ] = None,
+    risk: Annotated[
+        str | None,
+        typer.Option(
+            help="mean, cvar or worst, over the charges.",
+            show_default="as in the scenario's objective",
+        ),
+    ] = None,
+    cvar_level: CvarOption = CVAR_LEVEL,
+    engine: EngineOption = JUDGE,
+    cell_m: CellOption = None,
+    cells: CellsOption = None,
+    start_from: Annotated[
+        list[Path] | None, typer.Option(help="Initial layout file; may be given again.")
+    ] = None,
+    surrogate: Annotated[
+        Path | None,
+        typer.Option(
+            help="File of the surrogate for --method surrogate (studies.surrogate fit).",
+            show_default="the package's",
+        ),
+    ] = None,
+    held_out: Annotated[
+        int, typer.Option(help="Number of threats for the final check of the result.", min=1)
+    ] = 32,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify",
+            help="With --method package: compare it by gas dynamics with no barrier and the rules.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for layout, its plan, history, front and figure.", callback=writes()
+        ),
+    ] = None,
+    charge: ChargeOption = None,
+    tnt_kg: TntOption = None,
+    processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
+    cache: CacheOption = None,
+) -> None:
     """Search for the layout with the least load on the protected structures.
 
     Ctrl-C ends the search and keeps the best layout so far. The result is checked on threats
     outside the search; those blasts do not count.
+
+    --method package proposes a layout in seconds without a blast, by the surrogate of gas dynamics;
+    nothing is proposed if the expected reduction is below 3 %. Without --charge, that layout is for
+    all possible places of the charge.
     """
-
-    method: str = option("genetic", f"{', '.join(proposers())}.")
-    scenario: str = option("courtyard", SCENARIO_HELP)
-    budget: int = option(DEFAULT_BUDGET, "Most blasts that may be spent.", min=1)
-    seed: int = option(0, "Decides threats and search.", min=0)
-    threat: ThreatName = option(
-        "visible", "visible: one known charge; hidden: a layout for all possible charges."
-    )
-    threats: int | None = option(None, "Charges of a hidden threat; 16 unless given.", min=1)
-    realisations: int | None = option(
-        None,
-        "Particle blasts per charge; 2 (visible) or 1 (hidden) unless given.",
-        min=1,
-    )
-    risk: str | None = option(
-        None,
-        "mean, cvar or worst, over the charges.",
-        show_default="as in the scenario's objective",
-    )
-    cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
-    engine: str = option(JUDGE, ENGINE_HELP)
-    cell_m: float | None = option(None, CELL_HELP)
-    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
-    start_from: tuple[Path, ...] = option((), "Initial layout file; may be given again.")
-    surrogate: Path | None = option(
-        None,
-        "File of the surrogate for --method surrogate (studies.surrogate fit).",
-        show_default="the package's",
-    )
-    held_out: int = option(32, "Number of threats for the final check of the result.", min=1)
-    out: Path | None = option(
-        None, "Folder for layout, its plan, history, front and figure.", writes=FOLDER
-    )
-
-    def __call__(self) -> None:
-        """Search, check the result, and write it."""
-        with running_on(self.cluster):
-            engine = find_engine(self.engine, self.cell_m, cells=self.cells)
-            evaluator = BlastEvaluator(load_scenario(self.scenario), engine, cache=self.cache)
-            if self.out is not None:
-                make_folder(self.out)
-            method, surrogate = self._method(evaluator.scenario)
-            run = self._run(method, evaluator)
-            if run.result.interrupted and not run.result.history:
-                raise KeyboardInterrupt  # there is no layout to keep
-            checked = self._check(run)
-            print_search(run, checked)
-            if self.out is not None:
-                options = {**self._options(), "surrogate": surrogate}
-                write_search(run, options, checked, self.out)
-        if run.result.interrupted:
-            layout = None if self.out is None else self.out / LAYOUT_NAME
-            raise InterruptedCommandError(
-                "the best layout so far was kept",
-                "" if layout is None else f"--start-from {layout} begins with it",
-                self.how_to_resume(),
+    given = GivenCharge.of(charge, tnt_kg)
+    if method == PACKAGE:
+        refuse_given(context, _WITH_BLASTS, f"does not apply to --method {PACKAGE}")
+        if budget is not None and not verify:
+            raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast")
+        found = package_proposal(load_scenario(scenario), given, cells, processes, out)
+        if verify:
+            verify_proposal(*found, budget, cells)
+        return
+    if verify:
+        raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
+    with running_on(cluster), resumable(resume_words(cache)):
+        site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
+        if out is not None:
+            make_folder(out)
+        proposer, digest = _method(method, site, start_from or (), surrogate)
+        model = find_threat_model(threat, threats)
+        repeats = find_realisations(realisations, threat, used)
+        measure = find_risk(risk, cvar_level)
+        if isinstance(model, HiddenThreat):
+            refuse_given(
+                context, ("charge", "tnt_kg"), "is for a visible threat: a hidden one is drawn"
             )
-
-    def _options(self) -> dict[str, Any]:
-        """Return the options that affect the result, as plain data."""
-        named = {each.name: getattr(self, each.name) for each in fields(self)}
-        named["start_from"] = [str(path) for path in self.start_from]
-        return {name: each for name, each in named.items() if name not in _NOT_OF_THE_SEARCH}
-
-    def _method(self, scenario: Scenario) -> "tuple[Proposer, str | None]":
-        """Return the method, and the digest of its surrogate if it has one."""
-        if self.surrogate is not None and self.method != _SURROGATE:
-            raise BlastEnvError(f"--surrogate is for --method {_SURROGATE}, not {self.method}")
-        proposer_row(self.method)  # refuses an unknown one
-        guessing = self._surrogate() if self.method == _SURROGATE else None
-        check_suits(self.method, scenario)
-        initial = tuple(load_layout(path, scenario) for path in self.start_from)
-        if guessing is None or initial:
-            return find_proposer(self.method, initial), None
-        # Here, because it takes half a second to import.
-        from blast_env.design.surrogate import search_by
-
-        return search_by(guessing), guessing.digest
-
-    def _surrogate(self) -> "Surrogate":
-        # Here, because it takes half a second to import.
-        from blast_env.design.surrogate import load_surrogate, packaged_surrogate
-
-        return packaged_surrogate() if self.surrogate is None else load_surrogate(self.surrogate)
-
-    def _run(self, method: Proposer, evaluator: BlastEvaluator) -> "SearchRun":
-        case = self._practice(evaluator.scenario, evaluator.engine)
-        problem = DesignProblem(evaluator, case, self.processes)
-        print_line(evaluator.engine.describe([evaluator.scenario]))
-        turns = islice(cycle(case.threats), self.budget)
-        print_cost((evaluator.engine, evaluator.scenario, each.charge) for each in turns)
-        problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
-        hits, begun_s = evaluator.cache_hits, perf_counter()
-        result = self._with_progress(method, problem)
-        return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
-
-    def _practice(self, scenario: Scenario, engine: Engine) -> Case:
-        """Return the load cases of the search."""
-        model = find_threat_model(self.threat, self.threats)
-        realisations = find_realisations(self.realisations, self.threat, engine)
-        risk = find_risk(self.risk, self.cvar_level)
-        if not isinstance(model, HiddenThreat):
-            # The known charge is always drawn by the seed of the search.
-            charge = self.fixed(scenario, scenario.sample_charge(np.random.default_rng(self.seed)))
-            return practice_visible(scenario, charge, realisations, self.seed, risk)
-        for flag, value in (("--charge", self.charge), ("--tnt-kg", self.tnt_kg)):
-            if value is not None:
-                raise BlastEnvError(f"{flag} is for a visible threat: a hidden one is drawn")
-        return practice_hidden(scenario, model.threats, realisations, self.seed, risk)
-
-    def _with_progress(self, method: Proposer, problem: DesignProblem) -> SearchResult:
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("blasts, best reduction {task.fields[best]}"),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=message_console(), transient=True) as progress:
-            label = f"{method.name} search in {problem.scenario.name}"
-            task = progress.add_task(label, total=self.budget, best="-")
-
-            def report(state: SearchProgress) -> None:
-                best = "-" if state.best is None else percent(state.best.reduction(problem))
-                progress.update(task, completed=state.blasts, best=best)
-
-            return method.propose(problem, self.budget, self.seed, report)
-
-    def _check(self, run: "SearchRun") -> LayoutEvaluation | None:
-        """Evaluate the layout on threats of judgement; `None` if the search used all of them.
-
-        Without noise a charge is one blast: a charge used by the search is not held out.
-        """
-        problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, self.held_out)
-        if self.threat == "hidden":
-            threats = draw_threats(problem.scenario, seeds)
+            case = practice_hidden(site, model.threats, repeats, seed, measure)
         else:
-            threats = tuple(Threat(problem.threats[0].charge, seed) for seed in seeds)
-        if not problem.evaluator.engine.has_noise:  # each charge is one blast
-            met = {each.charge for each in problem.threats}
-            threats = tuple(each for each in one_of_each_charge(threats) if each.charge not in met)
-        if not threats:
-            return None
-        with progress_bar(f"check on {len(threats)} other threats") as progress:
-            return evaluate_against(
-                problem.evaluator,
-                run.result.layout,
-                threats,
-                problem.processes,
-                cvar_level=self.cvar_level,
-                progress=progress,
-            )
+            # The known charge is always drawn by the seed of the search.
+            drawn = given.fixed(site, site.sample_charge(np.random.default_rng(seed)))
+            case = practice_visible(site, drawn, repeats, seed, measure)
+        problem = DesignProblem(BlastEvaluator(site, used, cache=cache), case, processes)
+        run = _run(proposer, problem, DEFAULT_BUDGET if budget is None else budget, seed)
+        if run.result.interrupted and not run.result.history:
+            raise KeyboardInterrupt  # there is no layout to keep
+        checked = _check(run, held_out, cvar_level, is_hidden=isinstance(model, HiddenThreat))
+        print_search(run, checked)
+        if out is not None:
+            options = {
+                name: [*map(str, each)] if name == "start_from" else each
+                for name, each in context.params.items()
+                if name not in _NOT_OF_THE_SEARCH
+            }
+            write_search(run, {**options, "surrogate": digest}, checked, out)
+    if run.result.interrupted:
+        raise InterruptedCommandError(
+            "the best layout so far was kept",
+            "" if out is None else f"--start-from {out / LAYOUT_NAME} begins with it",
+            resume_words(cache),
+        )
+
+
+def _method(
+    name: str, scenario: Scenario, start_from: Sequence[Path], surrogate: Path | None
+) -> tuple[Proposer, str | None]:
+    """Return the method, and the digest of its surrogate if it has one."""
+    if surrogate is not None and name != _SURROGATE:
+        raise BlastEnvError(f"--surrogate is for --method {_SURROGATE}, not {name}")
+    proposer_row(name)  # refuses an unknown one
+    # Here, because it takes half a second to import.
+    from blast_env.design.surrogate import load_surrogate, packaged_surrogate, search_by
+
+    guessing = None if surrogate is None else load_surrogate(surrogate)
+    check_suits(name, scenario)
+    initial = tuple(load_layout(path, scenario) for path in start_from)
+    if name != _SURROGATE or initial:
+        return find_proposer(name, initial), None
+    guessing = guessing or packaged_surrogate()
+    return search_by(guessing), guessing.digest
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,34 +253,83 @@ class SearchRun:
     cache_hits: int
 
 
+def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> SearchRun:
+    scenario, evaluator = problem.scenario, problem.evaluator
+    print_line(evaluator.engine.describe([scenario]))
+    turns = islice(cycle(problem.threats), budget)
+    print_cost((evaluator.engine, scenario, each.charge) for each in turns)
+    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+    hits, begun_s = evaluator.cache_hits, perf_counter()
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("blasts, best reduction {task.fields[best]}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=message_console(), transient=True) as progress:
+        label = f"{method.name} search in {scenario.name}"
+        task = progress.add_task(label, total=budget, best="-")
+
+        def report(state: SearchProgress) -> None:
+            best = "-" if state.best is None else percent(state.best.reduction(problem))
+            progress.update(task, completed=state.blasts, best=best)
+
+        result = method.propose(problem, budget, seed, report)
+    return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
+
+
+def _check(
+    run: SearchRun, held_out: int, cvar_level: float, *, is_hidden: bool
+) -> LayoutEvaluation | None:
+    """Evaluate the layout on threats of judgement; `None` if the search used all of them.
+
+    Without noise a charge is one blast: a charge used by the search is not held out.
+    """
+    problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, held_out)
+    if is_hidden:
+        threats = draw_threats(problem.scenario, seeds)
+    else:
+        threats = tuple(Threat(problem.threats[0].charge, seed) for seed in seeds)
+    if not problem.evaluator.engine.has_noise:  # each charge is one blast
+        used = {each.charge for each in problem.threats}
+        threats = tuple(each for each in one_of_each_charge(threats) if each.charge not in used)
+    if not threats:
+        return None
+    with progress_bar(f"check on {len(threats)} other threats") as progress:
+        return evaluate_against(
+            problem.evaluator,
+            run.result.layout,
+            threats,
+            problem.processes,
+            cvar_level=cvar_level,
+            progress=progress,
+        )
+
+
 def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
     """Print the effect of the layout on the search's threats and on others, and the cost."""
     result, problem = run.result, run.problem
-    table = ResultTable(
-        f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}",
-        ("threats", "number", "without", "with", "reduction", "95 % interval"),
-    )
     bare, load = problem.case.counted(problem.unprotected), problem.load(result.layout)
-    counts = problem.scenario.objective
-    table.add_row(
-        "of the search",
-        str(len(problem.threats)),
-        counts.text(bare),
-        counts.text(load),
-        percent(reductions(load, bare).item()),
-        "-",
-    )
+    text = problem.scenario.objective.text
+    rows = [
+        (
+            *("of the search", str(len(problem.threats)), text(bare), text(load)),
+            *(percent(reductions(load, bare).item()), "-"),
+        )
+    ]
     if checked is not None:
         low, high = checked.ci95
-        table.add_row(
-            "held out",
-            str(len(checked.threats)),
-            counts.text(checked.unprotected_load),
-            counts.text(checked.load),
-            percent(checked.mean_reduction),
-            "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
+        rows.append(
+            (
+                *("held out", str(len(checked.threats))),
+                *(text(checked.unprotected_load), text(checked.load)),
+                percent(checked.mean_reduction),
+                "-" if np.isnan(low) else f"{percent(low)} to {percent(high)}",
+            )
         )
-    result_console().print(table)
+    title = f"{problem.scenario.name}: {result.method} search, {_risk_text(problem)}"
+    print_table(title, ("threats", "number", "without", "with", "reduction", "95 % interval"), rows)
     if checked is None:
         print_line(
             "no threat is held out: with this engine a charge is one blast, and the search used "

@@ -99,9 +99,10 @@ def _what_helps(problem: DesignProblem) -> str:
         half_m = now_m[worst] * further[int(np.argmax(impulse <= 0.5 * impulse[0]))]
         return (
             f"half the impulse takes a stand-off of {half_m:.0f} m instead of {now_m[worst]:.0f} m "
-            f"({worst.tnt_kg:g} kg, by Kingery and Bulmash); for glass see screen and advise"
+            f"({worst.tnt_kg:g} kg, by Kingery and Bulmash); for glass see "
+            "assess --screen and advise"
         )
-    return "for stand-off and glass see screen and advise"
+    return "for stand-off and glass see assess --screen and advise"
 
 
 def _guesses(problem: DesignProblem) -> "Guesses":

@@ -80,7 +80,7 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
         ("simulate", site, "--engine", "gas"),
         ("search", *searched, "--held-out", 1, "--out", tmp_path / "found"),
         ("assess", site),
-        ("propose", site, "--verify", "--budget", 2),
+        ("search", "--method", "package", "--scenario", site, "--verify", "--budget", 2),
         ("train", *trained, "--run", tmp_path / "run", "--envs", 1, "--steps", 4),
     )
     for arguments in commands:

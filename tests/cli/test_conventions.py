@@ -170,7 +170,7 @@ def test_all_commands_take_a_charge_in_one_form() -> None:
         for each in command.loaded.params
         if "--charge" in each.opts
     }
-    assert {"simulate", "evaluate", "search", "assess", "advise", "propose", "report"} <= {*forms}
+    assert {"simulate", "evaluate", "search", "assess", "advise", "report"} <= {*forms}
     assert {*forms.values()} == {"X,Y[,KG]"}
 
 

@@ -89,9 +89,9 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     found = blast_env.propose(wide_yard(), CHARGE)
     assert (found.layout, found.gain) == ((), 0.0)
     save_scenario(wide_yard(), tmp_path / "yard.toml")
-    files = ("--out", str(tmp_path / "none.json"))
+    files = ("--method", "package", "--out", str(tmp_path / "none"))
     options = ("--charge", "{},{}".format(*CHARGE.position_m), *files)
-    done = CliRunner().invoke(app, ["propose", str(tmp_path / "yard.toml"), *options])
+    done = CliRunner().invoke(app, ["search", "--scenario", str(tmp_path / "yard.toml"), *options])
     assert done.exit_code == 0, done.output
     words = " ".join(done.output.split())
     assert (
@@ -102,8 +102,8 @@ def test_nothing_is_proposed_where_nothing_gains_enough(
     now_m, half_m = stand_offs(words)
     impulse = kingery_bulmash("reflected_impulse", np.array([now_m, half_m]), CHARGE.tnt_kg)
     assert 0.4 < impulse[1] / impulse[0] < 0.6  # both are rounded to metres
-    assert "for glass see screen and advise" in words
-    assert load_layout(tmp_path / "none.json", wide_yard()) == ()
+    assert "for glass see assess --screen and advise" in words
+    assert load_layout(tmp_path / "none" / "layout.json", wide_yard()) == ()
 
 
 def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(
@@ -115,8 +115,8 @@ def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(GasEngine, "loads", interrupted)
-    out = tmp_path / "layout.json"
-    result = CliRunner().invoke(app, ["propose", "courtyard", "--verify", "--out", str(out)])
+    options = ("--method", "package", "--verify", "--out", str(tmp_path / "out"))
+    result = CliRunner().invoke(app, ["search", *options])
     assert result.exit_code == 130, result.output
     assert "interrupted: no file was left half-written" in result.stderr
-    assert not out.exists()
+    assert (tmp_path / "out" / "layout.json").exists()

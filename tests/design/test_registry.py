@@ -1,5 +1,6 @@
 """A rule and a search are a file and a line each, and then they are everywhere."""
 
+from inspect import signature
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,9 +12,7 @@ from blast_env import save_scenario
 from blast_env.app import offers
 from blast_env.benchmark import JudgedSubmission, make, play
 from blast_env.benchmark.methods import find_method
-from blast_env.cli import app
-from blast_env.cli.evaluate import EvaluateCommand
-from blast_env.cli.search import SearchCommand
+from blast_env.cli import app, evaluate, search
 from blast_env.design.proposal import problem_of
 from blast_env.design.rules import random_layout
 from blast_env.design.search import (
@@ -88,7 +87,9 @@ def test_the_rule_is_among_those_that_a_proposal_is_chosen_from_and_held_against
 ) -> None:
     assert "from the corner" in layouts_by_rule(hut())
     save_scenario(hut(), tmp_path / "hut.toml")
-    shown = run("propose", tmp_path / "hut.toml", "--verify").stdout
+    shown = run(
+        "search", "--method", "package", "--scenario", tmp_path / "hut.toml", "--verify"
+    ).stdout
     assert "blasts of gas: about " in shown
     verdict = shown.partition("judged by gas dynamics")[2]
     assert "from the corner" in verdict
@@ -136,7 +137,8 @@ def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> 
 
 
 def test_verdicts_are_by_gas_dynamics_unless_told_otherwise() -> None:
-    assert SearchCommand().engine == EvaluateCommand().engine == "gas"
+    for command in (search.search, evaluate.EvaluateCommand):
+        assert signature(command).parameters["engine"].default == "gas"
     assert problem_of(hut(), None).evaluator.engine.name == "gas"
 
 

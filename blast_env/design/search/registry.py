@@ -1,6 +1,6 @@
 """The proposers of the package, by name: a new one is a file and a line here.
 
-`blast-env search`, `propose` and `judge`, the page and the studies list these proposers.
+`blast-env search` and `judge`, the page and the studies list these proposers.
 """
 
 import re
