@@ -16,14 +16,8 @@ class _Commands(LazyGroup):
         "calibrate": (
             "Run blasts at many distances, fit the three laws, and store one as a calibration."
         ),
-        "screen": (
-            "Screen a site before any blast: level of protection, and the stand-off that it needs."
-        ),
         "evaluate": "Compare layouts with no barrier, both exposed to the same threats.",
         "assess": "Assess the damage of buildings by charges: panes, panels, level of protection.",
-        "capacity": (
-            "Find the largest charge at each place, and the least stand-off, that keep each level."
-        ),
         "advise": (
             "Compare the protection for a budget: stand-off, shielding, hardening, and all "
             "combined."
@@ -38,7 +32,7 @@ class _Commands(LazyGroup):
             "search."
         ),
     }
-    functions = ("draw", "search")
+    functions = ("draw", "search", "assess")
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 
 

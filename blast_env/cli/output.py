@@ -30,6 +30,7 @@ from blast_env.values import printable, printable_line
 
 if TYPE_CHECKING:  # a third of a second to import
     import pandas as pd
+    from matplotlib.figure import Figure
 
     from blast_env.evaluation.engines import Engine
     from blast_env.gas.cost import CostGuess
@@ -174,6 +175,28 @@ def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
     except MissingExtraError as error:
         message_console().print(printable(f"note: {error}"), style="yellow")
         return []
+
+
+def save_figures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Path]:
+    """Draw, save and print the figures that have a path; return their files.
+
+    Args:
+        asked: Path of each figure, and the function that draws it.
+
+    Raises:
+        MissingExtraError: If the extra `render` is not installed.
+        BlastEnvError: If a file cannot be written.
+    """
+    written = []
+    for path, draw in asked:
+        if path is not None:
+            figure = draw()
+            # Here, because pictures need the extra `render`.
+            from blast_env.plots.figures import save_figure
+
+            written.append(save_figure(figure, path))
+            print_written(written[-1:])
+    return written
 
 
 def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""`blast-env capacity`: a row for each layout and place."""
+"""`blast-env assess --capacity`: a row for each layout and place."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(capacity, "consequences", scaled)
     options = ("--tnt-kg", "0.1", "--cell", "0.5", "--layout", layout)
-    done = CliRunner().invoke(app, ["capacity", *map(str, (site, *options))])
+    done = CliRunner().invoke(app, ["assess", "--capacity", *map(str, (site, *options))])
     assert done.exit_code == 0, done.output
     rows = [line.split() for line in done.output.splitlines() if "2.0, 4.0" in line]
     assert len(rows) == 4

@@ -1,4 +1,4 @@
-"""`blast-env screen`: tables, the verdict by the requirement, and the picture."""
+"""`blast-env assess --screen`: tables, the verdict by the requirement, and the picture."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from tests.gas_sites import glazed_hut
 
 
 def run(*words: object, code: int = 0) -> str:
-    done = CliRunner().invoke(app, ["screen", *map(str, words)])
+    done = CliRunner().invoke(app, ["assess", "--screen", *map(str, words)])
     assert done.exit_code == code, done.output
     return done.output
 

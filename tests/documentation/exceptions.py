@@ -136,8 +136,8 @@ SMALLER: Final[dict[str, str]] = {
         "--seeds 1 --cell 0.5"
     ),
     # docs/engineers/screening.md
-    "blast-env screen site.toml --glazing window_laminated_6 --wall brick_215 --mass backpack --gas"
-    " --cells coarse": "--cells uniform --cell 1",
+    "blast-env assess site.toml --screen --glazing window_laminated_6 --wall brick_215"
+    " --mass backpack --gas --cells coarse": "--cells uniform --cell 1",
     "python -m studies.response angles": "--width 12",
     # docs/researchers/training.md
     "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --no-rules",
