@@ -18,7 +18,7 @@ from blast_env import load_scenario
 from blast_env.cli.output import print_line, user_errors
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastKey, DiskCache, StructureLoad, draw_threats
+from blast_env.evaluation import BlastKey, BlastStore, StructureLoad, draw_threats
 from blast_env.files import make_folder
 from blast_env.particles.parquet import write_table
 from blast_env.provenance import versions
@@ -161,7 +161,7 @@ def main(
         for folder in folders:
             if not folder.is_dir():
                 raise BlastEnvError(f"{folder}: is no folder of blasts")
-            for key, loads in DiskCache(folder).items():
+            for key, loads in BlastStore(folder).items():
                 rows[json.dumps(key)] = [load_row(names, key, each) for each in loads.structures]
         if not rows:
             raise BlastEnvError(f"no blasts in {', '.join(map(str, folders))}")

@@ -19,7 +19,7 @@ from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line
 from blast_env.design.search import layouts_by_rule
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.evaluation.store import LoadsCache
+from blast_env.evaluation.store import BlastStore
 from blast_env.statistics import mean_estimate
 
 HELD_OUT: Final = range(10_000, 10_048)
@@ -35,7 +35,7 @@ def environment(action: str, realisations: int | None = None) -> BlastBarrierEnv
         observation="features",
         action=action,
         realisations=realisations,
-        cache=LoadsCache(8192),
+        cache=BlastStore(size=8192),
     )
 
 

@@ -31,7 +31,7 @@ from blast_env.benchmark.submissions import (
 )
 from blast_env.documents import checked_as, parse_json
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastCache, BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.statistics import Estimate, mean_estimate, stratified_estimate
 
@@ -191,7 +191,7 @@ def judge(
     submission: Submission,
     cell_m: float | None = JUDGE_CELL_M,
     processes: int = 1,
-    cache: str | Path | BlastCache | None = None,
+    cache: str | Path | BlastStore | None = None,
     engine: str | Engine = JUDGE,
     definitions: Mapping[str, Definition] = DEFINITIONS,
     references: Mapping[str, ScoreReference] | None = None,
@@ -206,7 +206,7 @@ def judge(
         submission: The layouts.
         cell_m: Side of the cells, m; `None` for the engine's default.
         processes: Number of worker processes; it has no effect on the result.
-        cache: Folder or cache in which blasts are kept for the next call.
+        cache: Folder or store in which blasts are kept for the next call.
         engine: Another engine than gas dynamics, for tests.
         definitions: The problems by name.
         references: References of the scores by problem; the stored ones unless given.

@@ -13,8 +13,8 @@ from blast_env.benchmark.space import LayoutSpace
 from blast_env.design.search import DesignProblem
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
-    BlastCache,
     BlastEvaluator,
+    BlastStore,
     BudgetError,
     Case,
     Threat,
@@ -197,7 +197,7 @@ def make(
     budget: int = BUDGETS[1],
     cell_m: float | None = None,
     engine: str | Engine = JUDGE,
-    cache: str | Path | BlastCache | None = None,
+    cache: str | Path | BlastStore | None = None,
 ) -> BenchmarkProblem:
     """Return a problem of the benchmark.
 
@@ -206,7 +206,7 @@ def make(
         budget: Most gas blasts.
         cell_m: Side of the cells, m; 0.5 unless given.
         engine: Another engine than gas dynamics, for tests.
-        cache: Folder or cache in which blasts are kept.
+        cache: Folder or store in which blasts are kept.
 
     Raises:
         UnknownNameError: If there is no such problem; the message names the nearest one.

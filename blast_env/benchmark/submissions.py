@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeVar
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.benchmark.problem import BenchmarkProblem
@@ -14,9 +14,9 @@ from blast_env.documents import MAX_BYTES, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
-from blast_env.journal import Journal
 from blast_env.layout import check_layout
 from blast_env.reading import read_apart
+from blast_env.store import Store
 from blast_env.values import MOST_SEED, path_of
 
 FORMAT: Final = "blast-env submission 1"
@@ -64,6 +64,9 @@ class Run:
     def key(self) -> tuple[str, int, int]:
         """Problem, budget and seed, which identify the run within a submission."""
         return self.problem, self.budget, self.seed
+
+
+_RUN: Final = TypeAdapter(Run)
 
 
 @dataclass(frozen=True)
@@ -214,7 +217,7 @@ class Asked:
 def play(
     method: Method,
     asked: Iterable[tuple[Callable[[int], BenchmarkProblem], int, int]],
-    journal: Path | None = None,
+    store: Path | None = None,
     progress: Callable[[Run], None] | None = None,
 ) -> tuple[Run, ...]:
     """Run a method on problems.
@@ -222,24 +225,24 @@ def play(
     Args:
         method: The method.
         asked: Triples (function that makes the problem, budget, seed); see `Asked`.
-        journal: File to which each run is appended; runs that it already has are not repeated.
+        store: File in which each run is kept, a `Store`; runs that it has are not repeated.
         progress: Called with each run.
 
     Raises:
         BudgetError: If the method exceeds its budget.
         LayoutError: If its layout is illegal.
     """
-    kept = Journal(journal, Run) if journal is not None else None
-    found = {run.key: run for run in kept.read()} if kept else {}
+    kept = None if store is None else Store(store)
     runs = []
     for make, budget, seed in asked:
         problem = make(budget)
-        run = found.get((problem.name, budget, seed))
+        key = json.dumps((problem.name, budget, seed))
+        run = None if kept is None else kept.read(key, _RUN.validate_json)
         if run is None:
             layout = check_layout(problem.scenario, method(problem, seed))
             run = Run(problem.name, budget, seed, problem.blasts, tuple(sorted(layout)))
-            if kept:
-                kept.add(run)
+            if kept is not None:
+                kept.put(key, _RUN.dump_json(run))
         runs.append(run)
         if progress is not None:
             progress(run)

@@ -39,7 +39,7 @@ Burst = Literal["hemispherical", "spherical"]
 class CalibrateCommand(ProcessOptions, ClusterOptions):
     """Run blasts at many distances, fit the three laws, and store one as a calibration.
 
-    Finished blasts are stored in NAME.ENGINE.runs.jsonl: after an interruption, the same command
+    Finished blasts are stored in NAME.ENGINE.runs.sqlite: after an interruption, the same command
     resumes from there.
     """
 
@@ -98,7 +98,7 @@ class CalibrateCommand(ProcessOptions, ClusterOptions):
         seeds = tuple(range(self.first_seed, self.first_seed + self.seeds))
         study = FreeFieldStudy(self._scenario(), distances_m, seeds, engine.name)
         reference = _reference(self.reference, study, self.burst)
-        kept = Path(f"{self.stem}.runs.jsonl")
+        kept = Path(f"{self.stem}.runs.sqlite")
         count = len(seeds) * len(distances_m)
         with running_on(self.cluster), progress_bar(f"{count} blasts") as progress:
             runs = study.run(self.processes, kept, progress)

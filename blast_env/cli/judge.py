@@ -38,7 +38,7 @@ from blast_env.cli.output import print_line, print_table, progress_bar
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation import BlastEvaluator, LoadsCache
+from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_atomically
 
@@ -180,7 +180,7 @@ class JudgeCommand(ProcessOptions, CacheOptions):
             for each in definitions.values()
         ]
         asked = tuple(Asked(made, budgets, range(self.seeds)))
-        journal = None if self.out is None else self.out / self._journal(name)
+        store = None if self.out is None else self.out / self._store(name)
         with progress_bar(f"{len(asked)} runs of {name}") as progress:
             done: list[Run] = []
 
@@ -188,15 +188,15 @@ class JudgeCommand(ProcessOptions, CacheOptions):
                 done.append(run)
                 progress(len(done) / len(asked))
 
-            runs = play(method, asked, journal, show)
+            runs = play(method, asked, store, show)
         submission = Submission(name[-60:], runs, f"blast-env judge: {name}")
         if self.out is not None:
             print_line(f"wrote {submission.save(self.out / f'{_file_name(name)}.json')}")
         return submission
 
-    def _journal(self, method: str) -> str:
+    def _store(self, method: str) -> str:
         """Return the file name of the runs that a call may resume: same method, same cells."""
-        return f"runs_{_file_name(method)}_{self.search_cell_m:g}.jsonl"
+        return f"runs_{_file_name(method)}_{self.search_cell_m:g}.sqlite"
 
     def _references(
         self, definitions: Mapping[str, Definition], played: Sequence[Submission]
@@ -223,9 +223,9 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         return found
 
     @cached_property
-    def _shared(self) -> Path | LoadsCache:
-        """The cache of the judge's blasts: references and submissions need the same ones."""
-        return self.cache or LoadsCache(_KEPT)
+    def _shared(self) -> BlastStore:
+        """The store of the judge's blasts: references and submissions need the same ones."""
+        return BlastStore(self.cache, _KEPT)
 
     def _judged(
         self,

@@ -40,7 +40,7 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.engines import Engine, default_engine, find_engine
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
-from blast_env.evaluation.store import BlastCache
+from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element
 from blast_env.layout import Placement
 from blast_env.site import AnyScenario
@@ -134,7 +134,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         illegal_action_limit: int = 100,
         engine: str | Engine | None = None,
         cell_m: float | None = None,
-        cache: str | Path | BlastCache | None = None,
+        cache: str | Path | BlastStore | None = None,
         render_mode: str | None = None,
         show_blast: bool = False,
     ) -> None:
@@ -165,8 +165,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 decisions: no calibration, one realisation per charge, a second or more per blast;
                 there is no `impulse_sim`. `"surrogate"` approximates gas dynamics.
             cell_m: Side of the cells of gas dynamics; default 0.5 m.
-            cache: Store of blasts beside the memory of the environment: a folder, which other
-                processes and later runs may use too, or a `BlastCache`.
+            cache: Folder of a store of blasts, which other processes and later runs may use too,
+                or a `BlastStore`; by default blasts are only in memory.
             render_mode: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
             show_blast: Whether an episode continues after the detonation, for as many steps as the
                 film of the blast has frames (some 250), regardless of the actions: for a window,

@@ -16,7 +16,7 @@ from blast_env.evaluation.report import (
     evaluate_against,
     evaluate_layout,
 )
-from blast_env.evaluation.store import BlastCache, BlastKey, DiskCache, LoadsCache
+from blast_env.evaluation.store import BlastKey, BlastStore
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,
@@ -28,20 +28,18 @@ from blast_env.statistics import (
 __all__ = [
     "CVAR_LEVEL",
     "Assessment",
-    "BlastCache",
     "BlastEvaluator",
     "BlastKey",
     "BlastLoads",
+    "BlastStore",
     "BudgetError",
     "Case",
     "Comparison",
     "DesignProblem",
-    "DiskCache",
     "Estimate",
     "Evaluators",
     "GridError",
     "LayoutEvaluation",
-    "LoadsCache",
     "ParticleLoad",
     "SeedRange",
     "StructureLoad",

@@ -8,14 +8,7 @@ from typing import Final, NamedTuple
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Threat
 from blast_env.evaluation.engines import BlastLoads, Engine, find_engine
-from blast_env.evaluation.store import (
-    BlastCache,
-    BlastKey,
-    LoadsCache,
-    calibration_digest,
-    engine_text,
-    find_cache,
-)
+from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
 from blast_env.layout.placement import met_by_blasts
@@ -39,9 +32,9 @@ class BlastEvaluator:
         scenario: The scenario, or its bundled name or path; for the particle engines it must name
             a calibration.
         engine: Name of an engine, or an engine.
-        cache_size: Maximum number of loads in the evaluator's memory; see `LoadsCache`.
-        cache: Second cache, which receives all loads: a folder (`DiskCache`), for other processes
-            and later runs, or a cache that several evaluators share.
+        cache_size: Maximum number of loads in memory, unless `cache` is a store.
+        cache: Folder of a store, for other processes and later runs, or a store that several
+            evaluators share; see `BlastStore`.
 
     Attributes:
         scenario: The scenario.
@@ -64,7 +57,7 @@ class BlastEvaluator:
         scenario: AnyScenario,
         engine: str | Engine = "event",
         cache_size: int = 4096,
-        cache: str | Path | BlastCache | None = None,
+        cache: str | Path | BlastStore | None = None,
     ) -> None:
         self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
@@ -72,8 +65,7 @@ class BlastEvaluator:
         self.calibration: Calibration | None = self.engine.calibration(self.scenario)
         self.blasts = 0
         self.cache_hits = 0
-        self._remembered = LoadsCache(cache_size)
-        self._cache = find_cache(cache)
+        self._store = BlastStore.of(cache, cache_size)
         self._key_of_nothing = BlastKey(
             scenario_hash=self.scenario.content_hash,
             layout=(),
@@ -101,9 +93,9 @@ class BlastEvaluator:
         return self.cache_hits / asked if asked else 0.0
 
     def coarser(self) -> "BlastEvaluator | None":
-        """Return an evaluator with `Engine.coarser` and the same cache on disk, if there is one."""
+        """Return an evaluator with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
-        return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self._cache)
+        return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self._store)
 
     def loads(self, layout: Sequence[Element], threat: Threat) -> BlastLoads:
         """Return the loads of one blast.
@@ -178,26 +170,13 @@ class BlastEvaluator:
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
-        """Return loads from either cache; `None` if they are in neither."""
-        loads = self._remembered.get(key)
-        if loads is None and self._cache is not None:
-            loads = self._cache.get(key)
-            if loads is not None and not loads.are_for(self.scenario):
-                return None  # anybody may write to the cache
-            if loads is not None:
-                self._remember(key, loads)
-        return loads
+        """Return stored loads; `None` without any."""
+        return self._store.get(key, self.scenario)
 
     def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Count and cache a blast."""
+        """Count and store a blast."""
         self.blasts += 1
-        self._remember(key, loads)
-        if self._cache is not None:
-            self._cache.add(key, loads)
-
-    def _remember(self, key: BlastKey, loads: BlastLoads) -> None:
-        loads.module_impulse_sim.flags.writeable = False  # shared by several callers
-        self._remembered.add(key, loads)
+        self._store.add(key, loads)
 
 
 def _run(
@@ -235,7 +214,6 @@ class BlastAsked(NamedTuple):
 
 
 _MOST_EVALUATORS: Final = 4
-_LOADS_PER_EVALUATOR: Final = 1024
 
 
 class Evaluators:
@@ -246,7 +224,7 @@ class Evaluators:
 
     Args:
         engine: Name of an engine, or an engine.
-        cache: Folder or cache that all of them share; see `BlastEvaluator`.
+        cache: Folder or store that all of them share; see `BlastEvaluator`.
         most: Maximum number of evaluators.
 
     Attributes:
@@ -260,12 +238,12 @@ class Evaluators:
     def __init__(
         self,
         engine: str | Engine,
-        cache: str | Path | BlastCache | None = None,
+        cache: str | Path | BlastStore | None = None,
         most: int = _MOST_EVALUATORS,
     ) -> None:
         self.engine = find_engine(engine)
         self._most = most
-        self._cache = find_cache(cache)
+        self._store = BlastStore.of(cache)
         self._kept: OrderedDict[str, BlastEvaluator] = OrderedDict()
         self._gone_blasts = 0
         self._gone_cache_hits = 0
@@ -287,9 +265,9 @@ class Evaluators:
         return self.cache_hits / asked if asked else 0.0
 
     def coarser(self) -> "Evaluators | None":
-        """Return evaluators with `Engine.coarser` and the same cache on disk, if there is one."""
+        """Return evaluators with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
-        return None if engine is None else Evaluators(engine, self._cache, self._most)
+        return None if engine is None else Evaluators(engine, self._store, self._most)
 
     def run_ahead(self, asked: Sequence[BlastAsked], processes: int = 1) -> list[bool]:
         """Run blasts of any scenarios in one batch and cache their loads.
@@ -334,7 +312,7 @@ class Evaluators:
         found = find_scenario(scenario)
         key = found.content_hash
         if key not in self._kept:
-            self._kept[key] = BlastEvaluator(found, self.engine, _LOADS_PER_EVALUATOR, self._cache)
+            self._kept[key] = BlastEvaluator(found, self.engine, cache=self._store)
         self._kept.move_to_end(key)
         if len(self._kept) > self._most:
             _, gone = self._kept.popitem(last=False)

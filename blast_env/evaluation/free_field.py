@@ -9,12 +9,11 @@ from typing import Annotated, ClassVar, Final, Literal
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, TypeAdapter
 from scipy.special import stdtrit
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import find_engine, simulate
-from blast_env.journal import Journal
 from blast_env.particles.calibration.laws import (
     Fit,
     FitMetrics,
@@ -38,6 +37,7 @@ from blast_env.provenance import package_version
 from blast_env.runner import as_completed
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.parameters import parameters_digest
+from blast_env.store import Store
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI, UNITS_PER_M
 
 RUN_COLUMNS = ("distance_m", "seed", "impulse_sim", "transferred_impulse_sim", "first_hit_s")
@@ -66,6 +66,9 @@ class FreeFieldRun:
     impulse_sim: Amount
     transferred_impulse_sim: Amount
     first_hit_s: Amount | None
+
+
+_RUN: Final = TypeAdapter(FreeFieldRun)
 
 
 @dataclass(frozen=True)
@@ -111,19 +114,16 @@ class FreeFieldStudy:
 
         Args:
             processes: Worker processes.
-            store: File of finished runs, one JSON object per line; each run is added as it ends,
-                so that an interrupted study continues from there. A truncated last line is run
-                again.
+            store: File of finished runs, a `Store`; each run is added as it ends, so that an
+                interrupted study continues from there.
             progress: Called with the finished share of the blasts.
 
         Returns:
             One row per blast, by distance and seed; the columns are `RUN_COLUMNS`.
 
         Raises:
-            BlastEnvError: If the store is invalid, was edited, or cannot be written.
+            BlastEnvError: If the store is damaged or cannot be written.
         """
-        journal = None if store is None else Journal(store, FreeFieldRun)
-        finished = {} if journal is None else {each.key: each for each in journal.read()}
         version = find_engine(self.engine).version
         wanted = {
             f"{scenario.content_hash} {seed} {self.engine} {version}": (scenario, distance_m, seed)
@@ -131,19 +131,15 @@ class FreeFieldStudy:
             for scenario in (self.scenario.at_stand_off(distance_m),)
             for seed in self.seeds
         }
-        for key, (_, distance_m, seed) in wanted.items():
-            known = finished.get(key)
-            if known is not None and (known.distance_m, known.seed) != (distance_m, seed):
-                raise BlastEnvError(
-                    f"{store}: a run at {known.distance_m:g} m with seed {known.seed} has the key"
-                    f" of one at {distance_m:g} m with seed {seed}: the file was edited"
-                )
+        kept = Store(store) if store is not None else None
+        found = {key: kept.read(key, _RUN.validate_json) for key in wanted} if kept else {}
+        finished = {key: run for key, run in found.items() if run is not None}
         missing = [key for key in wanted if key not in finished]
         jobs = [(key, *wanted[key], self.engine) for key in missing]
         for done, (_, run) in enumerate(as_completed(_run_one, jobs, processes), start=1):
             finished[run.key] = run
-            if journal is not None:
-                journal.add(run)
+            if kept is not None:
+                kept.put(run.key, _RUN.dump_json(run))
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(wanted))
         rows = [asdict(finished[key]) for key in wanted]

@@ -29,7 +29,7 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.grid_error import GridError, LoadOf, final_engine, grid_error
-from blast_env.evaluation.store import BlastCache
+from blast_env.evaluation.store import BlastStore
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
@@ -491,7 +491,7 @@ def evaluate_layout(
     *,
     threats: Iterable[Threat] | None = None,
     cvar_level: float = CVAR_LEVEL,
-    cache: str | Path | BlastCache | None = None,
+    cache: str | Path | BlastStore | None = None,
     progress: Callable[[float], None] | None = None,
     cell_m: float | None = None,
     cells: str | None = None,
@@ -513,7 +513,7 @@ def evaluate_layout(
             is needed. The worst threat runs on cells twice as large as well, for their error.
         threats: Used instead of threats drawn with `seeds`.
         cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level` of the threats.
-        cache: Folder or cache of earlier blasts; see `BlastEvaluator`.
+        cache: Folder or store of earlier blasts; see `BlastEvaluator`.
         progress: Called with the finished share of the blasts.
         cell_m: Side of the cells of gas dynamics, 0.25 m unless given.
         cells: Growth of these cells with the blast; see `GasSettings`. On sites wider than 40 m

@@ -1,4 +1,4 @@
-"""Caches of blast loads, in memory and in a folder for other processes and later runs."""
+"""The store of blast loads, in memory and in a file for other processes and later runs."""
 
 import dataclasses
 import json
@@ -9,18 +9,19 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 from pydantic import TypeAdapter
 
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.engines import BlastLoads, Engine, ParticleLoad, StructureLoad
-from blast_env.files import FolderStore
 from blast_env.geometry import Layout
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.damage import BayDamage
+from blast_env.site import Scenario
 from blast_env.site.scene import Charge
+from blast_env.store import Store
 
 
 class BlastKey(NamedTuple):
@@ -45,52 +46,113 @@ class BlastKey(NamedTuple):
     code: str
 
 
-class BlastCache(Protocol):
-    """The interface of caches of blast loads.
+MOST_BYTES: Final = 256_000_000
+"""Default maximum size of the file of a store; a blast in the courtyard takes 2 kB."""
 
-    A cache may drop loads, but must return them unchanged.
-    """
-
-    def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast, or `None` if they are not cached."""
-
-    def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Cache the loads of a blast, which may displace others."""
+_FILE: Final = "blasts.sqlite"
 
 
-class LoadsCache:
-    """Keeps the most recently used loads in the memory of this process.
+class BlastStore:
+    """The loads of blasts: the most recently used in memory and, with a folder, all in a file.
+
+    The file serves other processes and later runs; see `Store`. If it becomes unusable, a warning
+    is issued and the work continues without it. A store can be pickled, with the loads in memory.
 
     Args:
-        size: Maximum number of loads; 0 for none. Each takes 8 bytes per module plus about a
-            kilobyte.
+        folder: Folder of the file; created if necessary. Without one, loads are only in memory.
+        size: Maximum number of loads in memory; 0 for none. Each takes 8 bytes per module plus
+            about a kilobyte.
+        most_bytes: Maximum total size of the loads in the file.
 
     Raises:
-        BlastEnvError: If the size is negative.
+        BlastEnvError: If a bound is negative, or the file is damaged or cannot be made.
     """
 
-    def __init__(self, size: int) -> None:
+    def __init__(
+        self, folder: str | Path | None = None, size: int = 4096, most_bytes: int = MOST_BYTES
+    ) -> None:
         if size < 0:
             raise BlastEnvError(f"cache_size is {size}, must be at least 0")
         self.size = size
         self._loads: OrderedDict[BlastKey, BlastLoads] = OrderedDict()
+        self._file = None if folder is None else Store(Path(folder) / _FILE, most_bytes)
 
-    def __len__(self) -> int:
-        return len(self._loads)
+    @classmethod
+    def of(cls, value: "str | Path | BlastStore | None", size: int = 4096) -> "BlastStore":
+        """Return the store for an argument `cache`.
 
-    def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast, or `None` if they are not cached."""
+        Args:
+            value: A folder, a store, which is returned, or `None` for loads in memory.
+            size: As for a new store.
+
+        Raises:
+            BlastEnvError: As for a new store, or if the value is of another kind.
+        """
+        if isinstance(value, BlastStore):
+            return value
+        if value is not None and not isinstance(value, str | Path):
+            raise BlastEnvError(f"cache is {value_text(value)}, must be a folder or a BlastStore")
+        return cls(value, size)
+
+    @property
+    def damaged(self) -> int:
+        """Number of damaged blasts found in the file by this object."""
+        return 0 if self._file is None else self._file.damaged
+
+    def get(self, key: BlastKey, scenario: Scenario | None = None) -> BlastLoads | None:
+        """Return the loads of a blast, or `None` if they are missing or damaged.
+
+        Args:
+            key: The key.
+            scenario: Loads in the file that cannot be those of this scenario count as missing,
+                because anybody may write to it.
+        """
         loads = self._loads.get(key)
         if loads is not None:
             self._loads.move_to_end(key)
+        elif self._file is not None:
+            try:
+                loads = self._file.read(json.dumps(key), _decoded)
+            except BlastEnvError as error:
+                warnings.warn(f"a blast counts as missing: {error}", RuntimeWarning, stacklevel=2)
+            if loads is not None and scenario is not None and not loads.are_for(scenario):
+                return None
+            if loads is not None:
+                self.remember(key, loads)
         return loads
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Cache the loads of a blast, which may displace the least recently used ones."""
+        """Keep the loads of a blast, which may displace others."""
+        self.remember(key, loads)
+        if self._file is not None:
+            try:
+                self._file.put(json.dumps(key), _encoded(loads))
+            except BlastEnvError as error:
+                warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
+
+    def remember(self, key: BlastKey, loads: BlastLoads) -> None:
+        """Keep the loads of a blast in memory only."""
+        loads.module_impulse_sim.flags.writeable = False  # shared by several callers
         self._loads[key] = loads
         self._loads.move_to_end(key)
         if len(self._loads) > self.size:
             self._loads.popitem(last=False)
+
+    def items(self) -> Iterator[tuple[BlastKey, BlastLoads]]:
+        """Yield all undamaged blasts of the file, always in the same order; else those in memory.
+
+        Raises:
+            BlastEnvError: If the file cannot be read.
+        """
+        if self._file is None:
+            yield from self._loads.items()
+            return
+        for text, content in self._file.items():
+            with suppress(ValueError):
+                yield _KEY.validate_python(json.loads(text)), _decoded(content)
+
+    def __len__(self) -> int:
+        return len(self._loads) if self._file is None else len(self._file)
 
 
 def engine_text(engine: Engine) -> str:
@@ -106,78 +168,6 @@ def engine_text(engine: Engine) -> str:
 def calibration_digest(calibration: Calibration) -> str:
     """Return the SHA-256 of a calibration, which distinguishes versions of the same name."""
     return sha256(calibration.model_dump_json().encode()).hexdigest()
-
-
-SUFFIX: Final = ".loads"
-"""Suffix of the files of the cache, which touches no others."""
-
-MOST_BYTES: Final = 256_000_000
-"""Default maximum size of a cache; a blast in the courtyard takes 2 kB."""
-
-
-class DiskCache:
-    """Keeps loads in the files of a folder, for other processes and later runs; see `FolderStore`.
-
-    If the folder becomes unusable, a warning is issued and the work continues. A loss of power may
-    lose the last blasts, which are then simulated again. Files are not flushed to the device after
-    each blast, because that takes as long as a blast of the particle model.
-
-    Args:
-        folder: The folder; created if necessary.
-        most_bytes: Maximum total size of the files.
-
-    Raises:
-        BlastEnvError: If the folder cannot be created, or `most_bytes` is negative.
-    """
-
-    def __init__(self, folder: str | Path, most_bytes: int = MOST_BYTES) -> None:
-        self._store = FolderStore(folder, SUFFIX, most_bytes, durable=False)
-
-    @property
-    def folder(self) -> Path:
-        """The folder, as an absolute path."""
-        return self._store.folder
-
-    @property
-    def damaged(self) -> int:
-        """Number of damaged files found by this object."""
-        return self._store.damaged
-
-    def get(self, key: BlastKey) -> BlastLoads | None:
-        """Return the loads of a blast, or `None` if they are missing or damaged."""
-        return self._store.read(json.dumps(key), _decoded)
-
-    def add(self, key: BlastKey, loads: BlastLoads) -> None:
-        """Cache the loads of a blast, which may displace the least recently used ones."""
-        try:
-            self._store.put(json.dumps(key), _encoded(loads))
-        except BlastEnvError as error:
-            warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
-
-    def items(self) -> Iterator[tuple[BlastKey, BlastLoads]]:
-        """Yield all undamaged blasts, always in the same order."""
-        for text, content in self._store.items():
-            with suppress(ValueError):
-                yield _KEY.validate_python(json.loads(text)), _decoded(content)
-
-    def __len__(self) -> int:
-        return len(self._store)
-
-
-def find_cache(value: str | Path | BlastCache | None) -> BlastCache | None:
-    """Return the cache for an argument `cache`.
-
-    Args:
-        value: A folder for a `DiskCache`, a cache, or `None` for none.
-
-    Raises:
-        BlastEnvError: If the folder cannot be created, or the object is not a cache.
-    """
-    if isinstance(value, str | Path):
-        return DiskCache(value)
-    if value is not None and not (hasattr(value, "get") and hasattr(value, "add")):
-        raise BlastEnvError(f"cache is {value!r}, must be a folder or have the methods get and add")
-    return value
 
 
 _KEY: Final = TypeAdapter(BlastKey)

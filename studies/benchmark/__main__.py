@@ -26,7 +26,12 @@ from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_atomically
 from blast_env.tables import markdown_table
 from studies.benchmark.methods import OUTSIDE
-from studies.benchmark.references import known_layouts, published_before, submitted_layouts
+from studies.benchmark.references import (
+    known_layouts,
+    published_blasts,
+    submitted_layouts,
+    with_published,
+)
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 _STORED = Path("blast_env/benchmark/data/references.json")
@@ -51,7 +56,8 @@ def references(
     with user_errors():
         known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
         found = submitted_layouts([Submission.load(path) for path in submission or ()])
-        published, began = published_before(cache, DEFINITIONS), monotonic()
+        published, began = published_blasts(DEFINITIONS), monotonic()
+        store = with_published(cache, published)
         engine = find_engine(JUDGE, 0.5)
         for name, definition in DEFINITIONS.items():
             stored = known.get(name)
@@ -60,7 +66,7 @@ def references(
                 continue
             if monotonic() - began > most_s:
                 break
-            evaluator = BlastEvaluator(definition.scenario, engine, cache=published)
+            evaluator = BlastEvaluator(definition.scenario, engine, cache=store)
             more = known_layouts(definition, published) | found.get(name, {})
             if stored:
                 more = {stored.best.method: stored.best.layout} | more
@@ -117,7 +123,7 @@ def play_methods(
                 if monotonic() - began > most_s:
                     raise BlastEnvError("the time is over; the same command goes on")
                 asked = Asked(made, budget or (50,), (seed,))
-                runs[each] += play(found[each], asked, out / f"{each}.jsonl")
+                runs[each] += play(found[each], asked, out / f"{each}.sqlite")
                 print_line(f"seed {seed}, {each}: {monotonic() - began:.0f} s")
         for each, own in runs.items():
             Submission(each, tuple(own)).save(out / f"{each}.json")

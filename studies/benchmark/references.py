@@ -1,22 +1,22 @@
 """Reference layouts for the score of each problem: the rules', and the best one known."""
 
-import json
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from blast_env.benchmark import Definition, Submission, make
-from blast_env.benchmark.data import PublishedBlasts
+from blast_env.benchmark.data import remember_published
 from blast_env.benchmark.methods import find_method
-from blast_env.evaluation import DiskCache
+from blast_env.evaluation import BlastStore
 from blast_env.geometry import Layout
-from blast_env.layout import Placement, load_layout
+from blast_env.layout import load_layout
 from blast_env.site import Charge, VehicleCharge
 
 DATA = Path("docs/data")
+_MOST = 50_000  # blasts in memory
 
 
-def published_layouts(definition: Definition, published: PublishedBlasts) -> Iterator[Layout]:
+def published_layouts(definition: Definition, published: BlastStore) -> Iterator[Layout]:
     """Yield the published layouts with a blast for every charge of a problem.
 
     Problems with vehicle charges, which are not fixed, have none.
@@ -24,18 +24,16 @@ def published_layouts(definition: Definition, published: PublishedBlasts) -> Ite
     charges = [threat.charge for threat in definition.case.threats]
     if any(isinstance(charge, VehicleCharge) for charge in charges):
         return
-    met: dict[str, set[tuple[float, float, float, float]]] = defaultdict(set)
-    for _, scenario_hash, layout, charge in published.rows:
-        if scenario_hash == definition.scenario.content_hash:
-            met[layout].add(charge)
-    wanted = {(*c.position_m, c.height_m, c.tnt_kg) for c in charges if isinstance(c, Charge)}
-    catalogue = Placement.empty(definition.scenario).catalogue
-    for layout, own in met.items():
-        if wanted <= own and layout != "[]":
-            yield tuple(catalogue.element_from(tuple(e), "layout") for e in json.loads(layout))
+    blasted: dict[Layout, set[Charge]] = defaultdict(set)
+    for key, _ in published.items():  # noqa: PERF102  # is no dictionary
+        if key.scenario_hash == definition.scenario.content_hash:
+            blasted[key.layout].add(key.charge)
+    for layout, own in blasted.items():
+        if layout and own.issuperset(charges):
+            yield layout
 
 
-def known_layouts(definition: Definition, published: PublishedBlasts) -> dict[str, Layout]:
+def known_layouts(definition: Definition, published: BlastStore) -> dict[str, Layout]:
     """Return candidates for the best known layout of a problem, by their origin."""
     scenario = definition.scenario
     found: dict[str, Layout] = {}
@@ -60,7 +58,17 @@ def submitted_layouts(submissions: Iterable[Submission]) -> dict[str, dict[str, 
     return found
 
 
-def published_before(folder: Path, definitions: Mapping[str, Definition]) -> PublishedBlasts:
-    """Return the published blasts of these problems, with a folder for all others."""
-    scenarios = {each.scenario.content_hash: each.scenario for each in definitions.values()}
-    return PublishedBlasts(scenarios, DiskCache(folder))
+def published_blasts(definitions: Mapping[str, Definition]) -> BlastStore:
+    """Return the published blasts of these problems."""
+    store = BlastStore(size=_MOST)
+    sites = {each.scenario.content_hash: each.scenario for each in definitions.values()}
+    remember_published(store, sites.values())
+    return store
+
+
+def with_published(folder: Path, published: BlastStore) -> BlastStore:
+    """Return the store of a folder, with the published blasts in its memory alone."""
+    store = BlastStore(folder, _MOST)
+    for key, loads in published.items():
+        store.remember(key, loads)
+    return store

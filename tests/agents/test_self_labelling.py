@@ -39,6 +39,7 @@ from blast_env.design.search.registry import layouts_by_rule
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Evaluators
+from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import Placement
 from blast_env.site import Scenario, VehicleCharge, save_scenario
@@ -292,11 +293,11 @@ def test_blasts_of_an_interrupted_round_are_not_repeated_but_counted(
     with pytest.raises(KeyboardInterrupt):
         train(run_settings(scenario_file(tmp_path)), own(), run)
     monkeypatch.undo()
-    simulated = len([*(run / "blasts").iterdir()])
+    simulated = len(BlastStore(run / "blasts"))
     assert simulated > Checkpoint.load(run / "checkpoint.pt").counters.blasts
     result = resume(run)
     assert outcome(run) == outcome(finished)
-    assert result.progress.counters.blasts == len([*(run / "blasts").iterdir()])
+    assert result.progress.counters.blasts == len(BlastStore(run / "blasts"))
 
 
 def test_another_training_begins_with_the_weights_of_a_run(finished: Path, tmp_path: Path) -> None:

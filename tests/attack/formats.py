@@ -1,6 +1,7 @@
 """Every kind of file that the packages read: sound ones, and what reads them."""
 
 import json
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,10 +28,8 @@ from blast_env.app.work import ReportTask, read_task, write_task
 from blast_env.cluster import address_of
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad
-from blast_env.evaluation.free_field import FreeFieldRun
-from blast_env.evaluation.store import BlastKey, DiskCache
+from blast_env.evaluation.store import BlastKey, BlastStore
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.journal import Journal
 from blast_env.layout import LayoutFile, write_layout
 from blast_env.particles.calibration.model import load_calibration, save_calibration
 from blast_env.particles.parquet import _run_record, checked_table
@@ -159,14 +158,6 @@ def _setting(_: Path) -> Format:
     return Format(samples, read)
 
 
-def _runs(folder: Path) -> Format:
-    journal = Journal(folder / "runs.jsonl", FreeFieldRun)
-    for seed in range(5):
-        journal.add(FreeFieldRun(f"{'0' * 64} {seed} event 1", 8.0, seed, 12.5, 3.25, 0.004))
-    sample = journal.path.read_bytes()
-    return Format((sample,), _from_file(journal.path, lambda _: journal.read()))
-
-
 def _front(folder: Path) -> Format:
     rows = ('1.5,0.25,"0,0 0,1"', '2.5,0.5,"0,0 0,1 0,2"', '3,0.6,"1,1"')
     sample = "\n".join(("cost,reduction,layout", *rows, "")).encode()
@@ -176,7 +167,6 @@ def _front(folder: Path) -> Format:
 
 
 def _loads(folder: Path) -> Format:
-    cache = DiskCache(folder / "cache")
     key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
     load = ParticleLoad(
         *("building", True, 1.0, 0.01, None, 0.0, True),
@@ -185,11 +175,12 @@ def _loads(folder: Path) -> Format:
         impulse_sim=5.0,
         transferred_impulse_sim=2.0,
     )
-    cache.add(key, BlastLoads((load,), np.arange(8.0)))
-    (path,) = cache.folder.iterdir()
+    BlastStore(folder).add(key, BlastLoads((load,), np.arange(8.0)))
+    path = folder / "blasts.sqlite"
 
     def read(_: Path) -> Any:
-        loads = cache.get(key)
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
+            loads = BlastStore(folder).get(key)
         return None if loads is None else (loads.structures, loads.module_impulse_sim.tobytes())
 
     return Format((path.read_bytes(),), _from_file(path, read), True)
@@ -314,9 +305,8 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "run: rollouts.csv": _rollouts,
         "run: checkpoint.pt": _checkpoint,
         "--set": _setting,
-        "runs of a study": _runs,
         "front.csv": _front,
-        "cache entry": _loads,
+        "store of blasts": _loads,
         "GeoJSON": _geojson,
         "GeoJSON, local": _local_geojson,
         "OpenStreetMap": _osm,

@@ -29,15 +29,13 @@ from blast_env.documents import read_text
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasResult
-from blast_env.evaluation.free_field import FreeFieldRun
-from blast_env.files import FolderStore
 from blast_env.io.importing import import_site
-from blast_env.journal import Journal
 from blast_env.layout import LayoutFile
 from blast_env.particles.parquet import read_parquet
 from blast_env.response.facade import respond
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.scene import Charge
+from blast_env.store import Store
 from blast_env.tables import markdown_table
 from blast_env.values import STEERING, markup_text
 from tests.design.test_surrogate import YARD, by_hand
@@ -342,7 +340,7 @@ READERS: Final[Mapping[str, Reader]] = MappingProxyType(
         "checkpoint.pt": Checkpoint.load,
         "collisions.parquet": read_parquet,
         "front.csv": partial(read_text, most_bytes=1_000_000),
-        "runs.jsonl": lambda path: Journal(path, FreeFieldRun).read(),
+        "runs.sqlite": Store,
     }
 )
 """What reads a file, by its name."""
@@ -366,28 +364,12 @@ SPECIAL: Final = ("a pipe", "a device", "a socket", "a sparse file of 20 GB")
 """Kinds of `special`."""
 
 
-def entry_outcome(folder: Path, kind: str) -> str:
-    """Put a special file in the place of a stored content; return what is wrong then."""
-    store = FolderStore(folder, ".result")
-    store.put("key", b"content")
-    (path,) = folder.glob("*.result")
-    special(path, kind)
-    with warnings.catch_warnings(record=True) as noted:
-        warnings.simplefilter("always")
-        found = store.get("key")
-    if found is not None or not noted:
-        return f"no miss with a note: {found!r}"
-    store.put("key", b"again")
-    return "" if store.get("key") == b"again" else "not stored again"
-
-
 def _special(folder: Path) -> Tries:
     for kind in SPECIAL:
         for name, read in READERS.items():
             special(folder / name, kind)
             found = outcome(partial(read, folder / name), lambda _: "was read")
             yield f"{name}: {kind}", found
-        yield f"entry of a store: {kind}", entry_outcome(folder / "store", kind)
 
 
 METHODS: Final = (

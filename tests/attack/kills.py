@@ -23,11 +23,12 @@ from blast_env.app.jobs import jobs_of
 from blast_env.app.session import Sessions
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.free_field import FreeFieldRun, FreeFieldStudy
-from blast_env.files import FolderStore, is_temporary
-from blast_env.journal import Journal
+from blast_env.evaluation import BlastStore
+from blast_env.evaluation.free_field import FreeFieldStudy
+from blast_env.files import is_temporary
 from blast_env.layout import write_layout
 from blast_env.site import load_scenario, save_scenario
+from blast_env.store import Store
 from tests.agents.training_runs import (
     hyperparameters,
     scenario_file,
@@ -113,12 +114,12 @@ def _files(folder: Path) -> dict[str, bytes]:
 
 def _study(folder: Path) -> None:
     FreeFieldStudy(load_scenario("free_field"), (10.0, 12.0), (0, 1), "event").run(
-        store=folder / "runs.jsonl"
+        store=folder / "runs.sqlite"
     )
 
 
 def _study_outcome(folder: Path) -> Any:
-    return sorted(map(str, Journal(folder / "runs.jsonl", FreeFieldRun).read()))
+    return list(Store(folder / "runs.sqlite").items())
 
 
 def _report(folder: Path) -> None:
@@ -134,7 +135,7 @@ def _report(folder: Path) -> None:
 def _report_outcome(folder: Path) -> Any:
     """Return the numbers of the page, and what the cache has."""
     cells = re.findall(r"<td[^>]*>([^<]*)</td>", (folder / "report.html").read_text("utf-8"))
-    loads = FolderStore(folder / "cache", ".loads")
+    loads = BlastStore(folder / "cache")
     numbers = [cell for cell in cells if re.fullmatch(r"[-+0-9., ]+", cell)]
     return numbers, len(loads), _left(folder)
 

@@ -1,7 +1,6 @@
 """A full device costs the new file and nothing else, and nobody is told that it was written."""
 
 import gc
-import os
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
@@ -10,9 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.free_field import FreeFieldRun
-from blast_env.files import FolderStore, is_temporary, write_atomically
-from blast_env.journal import Journal
+from blast_env.files import is_temporary, write_atomically
 from tests.attack.disks import file_size_limit
 from tests.attack.writers import WRITERS
 
@@ -55,42 +52,6 @@ def test_what_was_there_outlives_a_full_device(
         gc.collect()
         assert path.read_bytes() == b"the old one"
         assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_study_goes_on_after_a_full_device(tmp_path: Path) -> None:
-    store = tmp_path / "runs.jsonl"
-    journal = Journal(store, FreeFieldRun)
-    runs = [FreeFieldRun(f"key {seed}", 10.0, seed, 1.0, 1.0, None) for seed in range(3)]
-    journal.add(runs[0])
-    limit = store.stat().st_size + 20
-    with file_size_limit(limit), pytest.raises(BlastEnvError, match="cannot be written"):
-        journal.add(runs[1])
-    journal.add(runs[2])
-    assert journal.read() == [runs[0], runs[2]]
-
-
-def test_a_store_keeps_what_it_had_on_a_full_device(tmp_path: Path) -> None:
-    store = FolderStore(tmp_path, ".result")
-    store.put("key", b"old")
-    with file_size_limit(1000), pytest.raises(BlastEnvError, match="cannot be written"):
-        store.put("key", bytes(2000))
-    assert store.get("key") == b"old"
-    assert len(store) == 1
-
-
-def test_what_a_writer_left_that_was_killed_before_its_rename_is_no_second_entry(
-    tmp_path: Path,
-) -> None:
-    store = FolderStore(tmp_path, ".result", most_bytes=10_000)
-    store.put("key", b"kept")
-    (whole,) = tmp_path.iterdir()
-    left = tmp_path / f".{16 * '0'}.result"
-    left.write_bytes(whole.read_bytes())
-    os.utime(left, (0.0, 0.0))
-    assert list(store.items()) == [("key", b"kept")]
-    assert len(store) == 1
-    store.put("large", bytes(9_950))  # it goes when there is no more room
-    assert not left.exists()
 
 
 def test_an_error_about_another_file_names_it(tmp_path: Path) -> None:

@@ -22,19 +22,19 @@ from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
 from blast_env.particles.parquet import checked_table
 from blast_env.site import Scenario, ScenarioError
+from blast_env.store import Store
 from tests.attack import hostile
 
 DOCUMENT = hostile.site_document()
 
 
 @pytest.mark.parametrize("kind", hostile.SPECIAL)
-def test_a_special_file_is_a_miss_with_a_note_in_a_store_and_refused_elsewhere(
-    kind: str, tmp_path: Path
-) -> None:
-    assert hostile.entry_outcome(tmp_path, kind) == ""
+def test_a_special_file_is_refused(kind: str, tmp_path: Path) -> None:
     hostile.special(tmp_path / "a.json", kind)
     with pytest.raises(DocumentError, match=r"not a regular file|bytes, must|cannot be read"):
         read_text(tmp_path / "a.json")
+    with pytest.raises(BlastEnvError, match=r"a\.json: (cannot be used|is damaged)"):
+        Store(tmp_path / "a.json")
 
 
 def test_nothing_is_written_in_the_place_of_a_device(tmp_path: Path) -> None:

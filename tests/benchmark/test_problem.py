@@ -163,9 +163,9 @@ def test_runs_go_on_where_they_were(tmp_path: Path) -> None:
         calls.append((own.budget, seed))
         return (Piece((12 + seed), 0, "low_wall", True),)
 
-    runs = play(wall, asked, tmp_path / "runs.jsonl")
+    runs = play(wall, asked, tmp_path / "runs.sqlite")
     assert [run.key[1:] for run in runs] == [(0, 0), (4, 0), (4, 1)]
-    assert play(wall, asked, tmp_path / "runs.jsonl") == runs
+    assert play(wall, asked, tmp_path / "runs.sqlite") == runs
     assert len(calls) == 3
     path = Submission("wall", runs, "a note").save(tmp_path / "wall.json")
     assert Submission.load(path) == Submission("wall", runs, "a note")

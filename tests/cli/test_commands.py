@@ -17,6 +17,7 @@ from blast_env.cli import app
 from blast_env.particles.calibration.model import load_calibration
 from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.plots import film
+from blast_env.store import Store
 from tests.scenarios import BALLISTIC_COURTYARD
 
 
@@ -174,10 +175,11 @@ def test_calibrate_writes_a_calibration_its_table_and_its_figure(tmp_path: Path)
     assert table.i_sim.tolist() == pytest.approx(list(stored.i_sim))
     assert (tmp_path / "mine.event.png").stat().st_size > 10_000
     assert "leave-one-distance-out" in result.stdout
-    finished = (tmp_path / "mine.event.runs.jsonl").read_text()
+    finished = list(Store(tmp_path / "mine.event.runs.sqlite").items())
+    assert len(finished) == 8
     again = calibrate(*arguments, out=tmp_path)
     assert again.exit_code == 0
-    assert (tmp_path / "mine.event.runs.jsonl").read_text() == finished
+    assert list(Store(tmp_path / "mine.event.runs.sqlite").items()) == finished
 
 
 @pytest.mark.parametrize(

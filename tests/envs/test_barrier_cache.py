@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, DiskCache, LoadsCache, Threat
+from blast_env.evaluation import BlastEvaluator, BlastStore, Threat
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 from tests.envs.test_scenario_source import Sites
 
@@ -33,7 +33,7 @@ def test_the_hit_rate_is_told() -> None:
 
 @pytest.mark.parametrize("kind", ["folder", "memory"])
 def test_a_second_environment_needs_no_blast_and_says_the_same(kind: str, tmp_path: Path) -> None:
-    cache = tmp_path / "blasts" if kind == "folder" else LoadsCache(100)
+    cache = tmp_path / "blasts" if kind == "folder" else BlastStore(size=100)
     bare, _ = without_counts(play(make(), seed=5))
     first, first_counts = without_counts(play(make(cache=cache), seed=5))
     second, second_counts = without_counts(play(make(cache=cache), seed=5))
@@ -46,7 +46,7 @@ def test_a_second_environment_needs_no_blast_and_says_the_same(kind: str, tmp_pa
 def test_an_evaluator_finds_the_blasts_of_an_environment(tmp_path: Path) -> None:
     env = make(cache=str(tmp_path))
     info = play(env, seed=5)[-1][4]
-    evaluator = BlastEvaluator(small_scenario(), ThinEngine(), cache=DiskCache(tmp_path))
+    evaluator = BlastEvaluator(small_scenario(), ThinEngine(), cache=BlastStore(tmp_path))
     threat = Threat(info["charges"][0], info["blast_seeds"][0][0])
     loads = evaluator.loads(info["layout"], threat)
     assert evaluator.blasts == 0
@@ -79,7 +79,7 @@ def test_environments_in_processes_share_a_folder(tmp_path: Path) -> None:
 
 
 def test_what_is_no_cache_is_named() -> None:
-    with pytest.raises(BlastEnvError, match="cache is 3, must be a folder or have the methods"):
+    with pytest.raises(BlastEnvError, match="cache is 3, must be a folder or a BlastStore"):
         make(cache=3)
     with pytest.raises(BlastEnvError, match="argument 'cahce', did you mean 'cache'"):
         make(cahce="folder")

@@ -11,7 +11,7 @@ from blast_env.evaluation import BlastEvaluator, BlastLoads
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine, PymunkEngine
 from blast_env.evaluation.store import (
     BlastKey,
-    LoadsCache,
+    BlastStore,
     calibration_digest,
     engine_text,
 )
@@ -25,14 +25,14 @@ def key(seed: int) -> BlastKey:
     return BlastKey("hash", (), Charge((0.0, 0.0), 1.0), seed, "pymunk", "calibration", "code")
 
 
-def filled(size: int, count: int) -> LoadsCache:
-    cache = LoadsCache(size)
+def filled(size: int, count: int) -> BlastStore:
+    cache = BlastStore(size=size)
     for seed in range(count):
         cache.add(key(seed), BlastLoads((), np.array([float(seed)])))
     return cache
 
 
-def kept(cache: LoadsCache, count: int) -> list[int]:
+def kept(cache: BlastStore, count: int) -> list[int]:
     return [seed for seed in range(count) if cache.get(key(seed)) is not None]
 
 
@@ -73,7 +73,7 @@ def test_a_cache_of_size_zero_keeps_nothing() -> None:
 
 def test_a_negative_size_is_refused() -> None:
     with pytest.raises(BlastEnvError, match="cache_size is -1, must be at least 0"):
-        LoadsCache(-1)
+        BlastStore(size=-1)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def test_calibrations_of_one_name_are_told_apart() -> None:
 
 def test_the_version_of_the_code_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """What an older package computed must not pass for what this one would."""
-    shared = LoadsCache(10)
+    shared = BlastStore(size=10)
     BlastEvaluator(COURTYARD, "event", cache=shared).loads(FEW, THREATS[0])
     same = BlastEvaluator(COURTYARD, "event", cache=shared)
     same.loads(FEW, THREATS[0])
@@ -122,7 +122,7 @@ def test_the_version_of_the_code_counts(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_the_version_of_the_engine_counts() -> None:
-    shared = LoadsCache(10)
+    shared = BlastStore(size=10)
     evaluators = [
         BlastEvaluator(COURTYARD, replace(EventEngine(), version=version), cache=shared)
         for version in ("event 1", "event 2", "event 1")

@@ -9,7 +9,7 @@ import typer
 from blast_agents.training import train
 from typer.testing import CliRunner
 
-from blast_env.evaluation import BlastEvaluator, DiskCache, draw_threats
+from blast_env.evaluation import BlastEvaluator, BlastStore, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece
 from blast_env.site import save_scenario
@@ -17,7 +17,7 @@ from studies import blast_table
 from tests.agents.test_self_labelling import own, run_settings
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 from tests.evaluation.cases import COURTYARD
-from tests.evaluation.test_disk_cache import key, loads, same
+from tests.evaluation.test_blast_store import key, loads, same
 
 PIECES = (Piece(0, 0, "wall"),)
 FAST = GasEngine(border_m=0.0, until=0.005)
@@ -35,7 +35,6 @@ def test_each_blast_is_there_once_with_what_was_asked(tmp_path: Path) -> None:
     evaluator = BlastEvaluator(scenario, "event", cache=tmp_path / "blasts")
     threats = draw_threats(scenario, range(2))
     found = [evaluator.loads((), each) for each in threats]
-    (tmp_path / "blasts" / "broken.loads").write_bytes(b"no blast at all")
     code, words = run(tmp_path / "blasts", tmp_path / "blasts", "--out", out)
     assert (code, words.split(";")[0]) == (0, "2 blasts")
     table = pd.read_parquet(out).sort_values("seed")
@@ -118,7 +117,7 @@ def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("layout", [(), PIECES, ((1, 2), (3, 4))])
 def test_keys_come_back_as_they_were(tmp_path: Path, layout: tuple) -> None:
-    cache, asked = DiskCache(tmp_path), key(3)._replace(layout=layout)
+    cache, asked = BlastStore(tmp_path), key(3)._replace(layout=layout)
     cache.add(asked, loads(3))
     ((found, kept),) = cache.items()
     assert found == asked

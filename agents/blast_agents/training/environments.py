@@ -18,7 +18,7 @@ from blast_env.envs.observations import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Evaluators
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.store import BlastCache, LoadsCache
+from blast_env.evaluation.store import BlastStore
 from blast_env.runner import workers_told
 from blast_env.sites import FAMILIES
 from blast_env.values import checked_seed, whole_number
@@ -95,14 +95,14 @@ class SharedBlastsVecEnv(DummyVecEnv):
     Args:
         makers: Create the `BlastBarrier` environments, which share `cache`.
         engine: The engine of all environments.
-        cache: Cache of the loads.
+        cache: Store of the loads.
     """
 
     def __init__(
         self,
         makers: Sequence[Callable[[], gym.Env[Any, Any]]],
         engine: str | Engine,
-        cache: BlastCache,
+        cache: BlastStore,
     ) -> None:
         super().__init__([*makers])
         self._evaluators = Evaluators(engine, cache)
@@ -133,13 +133,13 @@ class EnvironmentMaker:
         configuration: Configuration of the run.
         source: Source of the episodes' scenarios.
         index: Index of the environment.
-        cache: Cache of the loads; by default a separate one in memory.
+        cache: Store of the loads; by default a separate one in memory.
     """
 
     configuration: RunConfiguration
     source: ScenarioSource
     index: int
-    cache: BlastCache | None = None
+    cache: BlastStore | None = None
 
     def __call__(self) -> gym.Env[Any, Any]:
         """Return the environment with its wrappers."""
@@ -153,7 +153,7 @@ class EnvironmentMaker:
             realisations=1,
             engine=settings.blast_engine,
             observation=settings.observation,
-            cache=LoadsCache(_LOADS) if self.cache is None else self.cache,
+            cache=BlastStore(size=_LOADS) if self.cache is None else self.cache,
             threat=settings.threat,
             **threats,
         )
@@ -171,7 +171,7 @@ def make_environments(configuration: RunConfiguration, source: ScenarioSource) -
     """
     count = configuration.ppo.n_envs
     if workers_told() > 1:
-        shared = LoadsCache(_LOADS * count)
+        shared = BlastStore(size=_LOADS * count)
         actors = [EnvironmentMaker(configuration, source, index, shared) for index in range(count)]
         return SharedBlastsVecEnv(actors, configuration.settings.blast_engine, shared)
     makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]

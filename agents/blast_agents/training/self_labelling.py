@@ -38,7 +38,7 @@ from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observ
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import BlastAsked
-from blast_env.evaluation.store import DiskCache, LoadsCache
+from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import Placement
 from blast_env.site.scene import Charge
@@ -405,9 +405,13 @@ class SelfLabelling:
         policy.set_training_mode(False)
         cases = training_cases(settings, source, hyperparameters.cases)
         # Predictions take less time than reading them from a file.
-        cache = LoadsCache(_GUESSES) if settings.guesses else DiskCache(folder.blasts, _MOST_BYTES)
+        store = (
+            BlastStore(size=_GUESSES)
+            if settings.guesses
+            else BlastStore(folder.blasts, most_bytes=_MOST_BYTES)
+        )
         scenarios = {case.scenario.content_hash for case in cases}
-        evaluators = Evaluators(settings.blast_engine, cache, most=len(scenarios))
+        evaluators = Evaluators(settings.blast_engine, store, most=len(scenarios))
         judge = Judge(evaluators, hyperparameters.n_envs, progress.counters.steps)
         return cls(
             folder=folder,
@@ -418,7 +422,7 @@ class SelfLabelling:
             selection=selection,
             progress=progress,
             logger=configure(str(folder.tensorboard), ["tensorboard"]),
-            uncounted=0 if settings.guesses else max(len(cache) - progress.counters.blasts, 0),
+            uncounted=0 if settings.guesses else max(len(store) - progress.counters.blasts, 0),
         )
 
     def do_round(self) -> None:

@@ -1,7 +1,6 @@
 """The gas blasts as a data set: what its card promises of every row."""
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from blast_env.benchmark.data import COLUMNS, TABLES, PublishedBlasts, as_tensors, load, sources
+from blast_env.benchmark.data import COLUMNS, TABLES, as_tensors, load, remember_published, sources
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastKey
-from blast_env.evaluation.engines import BlastLoads
+from blast_env.evaluation import BlastEvaluator, BlastStore, Threat
+from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece
 from blast_env.site.scene import Charge
 from studies.blast_table import scenario_of
@@ -63,21 +63,27 @@ def test_other_names_and_other_files_are_refused(tmp_path: Path) -> None:
         load(paths=[other])
 
 
-def test_published_blasts_are_served_for_the_same_cells_and_version(rows: pd.DataFrame) -> None:
+def test_published_blasts_are_served_for_the_same_cells_and_version(
+    rows: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
     row = rows[rows["table"] == "many_site_blasts"].iloc[0]
-    site = scenario_of(row["scenario"])
-    published = PublishedBlasts({site.content_hash: site})
+    site, store = scenario_of(row["scenario"]), BlastStore(size=100)
+    assert remember_published(store, [site]) == len(store) > 0
     charge = Charge((row["charge_x_m"], row["charge_y_m"]), row["tnt_kg"])
     layout = tuple(Piece(*each) for each in json.loads(row["layout"]))
-    present = re.findall(r"gas (\d+) \(", row["engine"])[0]
-
-    def found(cells: str, version: str = present) -> BlastLoads | None:
-        engine = f"gas {version} (numba) cell_m=0.5, cells='{cells}'"
-        return published.get(BlastKey(site.content_hash, layout, charge, 0, engine, "none", ""))
-
-    assert found("coarse") is None
-    assert found("uniform", version="99") is None  # another version has other loads
-    loads = found("uniform")
-    assert loads is not None
-    (same,) = (each for each in loads.structures if each.name == row["structure"])
-    assert same.impulse_pa_s == row["impulse_pa_s"]
+    fine, same = (
+        BlastEvaluator(site, find_engine("gas", each), cache=store) for each in (0.25, 0.5)
+    )
+    assert store.get(fine.key(layout, Threat(charge, 0))) is None
+    (load,) = (
+        each
+        for each in same.loads(layout, Threat(charge, 0)).structures
+        if each.name == row["structure"]
+    )
+    assert load.impulse_pa_s == row["impulse_pa_s"]
+    assert same.blasts == 0
+    # Another version has other loads.
+    monkeypatch.setattr(
+        "blast_env.benchmark.data.published.find_engine", lambda *_: GasEngine(version="gas 99 (x)")
+    )
+    assert remember_published(BlastStore(), [site]) == 0

@@ -10,12 +10,11 @@ from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import free_field as study_module
 from blast_env.evaluation.free_field import (
-    FreeFieldRun,
     FreeFieldStudy,
     impulse_by_seed,
     summarise,
 )
-from blast_env.journal import Journal
+from blast_env.store import Store
 
 SMALL = load_scenario("free_field").with_simulation(
     overrides={"explosive": {"ball_count": 120}, "stepping": {"time_limit_s": 0.1}}
@@ -47,7 +46,7 @@ def test_two_processes_give_the_same_table(runs: pd.DataFrame) -> None:
 def test_an_interrupted_study_goes_on_without_repeating(
     runs: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    store, run_one = tmp_path / "runs.jsonl", study_module._run_one
+    store, run_one = tmp_path / "runs.sqlite", study_module._run_one
     ran: list[tuple[float, int]] = []
 
     def counted(job: tuple) -> object:
@@ -60,9 +59,7 @@ def test_an_interrupted_study_goes_on_without_repeating(
     monkeypatch.setattr(study_module, "_run_one", counted)
     with pytest.raises(KeyboardInterrupt):
         STUDY.run(store=store)
-    assert len(Journal(store, FreeFieldRun).read()) == 4
-    with store.open("a") as file:
-        file.write('{"key": "cut sho')  # what a killed process leaves
+    assert len(Store(store)) == 4
     first, ran[:] = list(ran), []
     pd.testing.assert_frame_equal(STUDY.run(store=store), runs, check_exact=True)
     assert len(ran) == 2
@@ -74,11 +71,11 @@ def test_an_interrupted_study_goes_on_without_repeating(
 
 
 def test_runs_of_other_parameters_are_not_believed(tmp_path: Path) -> None:
-    store = tmp_path / "runs.jsonl"
+    store = tmp_path / "runs.sqlite"
     FreeFieldStudy(SMALL, (8.0,), (5,)).run(store=store)
     heavier = SMALL.with_simulation(overrides={"air": {"mass": 0.5}})
     other = FreeFieldStudy(heavier, (8.0,), (5,)).run(store=store)
-    assert len(Journal(store, FreeFieldRun).read()) == 2
+    assert len(Store(store)) == 2
     expected = simulate(heavier.at_stand_off(8.0), seed=5).impulse_sim("building")
     assert other.impulse_sim.tolist() == [expected]
 
@@ -108,16 +105,3 @@ def test_bad_studies_are_refused(
 ) -> None:
     with pytest.raises(BlastEnvError, match=words):
         FreeFieldStudy(SMALL, distances, seeds)
-
-
-def test_a_store_that_is_none_is_refused_with_its_line(tmp_path: Path) -> None:
-    store = tmp_path / "runs.jsonl"
-    Journal(store, FreeFieldRun).add(FreeFieldRun("key", 8.0, 1, 2.0, 3.0, None))
-    with store.open("a") as file:
-        file.write("nonsense\n")
-    with pytest.raises(BlastEnvError, match=r"runs.jsonl: line 2: is not JSON"):
-        Journal(store, FreeFieldRun).read()
-    store.write_bytes(b"\xff\xfe\n")
-    with pytest.raises(BlastEnvError, match=r"line 1: is not UTF-8 text"):
-        Journal(store, FreeFieldRun).read()
-    assert Journal(tmp_path / "none.jsonl", FreeFieldRun).read() == []

@@ -1,0 +1,214 @@
+"""Results of long work by their keys, in a database that several processes and threads may use."""
+
+import os
+import sqlite3
+from collections.abc import Callable, Iterator
+from hashlib import sha256
+from pathlib import Path
+from threading import RLock
+from time import monotonic, sleep
+from typing import Any, Final, TypeVar
+
+from blast_env.errors import BlastEnvError
+from blast_env.files import make_folder
+
+T = TypeVar("T")
+
+_FORMAT: Final = 0x62_6C_73_31
+"""Application number in the file ("bls1"); a later format takes another one."""
+
+_PATIENCE_S: Final = 60.0
+_MOST_CONTENT_BYTES: Final = 2**28
+_KEPT_SHARE: Final = 0.9  # of the bound, after deleting: not every addition tidies up again
+_UNSEEN_SHARE: Final = 1.0 / 32.0
+
+
+class Store:
+    """Contents by their keys: everything on which a content depends, as text.
+
+    The file is an SQLite database with a write-ahead log: after a crash or on a full device, a
+    content is either whole or absent. A content whose checksum differs is deleted and counts as
+    absent. A loss of power may lose the last contents. Processes on one machine may share a file;
+    network folders have no such locks.
+
+    A store can be pickled; the copy uses the same file.
+
+    Args:
+        path: The file; it and its folder are made if need be.
+        most_bytes: Largest total size of the contents; the oldest are deleted first. Each process
+            checks it whenever it has written a 32nd part of it. Without it, nothing is deleted.
+
+    Attributes:
+        path: The file, as an absolute path.
+        most_bytes: As given.
+        damaged: Number of damaged contents that this object has found.
+
+    Raises:
+        BlastEnvError: If the file is damaged, is no store or cannot be opened, or `most_bytes` is
+            negative.
+    """
+
+    def __init__(self, path: str | Path, most_bytes: int | None = None) -> None:
+        self._begin()
+        if most_bytes is not None and most_bytes < 0:
+            raise BlastEnvError(f"most_bytes is {most_bytes}, must be at least 0")
+        self.path = Path(path).absolute()
+        self.most_bytes = most_bytes
+        self.damaged = 0
+        self._unseen_bytes = most_bytes or 0  # the size is not known yet
+        make_folder(self.path.parent)
+        self._run("SELECT 1")
+
+    def _begin(self) -> None:
+        self._lock, self._process = RLock(), 0
+        self._connection: sqlite3.Connection | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without the connection, which belongs to one process."""
+        own = ("_lock", "_process", "_connection")
+        return {name: value for name, value in vars(self).items() if name not in own}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore the state; the file is opened when it is used."""
+        vars(self).update(state)
+        self._begin()
+
+    def __del__(self) -> None:
+        """Close the connection, unless it is that of a parent process."""
+        if self._connection is not None and self._process == os.getpid():
+            self._connection.close()
+
+    def get(self, key: str) -> bytes | None:
+        """Return the content of a key, or `None` if it is absent or damaged.
+
+        Raises:
+            BlastEnvError: If the file cannot be read.
+        """
+        found = self._run("SELECT checksum, content FROM contents WHERE key = ?", key)
+        if not found:
+            return None
+        checksum, content = found[0]
+        if isinstance(content, bytes) and checksum == _checksum(key, content):
+            return content
+        self.discard(key)
+        return None
+
+    def read(self, key: str, decode: Callable[[bytes], T]) -> T | None:
+        """Return the decoded content of a key, or `None` if it is absent or damaged.
+
+        Args:
+            key: The key.
+            decode: Decodes the content. It raises `ValueError` for content that passes the
+                checksum but is not valid; such content counts as damaged.
+
+        Raises:
+            BlastEnvError: If the file cannot be read.
+        """
+        content = self.get(key)
+        try:
+            return None if content is None else decode(content)
+        except ValueError:
+            self.discard(key)
+            return None
+
+    def put(self, key: str, content: bytes) -> None:
+        """Store the content of a key; the oldest ones may be deleted for it.
+
+        Raises:
+            BlastEnvError: If it cannot be written.
+        """
+        insert = "INSERT OR REPLACE INTO contents (key, checksum, content) VALUES (?, ?, ?)"
+        self._run(insert, key, _checksum(key, content), content)
+        if self.most_bytes is None:
+            return
+        self._unseen_bytes += len(content)
+        if self._unseen_bytes > _UNSEEN_SHARE * self.most_bytes:
+            self._unseen_bytes = 0
+            self._tidy_up(self.most_bytes)
+
+    def items(self) -> Iterator[tuple[str, bytes]]:
+        """Yield keys and contents in the order of the keys, without damaged ones.
+
+        Raises:
+            BlastEnvError: If the file cannot be read.
+        """
+        for (key,) in self._run("SELECT key FROM contents ORDER BY key"):
+            content = self.get(key)
+            if content is not None:
+                yield key, content
+
+    def discard(self, key: str) -> None:
+        """Count the content of a key as damaged, and delete it."""
+        self.damaged += 1
+        self._run("DELETE FROM contents WHERE key = ?", key)
+
+    def __len__(self) -> int:
+        count: int = self._run("SELECT COUNT(*) FROM contents")[0][0]
+        return count
+
+    def _tidy_up(self, most_bytes: int) -> None:
+        """Delete the oldest contents, if all together exceed the bound."""
+        (size,) = self._run("SELECT TOTAL(LENGTH(content)) FROM contents")[0]
+        if size > most_bytes:
+            self._run(
+                "DELETE FROM contents WHERE number IN (SELECT number FROM (SELECT number,"
+                " SUM(LENGTH(content)) OVER (ORDER BY number DESC) AS size FROM contents)"
+                " WHERE size > ?)",
+                _KEPT_SHARE * most_bytes,
+            )
+
+    def _run(self, command: str, *values: object) -> list[Any]:
+        try:
+            with self._lock:
+                if self._connection is None or self._process != os.getpid():
+                    self._connection, self._process = self._opened(), os.getpid()
+                return self._connection.execute(command, values).fetchall()
+        except sqlite3.Error as error:
+            damaged = type(error) is sqlite3.DatabaseError
+            words = "is damaged, or no store of results: delete it" if damaged else "cannot be used"
+            raise BlastEnvError(f"{self.path}: {words} ({error})") from error
+
+    def _opened(self) -> sqlite3.Connection:
+        connection = sqlite3.connect(
+            self.path, _PATIENCE_S, isolation_level=None, check_same_thread=False
+        )
+        try:
+            connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MOST_CONTENT_BYTES)
+            connection.execute("PRAGMA trusted_schema = OFF")  # nothing in a file is run
+            connection.execute("PRAGMA synchronous = NORMAL")
+            kind = "SELECT application_id, (SELECT COUNT(*) FROM sqlite_master) FROM"
+            number, tables = connection.execute(f"{kind} pragma_application_id").fetchone()
+            if number != _FORMAT and (number or tables):
+                raise sqlite3.DatabaseError("it has another format")
+            if not number:
+                _use_log(connection)
+                connection.execute(f"PRAGMA application_id = {_FORMAT}")
+            connection.execute(
+                "CREATE TABLE IF NOT EXISTS contents"
+                " (number INTEGER PRIMARY KEY, key TEXT UNIQUE, checksum BLOB, content BLOB)"
+            )
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+
+def _use_log(connection: sqlite3.Connection) -> None:
+    """Set the write-ahead log of a new file, which other processes may be setting just now.
+
+    SQLite does not wait for them here.
+    """
+    until_s = monotonic() + _PATIENCE_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or monotonic() > until_s:
+                raise
+            sleep(0.01)
+        else:
+            return
+
+
+def _checksum(key: str, content: bytes) -> bytes:
+    return sha256(key.encode() + b"\n" + content).digest()

@@ -1,0 +1,158 @@
+"""A store gives back what was put in, or nothing: never anything else."""
+
+import multiprocessing
+import pickle
+import sqlite3
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from blast_env.errors import BlastEnvError
+from blast_env.store import Store
+from tests.attack.disks import file_size_limit
+
+FORKING = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+"""Forks begin at once; later versions of Python warn of threads, which here do nothing."""
+
+
+def filled(path: Path) -> Store:
+    store = Store(path)
+    for number in range(3):
+        store.put(f"key {number}", bytes([number]) * 2000)
+    return store
+
+
+def test_contents_come_back_for_another_object_and_a_copy(tmp_path: Path) -> None:
+    first = filled(tmp_path / "a" / "store")
+    for store in (first, Store(tmp_path / "a" / "store"), pickle.loads(pickle.dumps(first))):
+        assert store.get("key 1") == bytes([1]) * 2000
+        assert store.get("key 3") is None
+        assert len(store) == 3
+        assert list(store.items()) == [(f"key {k}", bytes([k]) * 2000) for k in range(3)]
+
+
+def test_a_later_content_takes_the_place_of_the_first(tmp_path: Path) -> None:
+    store = Store(tmp_path / "store")
+    store.put("key", b"first")
+    store.put("key", b"second")
+    assert list(store.items()) == [("key", b"second")]
+
+
+@pytest.mark.filterwarnings("error")
+def test_any_damage_is_an_error_or_a_missing_content_and_never_a_wrong_one(tmp_path: Path) -> None:
+    path = tmp_path / "store"
+    filled(path).__del__()  # which closes it, so that all of it is in one file
+    whole = path.read_bytes()
+    assert [each.name for each in tmp_path.iterdir()] == ["store"]
+    flipped = [
+        whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
+        for place in range(0, len(whole), 331)
+    ]
+    refused = 0
+    for content in [*flipped, whole[: len(whole) // 2], whole[:50], b"x" * 5000]:
+        for each in tmp_path.iterdir():
+            each.unlink()
+        path.write_bytes(content)
+        try:
+            store = Store(path)
+            found = [store.get(f"key {number}") for number in range(3)]
+        except BlastEnvError:
+            refused += 1
+        else:
+            whole_or_none = zip(found, range(3), strict=True)
+            assert all(each in (None, bytes([k]) * 2000) for each, k in whole_or_none)
+    assert refused >= 3
+
+
+def test_a_damaged_content_goes(tmp_path: Path) -> None:
+    store = filled(tmp_path / "store")
+    with closing(sqlite3.connect(tmp_path / "store")) as other:
+        other.execute("UPDATE contents SET content = ? WHERE key = 'key 1'", (b"other",))
+        other.execute("UPDATE contents SET key = 'key 9' WHERE key = 'key 2'")
+        other.commit()
+    assert store.get("key 1") is None
+    assert store.get("key 9") is None  # of another key
+    assert store.damaged == 2
+    assert len(store) == 1
+
+
+def test_content_that_cannot_be_decoded_counts_as_damaged(tmp_path: Path) -> None:
+    store = Store(tmp_path / "store")
+    store.put("key", b"3.5")
+    assert store.read("key", float) == 3.5
+    assert store.read("key", int) is None
+    assert store.damaged == 1
+    assert store.read("key", float) is None
+
+
+def test_files_of_others_are_refused_and_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "other"
+    with closing(sqlite3.connect(path)) as other:
+        other.execute("CREATE TABLE contents (mine TEXT)")
+        other.commit()
+    content = path.read_bytes()
+    with pytest.raises(BlastEnvError, match=r"other: is damaged, or no store .* another format"):
+        Store(path)
+    assert path.read_bytes() == content
+    with pytest.raises(BlastEnvError, match="cannot be used"):
+        Store(tmp_path)
+    with pytest.raises(BlastEnvError, match="most_bytes is -1, must be at least 0"):
+        Store(tmp_path / "new", -1)
+
+
+def test_the_oldest_go_when_there_is_no_more_room(tmp_path: Path) -> None:
+    store = Store(tmp_path / "store", most_bytes=10_000)
+    for number in range(40):
+        store.put(str(number), bytes(1000))
+        assert len(store) <= 10
+    assert [int(key) for key, _ in store.items()] == list(range(40 - len(store), 40))
+    assert len(store) >= 9
+
+
+def test_a_full_device_costs_the_new_content_alone(tmp_path: Path) -> None:
+    store = filled(tmp_path / "store")
+    with file_size_limit(1000), pytest.raises(BlastEnvError, match="store: cannot be used"):
+        store.put("large", bytes(100_000))
+    assert store.get("large") is None
+    store.put("key 3", b"fits")
+    assert len(store) == 4
+    assert len(Store(tmp_path / "store")) == 4
+
+
+def _mixed(path: Path, first: int) -> int:
+    """Put and get what others put and get at the same time; return the number of errors."""
+    store, wrong = Store(path, 20_000), 0
+    for number in (*range(first, 40), *range(first)):
+        store.put(str(number), bytes([number]) * 1000)
+        for asked in (number, (number + 20) % 40):
+            wrong += store.get(str(asked)) not in (None, bytes([asked]) * 1000)
+    return wrong + store.damaged
+
+
+@FORKING
+def test_processes_at_once_never_read_anything_half_written(tmp_path: Path) -> None:
+    """Also while each deletes what another one has just written, and all make the file."""
+    with multiprocessing.get_context("fork").Pool(3) as pool:
+        jobs = [(tmp_path / str(k), first) for k in range(3) for first in (0, 13, 26)]
+        assert sum(pool.starmap(_mixed, jobs, chunksize=1)) == 0
+
+
+def test_threads_share_a_store(tmp_path: Path) -> None:
+    store = Store(tmp_path / "store")
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda number: store.put(str(number), str(number).encode()), range(100)))
+        found = pool.map(lambda number: store.get(str(number)), range(100))
+    assert list(found) == [str(number).encode() for number in range(100)]
+
+
+@FORKING
+def test_a_forked_process_opens_its_own_connection(tmp_path: Path) -> None:
+    store = filled(tmp_path / "store")
+    process = multiprocessing.get_context("fork").Process(target=store.put, args=("child", b"1"))
+    process.start()
+    process.join()
+    assert process.exitcode == 0
+    store.put("parent", b"2")
+    assert (store.get("child"), store.get("parent"), len(store)) == (b"1", b"2", 5)
