@@ -16,7 +16,7 @@ from blast_env.provenance import package_version
 
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers
     from blast_env.design.proposal import propose, search
-    from blast_env.evaluation.cases import Case, Threat
+    from blast_env.evaluation.cases import Case, LoadCase
     from blast_env.evaluation.engines.contract import Engine
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
     from blast_env.evaluation.engines.particles import Blast, BlastResult
@@ -38,7 +38,7 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
         "LayoutEvaluation": "blast_env.evaluation.report",
         "Placement": "blast_env.layout",
         "Scenario": "blast_env.site",
-        "Threat": "blast_env.evaluation.cases",
+        "LoadCase": "blast_env.evaluation.cases",
         "evaluate_layout": "blast_env.evaluation.report",
         "load_layout": "blast_env.layout",
         "load_scenario": "blast_env.site",
@@ -61,9 +61,9 @@ __all__ = [
     "GasBlast",
     "GasResult",
     "LayoutEvaluation",
+    "LoadCase",
     "Placement",
     "Scenario",
-    "Threat",
     "bundled_scenarios",
     "evaluate_layout",
     "load_layout",

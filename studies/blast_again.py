@@ -18,7 +18,7 @@ import typer
 
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.surrogate.fitting import elements
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.engines import find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
@@ -74,7 +74,7 @@ def run_site(asked: SiteBlasts, cells: str | None, folder: Path) -> list[dict[st
     evaluator = BlastEvaluator(site, engine, cache=folder)
     rows = []
     for layout, charge in asked.blasts:
-        threat = Threat(charge, 0)
+        threat = LoadCase(charge, 0)
         loads, key = evaluator.loads(layout, threat), evaluator.key(layout, threat)
         rows += [load_row({key.scenario_hash: asked.name}, key, each) for each in loads.structures]
     return rows

@@ -8,7 +8,7 @@ import typer
 
 from blast_env.cli.output import print_line, user_errors
 from blast_env.design.search.registry import layouts_by_rule
-from blast_env.evaluation import BlastEvaluator, Threat, draw_threats
+from blast_env.evaluation import BlastEvaluator, LoadCase, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.files import make_folder
 from blast_env.geometry import layout_words
@@ -116,7 +116,7 @@ def _draw_damages(axes: Axes, damages: Mapping[str, float], target: LevelOfProte
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _threats(scenario: Scenario) -> tuple[Threat, ...]:
+def _threats(scenario: Scenario) -> tuple[LoadCase, ...]:
     return one_of_each_charge(draw_threats(scenario, range(_DRAWS)))
 
 

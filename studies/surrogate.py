@@ -23,7 +23,7 @@ from blast_env.design.surrogate.fitting import ErrorsOfBoth, Samples, errors, fi
 from blast_env.design.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation import BlastEvaluator, Case, LoadCase, SeedRange, draw_threats
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
@@ -111,7 +111,7 @@ class Recipe:
     favourites: int = 3
     changes: int = 300
 
-    def of(self, site: Scenario, threat: Threat, seed: int) -> list[Layout]:
+    def of(self, site: Scenario, threat: LoadCase, seed: int) -> list[Layout]:
         """Return the layouts for a threat, sorted and distinct, the empty one first."""
         rng, moves = np.random.default_rng(seed), Moves(site)
         ruled = list(dict.fromkeys(layouts_by_rule(site).values()))
@@ -266,7 +266,7 @@ def verdict(
     surrogate: Surrogate,
     changes: int,
     evaluator: BlastEvaluator,
-    threat: Threat,
+    threat: LoadCase,
     processes: int = 1,
 ) -> LayoutsJudged:
     """Judge the surrogate's proposal after a number of changes, and the rules' layouts."""

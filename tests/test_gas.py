@@ -10,7 +10,7 @@ import pytest
 import blast_env
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
-from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
 from blast_env.evaluation.engines.gas_tables import FACE_COLUMNS
 from blast_env.gas.engine import scaled_distance
@@ -214,7 +214,7 @@ def test_a_charge_that_hangs_or_lies_close_is_flagged_or_runs() -> None:
 
 def test_an_evaluation_takes_one_realisation_a_charge() -> None:
     evaluator = BlastEvaluator(HUT, "gas")
-    threats = [Threat(HUT.sample_charge(np.random.default_rng(0)), seed) for seed in range(4)]
+    threats = [LoadCase(HUT.sample_charge(np.random.default_rng(0)), seed) for seed in range(4)]
     loads = evaluator.loads_of_many([(WALL, threat) for threat in threats])
     assert evaluator.blasts == 1
     assert evaluator.calibration_name == "none"

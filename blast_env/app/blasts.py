@@ -34,10 +34,9 @@ from blast_env.app.records import (
     worst_first,
     write_kept,
 )
-from blast_env.app.threats import NamedThreat
 from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask
-from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
 from blast_env.evaluation.consequences import unchecked
 from blast_env.evaluation.engines import Blast
 from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
@@ -127,7 +126,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
     """
     scenario = task.site
     layout = met_by_blasts(placing.layout_from(scenario, task.layout))
-    work: list[tuple[NamedThreat, Layout]] = []
+    work: list[tuple[LoadCase, Layout]] = []
     for threat in task.threats:
         # Gas needs the scale of the blast without a barrier; particles show the layout first.
         both = [(threat, ()), (threat, layout)]
@@ -140,7 +139,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
 
 
 def _run_one(
-    task: BlastTask, scenario: Scenario, threat: NamedThreat, layout: Layout, tell: Tell
+    task: BlastTask, scenario: Scenario, threat: LoadCase, layout: Layout, tell: Tell
 ) -> None:
     charge = charge_against(scenario, layout, threat.charge)
     key = blast_key(scenario, layout, charge, task.engine)
@@ -174,11 +173,11 @@ def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
         return
     judge = LoadJudge(scenario)
 
-    def folder_of(threat: NamedThreat, cells: Layout) -> Path:
+    def folder_of(threat: LoadCase, cells: Layout) -> Path:
         charge = charge_against(scenario, cells, threat.charge)
         return Path(task.blasts) / blast_key(scenario, cells, charge, task.engine)
 
-    def load(threat: NamedThreat) -> float:
+    def load(threat: LoadCase) -> float:
         record = read_record(folder_of(threat, layout))
         return nan if record is None else worst_first(judge, record)
 
@@ -187,7 +186,7 @@ def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
     for cells in dict.fromkeys([layout, ()]):
         path = folder_of(worst, cells) / COARSE
         if not path.is_file():
-            found = evaluator.loads(cells, Threat(worst.charge, 0))
+            found = evaluator.loads(cells, worst)
             write_kept(_coarse_loads(scenario, found), path)
 
 
@@ -254,7 +253,7 @@ def _particle_loads(
     task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, tell: Tell
 ) -> list[BlastLoads]:
     evaluator = BlastEvaluator(scenario, "event", cache=task.cache)
-    pairs = [(layout, Threat(charge, seed)) for seed in SEEDS]
+    pairs = [(layout, LoadCase(charge, seed)) for seed in SEEDS]
     return evaluator.loads_of_many(pairs, progress=tell)
 
 

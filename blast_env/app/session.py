@@ -25,7 +25,7 @@ from blast_env.app.records import (
     blast_key,
     comparison,
 )
-from blast_env.app.threats import NamedThreat, threats_of, usual_threats
+from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import FacadeVerdict, facades_digest, picture_name, verdict_rows
 from blast_env.app.work import (
     BlastTask,
@@ -38,6 +38,7 @@ from blast_env.app.work import (
     Task,
 )
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import LoadCase
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
 from blast_env.layout.build_scene import charge_against
@@ -192,7 +193,7 @@ class Session:
 
     # Work.
 
-    def chosen_threats(self) -> tuple[NamedThreat, ...]:
+    def chosen_threats(self) -> tuple[LoadCase, ...]:
         """Return the threats of blasts."""
         return tuple(each for each in threats_of(self.scenario) if each.name in self.threats)
 
@@ -382,7 +383,7 @@ class Session:
 
     # Results.
 
-    def shown(self, threat: NamedThreat) -> tuple[Shown, ...]:
+    def shown(self, threat: LoadCase) -> tuple[Shown, ...]:
         """Return the layouts with the keys of their blasts under a threat, no barrier first.
 
         Empty layouts are left out: they equal no barrier.
@@ -395,7 +396,7 @@ class Session:
         ]
         return tuple(Shown(name, layout, self.key(layout, threat)) for name, layout in layouts)
 
-    def key(self, layout: Layout, threat: NamedThreat) -> str:
+    def key(self, layout: Layout, threat: LoadCase) -> str:
         """Return the key of a blast."""
         charge = charge_against(self.scenario, layout, threat.charge)
         return blast_key(self.scenario.without_budget, layout, charge, self.engine)
@@ -432,7 +433,7 @@ class Session:
             row.model_copy(update={"building": titled(row.building)}) for row in verdict_rows(found)
         ]
 
-    def verdicts_on(self, shown: Shown, threat: NamedThreat) -> tuple[BuildingVerdict, ...]:
+    def verdicts_on(self, shown: Shown, threat: LoadCase) -> tuple[BuildingVerdict, ...]:
         """Return the verdicts of a blast on the buildings with their current facades."""
         if not any(each.facade for each in self.scenario.structures):
             return ()
@@ -466,12 +467,12 @@ class Session:
                         return path
         raise BlastEnvError(f"there is no {name}")
 
-    def _facades(self, shown: Shown, threat: NamedThreat) -> FacadeVerdict | None:
+    def _facades(self, shown: Shown, threat: LoadCase) -> FacadeVerdict | None:
         folder = self.folder.blast_of(shown.key)
         cell_m = self.engine.gas.smallest_m
         return FacadeVerdict.read(self.scenario, shown.layout, threat.charge, cell_m, folder)
 
-    def waves(self, threat: NamedThreat) -> Sequence[tuple[str, BlastRecord]]:
+    def waves(self, threat: LoadCase) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""
         found = ((each.name, self.folder.record_of(each.key)) for each in self.shown(threat))
         return [(name, record) for name, record in found if record is not None and record.waves]

@@ -26,7 +26,7 @@ from blast_env.app.work import (
 )
 from blast_env.design.proposal import chosen_proposer
 from blast_env.design.search import DesignProblem, Progress, find_proposer
-from blast_env.evaluation import BlastEvaluator, Case, SeedRange, Threat
+from blast_env.evaluation import BlastEvaluator, Case, LoadCase, SeedRange
 from blast_env.evaluation.engines import JUDGE
 from blast_env.geometry import Layout
 from blast_env.site import Scenario
@@ -116,7 +116,7 @@ def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[L
         return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None)), ""
     if task.proposer != PACKAGED:
         return proposed(task.proposer, scenario, known), ""
-    case = Case(scenario, tuple(Threat(each, SeedRange.SEARCH.value.start) for each in known))
+    case = Case(scenario, tuple(LoadCase(each, SeedRange.SEARCH.value.start) for each in known))
     problem = DesignProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
     report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
     found = chosen_proposer().propose(problem, report=report)
@@ -165,7 +165,7 @@ def practice_case(scenario: Scenario, task: SearchTask) -> Case:
     noisy = task.engine.is_first_look
     realisations = max(_REALISATIONS // len(charges), 1) if noisy else 1
     first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
-    threats = [Threat(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
+    threats = [LoadCase(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
     return Case(scenario, tuple(threats), realisations)
 
 

@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 from typing import Final
 
-from blast_env.app.records import Kept
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.site import (
-    AnyCharge,
     RectangleSource,
     Scenario,
     SegmentSource,
@@ -19,20 +18,13 @@ from blast_env.site.sections import PointM
 _NEAREST: Final = ", as near as it comes"
 
 
-class NamedThreat(Kept):
-    """A charge with its label, at its place or on its vehicle."""
-
-    name: str
-    charge: AnyCharge
-
-
-def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
+def threats_of(scenario: Scenario) -> tuple[LoadCase, ...]:
     """Return the charges that layouts of a site are tested against.
 
     Of a line: the middle and the ends; of an area: the middle and the corners; of a vehicle: the
     nearest place that the layout leaves it, and the next ones by distance.
     """
-    named: list[NamedThreat] = []
+    named: list[LoadCase] = []
     for index, source in enumerate(scenario.charge):
         places: list[tuple[str, PointM]]
         if isinstance(source, SegmentSource):
@@ -54,7 +46,7 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
         else:
             places = [("", source.position_m)]
         named += [
-            NamedThreat(
+            LoadCase(
                 name=f"charge {index + 1}{words}",
                 charge=Charge(at_m, source.tnt_kg, source.height_m),
             )
@@ -63,10 +55,10 @@ def threats_of(scenario: Scenario) -> tuple[NamedThreat, ...]:
     return tuple(named)
 
 
-def _of_vehicle(name: str, source: VehicleSource) -> Iterator[NamedThreat]:
+def _of_vehicle(name: str, source: VehicleSource) -> Iterator[LoadCase]:
     for rank in range(source.places):
         words = _NEAREST if rank == 0 else f", place {rank + 1} by distance"
-        yield NamedThreat(name=f"{name}{words}", charge=VehicleCharge(source, rank))
+        yield LoadCase(name=f"{name}{words}", charge=VehicleCharge(source, rank))
 
 
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:
@@ -74,11 +66,11 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
 
     Of each source, the place that governs by its load in the open; of a vehicle, the nearest one.
     """
-    sources: dict[str, list[NamedThreat]] = {}
+    sources: dict[str, list[LoadCase]] = {}
     for threat in threats_of(scenario):
         sources.setdefault(threat.name.partition(",")[0], []).append(threat)
 
-    def severity(threat: NamedThreat) -> Severity:
+    def severity(threat: LoadCase) -> Severity:
         if isinstance(threat.charge, VehicleCharge):
             return Severity(load=-threat.charge.rank)
         return Severity.in_the_open(scenario, threat.charge)

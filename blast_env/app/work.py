@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import Field, TypeAdapter
 
 from blast_env.app.records import MOST_BYTES, EngineRecord, Kept, write_kept
-from blast_env.app.threats import NamedThreat
 from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import LoadCase
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
 
@@ -32,7 +32,7 @@ class SiteTask(Kept):
     """
 
     scenario: dict[str, Any]
-    threats: tuple[NamedThreat, ...]
+    threats: tuple[LoadCase, ...]
     cache: str
 
     @property

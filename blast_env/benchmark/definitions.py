@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 from blast_env.bundled import ITEM_SITES
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation import Case, LoadCase, SeedRange, draw_threats
 from blast_env.evaluation.cases import (
     fixed_charges,
     one_of_each_charge,
@@ -133,7 +133,7 @@ class Definition:
         return Case(scenario, one_of_each_charge(threats), practice=practice)
 
 
-def _charge(threat: Threat) -> object:
+def _charge(threat: LoadCase) -> object:
     charge = threat.charge
     if isinstance(charge, VehicleCharge):
         return charge.source.model_dump(mode="json", exclude={"threat"}), charge.rank

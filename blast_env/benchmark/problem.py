@@ -17,7 +17,7 @@ from blast_env.evaluation import (
     BlastStore,
     BudgetError,
     Case,
-    Threat,
+    LoadCase,
 )
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
@@ -135,7 +135,7 @@ class BenchmarkProblem(DesignProblem):
         if not 1 <= count <= most:
             raise BlastEnvError(f"threats is {count}, must be 1 to {most}")
         checked = tuple(sorted(check_layout(self.scenario, layout)))
-        pairs: list[tuple[Layout, Threat]] = [
+        pairs: list[tuple[Layout, LoadCase]] = [
             (checked, threat) for threat in self.case.threats[:count]
         ]
         try:

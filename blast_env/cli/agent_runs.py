@@ -43,7 +43,6 @@ from blast_env.evaluation import (
     Comparison,
     Evaluators,
     SeedRange,
-    Threat,
     compare,
 )
 from blast_env.evaluation.comparison import case_table, comparison_record
@@ -191,7 +190,8 @@ def _engine(
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:
     threats = tuple(
-        Threat(options.fixed(case.scenario, threat.charge), threat.seed) for threat in case.threats
+        replace(threat, charge=options.fixed(case.scenario, threat.charge))
+        for threat in case.threats
     )
     charge = None if case.charge is None else options.fixed(case.scenario, case.charge)
     return replace(case, threats=threats, charge=charge)

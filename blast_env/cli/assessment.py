@@ -16,7 +16,7 @@ from blast_env.cli.output import (
     progress_bar,
     save_figures,
 )
-from blast_env.evaluation import Case, Threat
+from blast_env.evaluation import Case, LoadCase
 from blast_env.evaluation.consequences import (
     BAY_CASE_COLUMNS,
     CASE_COLUMNS,
@@ -89,7 +89,7 @@ class Assessed:
         if self.coarser is None:
             return None
         number, bare = self.judged.worst_number, next(iter(self.found))
-        threat = Threat(self.judged.barriers[number].charge, 0)
+        threat = LoadCase(self.judged.barriers[number].charge)
         return GridError(
             case=Case(self.scenario, (threat,)),
             layout=self.layouts[self.name],

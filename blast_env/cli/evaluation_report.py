@@ -40,8 +40,8 @@ from blast_env.evaluation import (
     Case,
     Evaluators,
     LayoutEvaluation,
+    LoadCase,
     SeedRange,
-    Threat,
     draw_threats,
     evaluate_against,
 )
@@ -95,7 +95,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
             targets.append(Target("--export", self.export, FOLDER))
         return targets
 
-    def threats(self, scenario: Scenario, engine: Engine) -> tuple[Threat, ...]:
+    def threats(self, scenario: Scenario, engine: Engine) -> tuple[LoadCase, ...]:
         """Return the threats drawn by the seeds, with the user's place and mass of the charge.
 
         Fixed charges come in turn, each once before any repeats. Without noise a charge has one
@@ -103,7 +103,7 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         """
         drawn = in_turn(scenario, draw_threats(scenario, self.seed_range))
         threats = tuple(
-            Threat(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
+            LoadCase(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
         )
         return threats if engine.has_noise else one_of_each_charge(threats)
 

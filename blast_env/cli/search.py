@@ -59,8 +59,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
     LayoutEvaluation,
+    LoadCase,
     SeedRange,
-    Threat,
     draw_threats,
     evaluate_against,
 )
@@ -290,7 +290,7 @@ def _check(
     if is_hidden:
         threats = draw_threats(problem.scenario, seeds)
     else:
-        threats = tuple(Threat(problem.threats[0].charge, seed) for seed in seeds)
+        threats = tuple(LoadCase(problem.threats[0].charge, seed) for seed in seeds)
     if not problem.evaluator.engine.has_noise:  # each charge is one blast
         used = {each.charge for each in problem.threats}
         threats = tuple(each for each in one_of_each_charge(threats) if each.charge not in used)

@@ -17,8 +17,8 @@ from blast_env.evaluation import (
     BlastEvaluator,
     Case,
     DesignProblem,
+    LoadCase,
     SeedRange,
-    Threat,
     draw_threats,
 )
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
@@ -265,7 +265,7 @@ def problem_of(
         charge = Charge(only.position_m, only.tnt_kg, only.height_m)
     first = SeedRange.JUDGEMENT.value.start
     if charge is not None:
-        case = Case(found, (Threat(charge, first),), charge=charge)
+        case = Case(found, (LoadCase(charge, first),), charge=charge)
     else:
         threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
         case = Case(found, one_of_each_charge(threats))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.envs.episode import Episode
 from blast_env.envs.observations import VehicleView
-from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
 from blast_env.layout import Placement
@@ -218,7 +218,7 @@ def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | 
     return PressureScreening(cast("GasBlast", blast), _outcome(episode), remark, size_px)
 
 
-def _shown_threat(episode: Episode) -> Threat:
+def _shown_threat(episode: Episode) -> LoadCase:
     """Return the worst threat, with its first realisation."""
     case = episode.problem.case
     blasts = episode.problem.loads_with(episode.placement.layout)

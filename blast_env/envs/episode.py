@@ -27,7 +27,7 @@ from blast_env.envs.strategies import (
     check_size,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, SeedRange, Threat
+from blast_env.evaluation.cases import Case, LoadCase, SeedRange
 from blast_env.evaluation.comparison import Assessment
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import BlastAsked, Evaluators
@@ -342,7 +342,7 @@ class Task:
     ) -> Case:
         """Return the load case of a layout; `seeds` has the shape (charges, realisations)."""
         threats = tuple(
-            Threat(charge, int(seed))
+            LoadCase(charge, int(seed))
             for of_realisation in seeds.T
             for charge, seed in zip(charges, of_realisation, strict=True)
         )

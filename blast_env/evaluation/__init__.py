@@ -1,6 +1,6 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.evaluation.cases import Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation.cases import Case, LoadCase, SeedRange, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,
     Comparison,
@@ -40,10 +40,10 @@ __all__ = [
     "Evaluators",
     "GridError",
     "LayoutEvaluation",
+    "LoadCase",
     "ParticleLoad",
     "SeedRange",
     "StructureLoad",
-    "Threat",
     "ThreatOutcome",
     "compare",
     "conditional_value_at_risk",

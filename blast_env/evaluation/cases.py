@@ -1,11 +1,13 @@
 """Cases for comparing layouts: threats, known or hidden charges, and disjoint seed ranges."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, value_text
@@ -27,10 +29,10 @@ from blast_env.values import checked_seed, generator
 
 
 @dataclass(frozen=True)
-class Threat:
-    """One possible blast, independent of the layout.
+class LoadCase:
+    """One possible blast, independent of the layout: a threat.
 
-    Two layouts under the same threat have the same charge, fan and air, so that the difference
+    Two layouts under the same load case have the same charge, fan and air, so that the difference
     between their loads is due to the layouts alone (common random numbers).
 
     The charge in a vehicle is the same with either layout, but its place depends on the layout:
@@ -39,13 +41,21 @@ class Threat:
     Attributes:
         charge: The charge, or the vehicle that carries it.
         seed: Seed of the fan and the air.
+        name: Name for display, which does not count in comparisons, as the others below.
+        why: The reason for its choice.
+        source: Number of its charge source, -1 for none.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
     charge: AnyCharge
-    seed: int
+    seed: int = 0
+    name: str = field(default="", compare=False)
+    why: str = field(default="", compare=False, repr=False)
+    source: int = field(default=-1, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Convert the values to plain Python numbers, so that threats are hashable and writable.
+        """Convert the values to plain Python numbers, so that they can be hashed and written.
 
         Raises:
             BlastEnvError: If the seed is not an integer of at least 0, or the charge is not a
@@ -63,14 +73,14 @@ class Threat:
             ) from None
         object.__setattr__(self, "charge", charge)
 
-    def charge_against(self, scenario: AnyScenario, layout: Sequence[Element]) -> Charge:
+    def charge_against(self, scenario: AnyScenario, layout: Sequence[Element] = ()) -> Charge:
         """Return the charge at its place with a layout, which matters for vehicles only."""
         if not isinstance(self.charge, VehicleCharge):
             return self.charge
         return charge_against(find_scenario(scenario), layout, self.charge)
 
 
-def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, ...]:
+def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[LoadCase, ...]:
     """Return one threat per seed, its charge drawn from the scenario as in `simulate`.
 
     If several seeds draw the same vehicle, the first has its charge at the worst place, the next
@@ -93,7 +103,7 @@ def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[Threat, .
             raise BlastEnvError(f"seeds[{index}] is {seed}, appears twice, must be unique")
     found = find_scenario(scenario)
     charges = ranked(draw_threat(found, seed) for seed in plain)
-    return tuple(Threat(charge, seed) for charge, seed in zip(charges, plain, strict=True))
+    return tuple(LoadCase(charge, seed) for charge, seed in zip(charges, plain, strict=True))
 
 
 def fixed_charges(scenario: AnyScenario) -> tuple[Charge, ...]:
@@ -106,7 +116,7 @@ def fixed_charges(scenario: AnyScenario) -> tuple[Charge, ...]:
     return tuple(dict.fromkeys(charges))
 
 
-def in_turn(scenario: AnyScenario, threats: Sequence[Threat]) -> tuple[Threat, ...]:
+def in_turn(scenario: AnyScenario, threats: Sequence[LoadCase]) -> tuple[LoadCase, ...]:
     """Return threats with the fixed charges of a scenario in turn, each once before any repeats.
 
     Their order is drawn by the seed of the first threat. Weights of the sources do not count.
@@ -202,7 +212,7 @@ class Case:
     """
 
     scenario: ScenarioField = ScenarioField()
-    threats: tuple[Threat, ...]  # type: ignore[misc]  # a scenario has no default
+    threats: tuple[LoadCase, ...]  # type: ignore[misc]  # a scenario has no default
     realisations: int = 1
     risk: Risk | None = None
     charge: AnyCharge | None = None
@@ -276,7 +286,7 @@ def visible_case(
     scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk | None = None
 ) -> Case:
     """Return the case of a known charge, with one realisation of fan and air per seed."""
-    threats = tuple(Threat(charge, seed) for seed in seeds)
+    threats = tuple(LoadCase(charge, seed) for seed in seeds)
     return Case(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
 
 
@@ -330,16 +340,16 @@ def practice_hidden(
     found = find_scenario(scenario)
     drawn = _spread_first(found.sample_charges(rng, charges))
     seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
-    threats = [Threat(drawn[index % charges], each) for index, each in enumerate(seeds)]
+    threats = [LoadCase(drawn[index % charges], each) for index, each in enumerate(seeds)]
     return Case(found, tuple(threats), realisations, risk, seed=seed)
 
 
-def one_of_each_charge(threats: Iterable[Threat]) -> tuple[Threat, ...]:
+def one_of_each_charge(threats: Iterable[LoadCase]) -> tuple[LoadCase, ...]:
     """Return the first threat of each charge, for engines without noise.
 
     Ranks of a vehicle beyond the number of its places repeat the same places.
     """
-    first: dict[AnyCharge, Threat] = {}
+    first: dict[AnyCharge, LoadCase] = {}
     for threat in threats:
         charge = threat.charge
         if isinstance(charge, VehicleCharge):
@@ -348,7 +358,7 @@ def one_of_each_charge(threats: Iterable[Threat]) -> tuple[Threat, ...]:
     return tuple(first.values())
 
 
-def check_distinct(threats: Sequence[Threat]) -> None:
+def check_distinct(threats: Sequence[LoadCase]) -> None:
     """Refuse a repeated threat, which would count as evidence twice (`BlastEnvError`)."""
     for index, threat in enumerate(threats):
         if threat in threats[:index]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines import BlastLoads, Engine, find_engine
 from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
 from blast_env.geometry import Element, Layout
@@ -97,7 +97,7 @@ class BlastEvaluator:
         engine = self.engine.coarser
         return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self._store)
 
-    def loads(self, layout: Sequence[Element], threat: Threat) -> BlastLoads:
+    def loads(self, layout: Sequence[Element], threat: LoadCase) -> BlastLoads:
         """Return the loads of one blast.
 
         Args:
@@ -112,7 +112,7 @@ class BlastEvaluator:
 
     def loads_of_many(
         self,
-        pairs: Iterable[tuple[Sequence[Element], Threat]],
+        pairs: Iterable[tuple[Sequence[Element], LoadCase]],
         processes: int = 1,
         progress: Callable[[float], None] | None = None,
     ) -> list[BlastLoads]:
@@ -153,7 +153,7 @@ class BlastEvaluator:
             for loads, layout in zip(loads_of, layouts, strict=True)
         ]
 
-    def keep(self, layout: Sequence[Element], threat: Threat, loads: BlastLoads) -> None:
+    def keep(self, layout: Sequence[Element], threat: LoadCase, loads: BlastLoads) -> None:
         """Cache and count the loads of a blast that ran elsewhere, with the same engine.
 
         Raises:
@@ -161,7 +161,7 @@ class BlastEvaluator:
         """
         self._keep(self.key(layout, threat), loads)
 
-    def key(self, layout: Sequence[Element], threat: Threat) -> BlastKey:
+    def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
         cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))
         # Without noise the seed has no effect: a charge has one realisation.
@@ -210,7 +210,7 @@ class BlastAsked(NamedTuple):
 
     scenario: Scenario
     layout: Layout
-    threat: Threat
+    threat: LoadCase
 
 
 _MOST_EVALUATORS: Final = 4

@@ -20,7 +20,7 @@ from math import isnan, nan
 from typing import Final, TypeAlias
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, Threat
+from blast_env.evaluation.cases import Case, LoadCase
 from blast_env.evaluation.engines.contract import BlastLoads, Engine, find_engine
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Layout
@@ -107,7 +107,7 @@ class GridError:
 
     case: Case
     layout: Layout
-    threat: Threat
+    threat: LoadCase
     coarser: Engine
     fine: tuple[BlastLoads, BlastLoads]
     coarse: tuple[BlastLoads, BlastLoads]
@@ -161,7 +161,7 @@ def grid_error(
     coarser: BlastEvaluator | None,
     case: Case,
     layout: Layout,
-    threat: Threat,
+    threat: LoadCase,
     fine: tuple[BlastLoads, BlastLoads],
     processes: int = 1,
 ) -> GridError | None:

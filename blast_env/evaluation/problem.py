@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, Threat, check_distinct
+from blast_env.evaluation.cases import Case, LoadCase, check_distinct
 from blast_env.evaluation.comparison import Assessment, check_something_arrives
 from blast_env.evaluation.engines import BlastLoads
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError
@@ -40,7 +40,7 @@ class DesignProblem:
     case: Case
     processes: int = 1
     budget: int | None = None
-    _asked: set[tuple[Layout, Threat]] = field(default_factory=set, init=False, repr=False)
+    _asked: set[tuple[Layout, LoadCase]] = field(default_factory=set, init=False, repr=False)
     _assessed: dict[Layout, Assessment] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -55,7 +55,7 @@ class DesignProblem:
         return self.case.scenario
 
     @property
-    def threats(self) -> tuple[Threat, ...]:
+    def threats(self) -> tuple[LoadCase, ...]:
         """The threats of the case."""
         return self.case.threats
 
@@ -83,7 +83,7 @@ class DesignProblem:
         """Blasts spent, whether cached or not; those of `unprotected` are free."""
         return len(self._asked)
 
-    def spend(self, pairs: Iterable[tuple[Layout, Threat]]) -> None:
+    def spend(self, pairs: Iterable[tuple[Layout, LoadCase]]) -> None:
         """Count blasts that have not been spent before.
 
         Raises:
@@ -97,7 +97,7 @@ class DesignProblem:
             )
         self._asked = asked
 
-    def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+    def loads(self, pairs: Sequence[tuple[Layout, LoadCase]]) -> list[float]:
         """Return the load of each blast, in the unit of the scenario's objective.
 
         Raises:
@@ -107,7 +107,7 @@ class DesignProblem:
         self.spend(pairs)
         return self._free(pairs)
 
-    def _free(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+    def _free(self, pairs: Sequence[tuple[Layout, LoadCase]]) -> list[float]:
         loads = self.evaluator.loads_of_many(pairs, self.processes)
         return [each.load(self.scenario.objective) for each in loads]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.cases import Case, Threat, draw_threats, in_turn
+from blast_env.evaluation.cases import Case, LoadCase, draw_threats, in_turn
 from blast_env.evaluation.comparison import (
     CHARGE_COLUMNS,
     Comparison,
@@ -207,7 +207,7 @@ class ThreatOutcome:
         in_range: Whether the threat is in the range of the calibration.
     """
 
-    threat: Threat
+    threat: LoadCase
     charge: Charge
     stand_off_m: float
     unprotected_stand_off_m: float
@@ -266,7 +266,7 @@ class LayoutEvaluation:
         return self.case.scenario
 
     @property
-    def threats(self) -> tuple[Threat, ...]:
+    def threats(self) -> tuple[LoadCase, ...]:
         """The threats of the case."""
         return self.case.threats
 
@@ -289,7 +289,7 @@ class LayoutEvaluation:
         """The loads under each threat."""
         return tuple(map(self._outcome, self.threats, self.loads, self.unprotected))
 
-    def _outcome(self, threat: Threat, load: BlastLoads, bare: BlastLoads) -> ThreatOutcome:
+    def _outcome(self, threat: LoadCase, load: BlastLoads, bare: BlastLoads) -> ThreatOutcome:
         scenario = self.scenario
         charge, unprotected = (
             threat.charge_against(scenario, layout) for layout in (self.layout, ())
@@ -489,7 +489,7 @@ def evaluate_layout(
     processes: int = 1,
     engine: str | Engine = JUDGE,
     *,
-    threats: Iterable[Threat] | None = None,
+    threats: Iterable[LoadCase] | None = None,
     cvar_level: float = CVAR_LEVEL,
     cache: str | Path | BlastStore | None = None,
     progress: Callable[[float], None] | None = None,
@@ -547,7 +547,7 @@ def evaluate_layout(
 def evaluate_against(
     evaluator: BlastEvaluator,
     layout: Sequence[Element],
-    threats: Sequence[Threat],
+    threats: Sequence[LoadCase],
     processes: int = 1,
     *,
     coarser: BlastEvaluator | None = None,

@@ -48,7 +48,7 @@ def checks_of(study: Study) -> tuple[HandCheck, ...]:
 
 def _stand_off(study: Study) -> HandCheck:
     threat = study.threats[0]
-    charge = threat.against(study.scenario)
+    charge = threat.charge_against(study.scenario)
     target = min(
         (each for each in study.targets if each.protected),
         key=lambda each: each.bounds_m.distance_to(charge.position_m),

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
@@ -39,7 +40,6 @@ from blast_env.plots.site_plan import (
 from blast_env.plots.style import count_of, render_extra, unit_interval
 from blast_env.report.loads import MeasuredBlast, ReportedBuilding, UnitSystem
 from blast_env.report.outcomes import FrontPoint, ItemWorth, Outcome
-from blast_env.report.threats import NamedCharge
 from blast_env.runner import Tell, share_of
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -80,7 +80,7 @@ def _page(height_in: float) -> tuple[Figure, Axes]:
 # The site.
 
 
-def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout) -> bytes:
+def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -> bytes:
     """Return the plan of a site with buildings, heights, threats and the layout.
 
     Vehicles and their charges stand at the places that the layout leaves them.
@@ -88,7 +88,7 @@ def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout
     figure, axes = _page(_height_in(scenario) + 0.9)
     charges = [
         charge_feature(
-            threat.against(scenario, layout),
+            threat.charge_against(scenario, layout),
             threat.name,
             f"{threat.name}: {threat.charge.tnt_kg:g} kg",
         )
@@ -98,7 +98,7 @@ def site_plan(scenario: Scenario, threats: Sequence[NamedCharge], layout: Layout
     features = (*_unlabelled(site_features(scenario, layout)), *vehicles, *charges)
     draw_plan(axes, features)
     for threat in threats:
-        _draw_stand_off(axes, scenario, threat.against(scenario, layout).position_m)
+        _draw_stand_off(axes, scenario, threat.charge_against(scenario, layout).position_m)
     draw_scale(axes, scenario)
     draw_north(axes, scenario, PLAN)
     write_legend(figure, legend_of(features))

@@ -9,11 +9,11 @@ from math import inf, isfinite
 from typing import Self
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.grid_error import convergence_index
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Rectangle
 from blast_env.report.loads import ReportedBuilding, TargetLoad, UnitSystem
-from blast_env.report.threats import NamedCharge
 from blast_env.statistics import reductions
 from blast_env.values import plain_number
 
@@ -94,7 +94,7 @@ class LoadPair:
     """
 
     target: ReportedBuilding
-    threat: NamedCharge
+    threat: LoadCase
     cells: Cells
     bare: TargetLoad
     walled: TargetLoad

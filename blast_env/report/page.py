@@ -38,7 +38,7 @@ from blast_env.report.loads import TargetLoad, UnitSystem
 from blast_env.report.outcomes import LoadErrors, LoadPair
 from blast_env.report.peaks import PeakSource
 from blast_env.report.study import Study
-from blast_env.report.threats import other_places
+from blast_env.report.threats import other_places, place_text
 from blast_env.report.verdict import ReportVerdict, counted, verdict_of
 from blast_env.response.buildings import BuildingDamage
 from blast_env.tables import table_records
@@ -152,7 +152,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     protected = [each for each in study.targets if each.protected]
     layout_json = _layout_file(study)
     places = [
-        each.against(scenario, study.layout) for each in other_places(scenario, options.places)
+        each.charge_against(scenario, study.layout)
+        for each in other_places(scenario, options.places)
     ]
     verdict, summary = verdict_of(study), _summary(study)
     return {
@@ -166,7 +167,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "others": [each for each in study.targets if not each.protected],
         "plan": site_plan(scenario, study.threats, study.layout),
         "place_texts": {
-            each.name: each.place_text(scenario, study.layout) for each in study.threats
+            each.name: place_text(each, scenario, study.layout) for each in study.threats
         },
         "stand_off": stand_off_text(scenario, study.layout),
         "summary": summary,

@@ -12,7 +12,7 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.documents import parse_csv, read_text
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
 from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.governing import Severity
@@ -47,7 +47,6 @@ from blast_env.report.outcomes import (
     check_limits,
 )
 from blast_env.report.threats import (
-    NamedCharge,
     asked_threats,
     chief_threats,
     other_masses,
@@ -187,7 +186,7 @@ class Study:
     layout: Layout
     options: StudyOptions
     targets: tuple[ReportedBuilding, ...]
-    threats: tuple[NamedCharge, ...]
+    threats: tuple[LoadCase, ...]
     bill: pd.DataFrame
     cost: float
     pairs: tuple[LoadPair, ...]
@@ -211,7 +210,7 @@ class Study:
         asked = (self.options.target, self.scenario.objective.level, LevelOfProtection.LOW)
         return next(each for each in asked if each is not None)
 
-    def pair(self, target: ReportedBuilding, threat: NamedCharge, cells: Cells) -> LoadPair:
+    def pair(self, target: ReportedBuilding, threat: LoadCase, cells: Cells) -> LoadPair:
         """Return the loads on a building under a threat with one size of cells."""
         return next(
             each
@@ -351,7 +350,7 @@ class PlannedPart(NamedTuple):
 
 
 def blasts_of(
-    scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[NamedCharge]
+    scenario: Scenario, layout: Layout, options: StudyOptions, threats: Sequence[LoadCase]
 ) -> tuple[PlannedPart, ...]:
     """Return the parts of a report in their order, with the blasts of each."""
     coarse = options.cells[0]
@@ -391,12 +390,12 @@ def _fewer(layout: Layout) -> list[Layout]:
     return [tuple(each for each in layout if each != piece) for piece in standing(layout)]
 
 
-def _label(threat: NamedCharge, words: str, cells: Cells) -> str:
+def _label(threat: LoadCase, words: str, cells: Cells) -> str:
     """Return the label of a blast of the threats, for progress and for its digest."""
     return f"{threat.name} {words}, {GasEngine.with_cells(cells).cell_words}"
 
 
-def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[NamedCharge, ...]:
+def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[LoadCase, ...]:
     """Return the threats of a report before any blast, for its cost.
 
     Those given, or stand-ins: one of the places of each source.
@@ -416,7 +415,7 @@ class Runs:
         layout: Layout,
         options: StudyOptions,
         targets: tuple[ReportedBuilding, ...],
-        threats: tuple[NamedCharge, ...],
+        threats: tuple[LoadCase, ...],
         progress: Told,
     ) -> None:
         self.scenario, self.layout, self.options = scenario, layout, options
@@ -442,7 +441,7 @@ class Runs:
                 both = [self._measured(threat, size, layout) for layout in ((), self.layout)]
                 self.pairs += self._pairs(threat, size, both[0], both[1])
                 for is_walled, measured in enumerate(both):
-                    charge = threat.against(self.scenario, self.layout if is_walled else ())
+                    charge = threat.charge_against(self.scenario, self.layout if is_walled else ())
                     found = consequences_of(self.scenario, measured.result, charge)
                     self._found.setdefault((size, bool(is_walled)), []).append(found)
                 # Drawn now, because only these two results are in memory at once.
@@ -475,7 +474,7 @@ class Runs:
         bare, walled = (self._found[cells, is_walled][-1] for is_walled in (False, True))
         return damage_pictures(self.scenario, self.layout, bare, walled, threat)
 
-    def _measured(self, threat: NamedCharge, cells: Cells, layout: Layout) -> MeasuredBlast:
+    def _measured(self, threat: LoadCase, cells: Cells, layout: Layout) -> MeasuredBlast:
         label = _label(threat, _WALLED if layout else _BARE, cells)
         engine = GasEngine.with_cells(cells)
         blast = GasBlast(self.scenario, layout, 0, engine, threat.charge)
@@ -483,11 +482,11 @@ class Runs:
         self.notes += [f"{label}: {note}" for note in measured.notes]
         self.digests.append((label, measured.result.digest))
         loads = measured.result.loads()
-        self._evaluators[cells].keep(layout, Threat(threat.charge, 0), loads)
+        self._evaluators[cells].keep(layout, threat, loads)
         return measured
 
     def _pairs(
-        self, threat: NamedCharge, cells: Cells, bare: MeasuredBlast, walled: MeasuredBlast
+        self, threat: LoadCase, cells: Cells, bare: MeasuredBlast, walled: MeasuredBlast
     ) -> Iterator[LoadPair]:
         for target in self.targets:
             if target.name in bare.loads and target.name in walled.loads:
@@ -528,7 +527,7 @@ class Runs:
         for threat in self.threats:
             charges, notes = other_masses(self.scenario, threat.charge, _MASSES)
             left_out += list(notes)
-            own = NamedCharge(f"{threat.charge.tnt_kg:g} kg", threat.charge, "as in the threat")
+            own = replace(threat, name=f"{threat.charge.tnt_kg:g} kg", why="as in the threat")
             ordered = sorted((own, *charges), key=lambda each: each.charge.tnt_kg)
             found[threat.name] = self._outcomes(f"{threat.name}, {_MASSES_PART}", ordered)
         return found, tuple(left_out)
@@ -550,7 +549,7 @@ class Runs:
         most = self.options.most_threats
         self.threats = chief_threats(places, lambda each: found[each.charge], most)
 
-    def _outcomes(self, label: str, charges: Sequence[NamedCharge]) -> tuple[Outcome, ...]:
+    def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[Outcome, ...]:
         layouts: tuple[Layout, ...] = ((), self.layout)
         impulses = self._loads(label, layouts, [each.charge for each in charges])
         return tuple(
@@ -601,7 +600,7 @@ class Runs:
         self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
     ) -> list[BlastLoads]:
         """Return the loads of every layout under every charge, from the cache if possible."""
-        pairs = [(layout, Threat(charge, 0)) for layout in layouts for charge in charges]
+        pairs = [(layout, LoadCase(charge)) for layout in layouts for charge in charges]
         told = partial(self.progress, label)
         return self._evaluator.loads_of_many(pairs, self.options.processes, told)
 

@@ -1,15 +1,15 @@
 """The charges of a report: the worst places, other places, other masses."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.geometry import Layout, Rectangle
-from blast_env.layout.build_scene import charge_against
 from blast_env.site import (
     AnyCharge,
     PointSource,
@@ -26,35 +26,15 @@ _STEPS: Final = 400
 """Number of parts of a segment in the search for its place nearest to a building."""
 
 
-@dataclass(frozen=True)
-class NamedCharge:
-    """A charge with its name in a report.
-
-    Attributes:
-        name: `T1`, or its place or mass.
-        charge: The charge, at its place or on its vehicle.
-        why: The reason for its choice.
-        source: Number of its charge source, -1 for none.
-    """
-
-    name: str
-    charge: AnyCharge
-    why: str
-    source: int = -1
-
-    def against(self, scenario: Scenario, layout: Layout = ()) -> Charge:
-        """Return the charge at its place, which for a vehicle depends on the layout."""
-        return charge_against(scenario, layout, self.charge)
-
-    def place_text(self, scenario: Scenario, layout: Layout) -> str:
-        """Return its place in words, with a layout, and without if that differs."""
-        bare, walled = (_place_text(self.against(scenario, each)) for each in ((), layout))
-        return walled if bare == walled else f"{bare} without the layout, {walled} with it"
+def place_text(threat: LoadCase, scenario: Scenario, layout: Layout) -> str:
+    """Return the place of a charge in words, with a layout, and without if that differs."""
+    bare, walled = (_place_text(threat.charge_against(scenario, each)) for each in ((), layout))
+    return walled if bare == walled else f"{bare} without the layout, {walled} with it"
 
 
 def chief_threats(
-    places: Sequence[NamedCharge], severity: Callable[[NamedCharge], Severity], most: int
-) -> tuple[NamedCharge, ...]:
+    places: Sequence[LoadCase], severity: Callable[[LoadCase], Severity], most: int
+) -> tuple[LoadCase, ...]:
     """Return the most severe charges: of each source, the place that governs.
 
     Args:
@@ -62,18 +42,18 @@ def chief_threats(
         severity: Severity of a charge.
         most: Greatest number of charges; the worst are taken.
     """
-    sources: dict[int, list[NamedCharge]] = {}
+    sources: dict[int, list[LoadCase]] = {}
     for each in places:
         sources.setdefault(each.source, []).append(each)
     worst = [governing(own, severity) for own in sources.values()]
     ranked = sorted(worst, key=severity, reverse=True)[:most]
     return tuple(
-        NamedCharge(f"T{number}", each.charge, _why(each, len(sources[each.source])))
+        replace(each, name=f"T{number}", why=_why(each, len(sources[each.source])))
         for number, each in enumerate(ranked, start=1)
     )
 
 
-def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[NamedCharge, ...]:
+def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[LoadCase, ...]:
     """Return the charges given by the user.
 
     Raises:
@@ -81,12 +61,12 @@ def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[N
     """
     scenario.with_possible_charges(charges)
     return tuple(
-        NamedCharge(f"T{number}", charge, "given by the user")
+        LoadCase(charge, name=f"T{number}", why="given by the user")
         for number, charge in enumerate(charges, start=1)
     )
 
 
-def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
+def other_places(scenario: Scenario, count: int) -> tuple[LoadCase, ...]:
     """Return charges at even steps along segments, over areas, and at points; each only once.
 
     The place of each source nearest to a protected structure is added. Those of a vehicle are at
@@ -96,25 +76,25 @@ def other_places(scenario: Scenario, count: int) -> tuple[NamedCharge, ...]:
         scenario: The scenario.
         count: Number of places of each segment and vehicle, and along each side of an area.
     """
-    found: dict[AnyCharge, NamedCharge] = {}
+    found: dict[AnyCharge, LoadCase] = {}
     for index, source in enumerate(scenario.charge):
         why = f"charge source {index + 1}"
         if isinstance(source, VehicleSource):
             for rank in range(min(count, source.places)):
                 vehicle = VehicleCharge(source, rank)
                 name = f"vehicle, place {rank + 1} by distance"
-                found.setdefault(vehicle, NamedCharge(name, vehicle, why, index))
+                found.setdefault(vehicle, LoadCase(vehicle, 0, name, why, index))
             continue
         nearest = min(_candidates(scenario, source), key=lambda each: _distance_m(scenario, each))
         for place in (*_spread(source, count), nearest):
             charge = Charge(place, source.tnt_kg, source.height_m)
-            found.setdefault(charge, NamedCharge(_place_text(charge), charge, why, index))
+            found.setdefault(charge, LoadCase(charge, 0, _place_text(charge), why, index))
     return tuple(found.values())
 
 
 def other_masses(
     scenario: Scenario, charge: AnyCharge, factors: tuple[float, ...]
-) -> tuple[tuple[NamedCharge, ...], tuple[str, ...]]:
+) -> tuple[tuple[LoadCase, ...], tuple[str, ...]]:
     """Return the same charge with other masses, and notes on those that are not possible."""
     possible, notes = [], []
     for factor in factors:
@@ -125,11 +105,11 @@ def other_masses(
         except (ScenarioError, BlastEnvError) as error:
             notes.append(f"{name} is omitted: {error}")
         else:
-            possible.append(NamedCharge(name, other, f"{factor:g} times the mass"))
+            possible.append(LoadCase(other, name=name, why=f"{factor:g} times the mass"))
     return tuple(possible), tuple(notes)
 
 
-def _why(place: NamedCharge, count: int) -> str:
+def _why(place: LoadCase, count: int) -> str:
     if count == 1:
         return place.why
     words = "the worst with the layout"

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation import BlastEvaluator, SeedRange, Threat
+from blast_env.evaluation import BlastEvaluator, LoadCase, SeedRange
 from blast_env.geometry import Layout
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -116,7 +116,7 @@ def _impulses(
 ) -> FloatArray:
     """Return the impulses without a barrier and with each layout, Pa s (1 + layouts, charges)."""
     pairs = [
-        (layout, Threat(charge, seed))
+        (layout, LoadCase(charge, seed))
         for layout in ((), *layouts)
         for charge in charges
         for seed in seeds

@@ -10,6 +10,7 @@ from time import monotonic, sleep
 from types import SimpleNamespace
 
 import pytest
+from pydantic import TypeAdapter
 
 from blast_env import report
 from blast_env.app import blasts, offers
@@ -28,11 +29,11 @@ from blast_env.app.records import (
     read_kept,
 )
 from blast_env.app.session import Session, Sessions
-from blast_env.app.threats import NamedThreat, threats_of
+from blast_env.app.threats import threats_of
 from blast_env.app.verdicts import verdict_rows
 from blast_env.app.work import ReportChoice, Status, read_status, write_status
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Threat, evaluate_layout
+from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines import find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
@@ -87,7 +88,7 @@ def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Ses
     record = particles.folder.record_of(own.key)
     assert record is not None
     evaluator = BlastEvaluator(particles.scenario, "event")
-    loads = [evaluator.loads(CELLS, Threat(threat.charge, seed)) for seed in range(8)]
+    loads = [evaluator.loads(CELLS, LoadCase(threat.charge, seed)) for seed in range(8)]
     mean = sum(each.protected_impulse_pa_s for each in loads) / 8
     assert record.loads[0].impulse_pa_s == pytest.approx(mean)
     assert record.loads[0].low_pa_s < mean < record.loads[0].high_pa_s
@@ -365,7 +366,7 @@ def test_a_blast_is_a_final_statement_with_the_error_of_its_cells(tmp_path: Path
     assert state_of(session).state == "done", state_of(session).text
     assert session.cost([0]) == session.cost_of_error([0]) == ()
     (threat,) = session.chosen_threats()
-    expected = evaluate_layout(hut(), WALL, threats=[Threat(threat.charge, 0)])
+    expected = evaluate_layout(hut(), WALL, threats=[LoadCase(threat.charge, 0)])
     found = expected.to_dict()["result"]["grid_error"]
     rows = session.comparison()
     assert all(row.impulse.count("\N{PLUS-MINUS SIGN}") == 1 for row in rows)
@@ -450,7 +451,7 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
     assert bare.repeat["charge"][0] == [9.0, 4.0]
     assert posts.repeat["charge"][0][0] <= 3.0
     assert posts.loads[0].impulse_pa_s < 0.6 * bare.loads[0].impulse_pa_s
-    again = NamedThreat.model_validate_json(nearest.model_dump_json())
+    again = TypeAdapter(LoadCase).validate_json(TypeAdapter(LoadCase).dump_json(nearest))
     assert again.charge == nearest.charge != second.charge
 
 

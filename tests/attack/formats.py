@@ -23,9 +23,9 @@ from blast_agents.training.run_folder import (
 
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
-from blast_env.app.threats import NamedThreat
 from blast_env.app.work import ReportTask, read_task, write_task
 from blast_env.cluster import address_of
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad
 from blast_env.evaluation.store import BlastKey, BlastStore
@@ -280,7 +280,7 @@ def _design(folder: Path) -> Format:
 
 
 def _task(folder: Path) -> Format:
-    threat = NamedThreat(name="here", charge=Charge((1.0, 2.0), 100.0))
+    threat = LoadCase(name="here", charge=Charge((1.0, 2.0), 100.0))
     document = small_scenario().model_dump(mode="json", exclude_none=True)
     task = ReportTask(scenario=document, layout=((0, 0),), threats=(threat,), cache="c", path="p")
     write_task(task, folder, "report")

@@ -9,7 +9,7 @@ import numpy as np
 from blast_env import load_scenario
 from blast_env.design.search import DesignProblem, Layout
 from blast_env.errors import LayoutError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, Threat
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
 from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Element
 from blast_env.layout import Placement
@@ -62,14 +62,14 @@ class WatchedEvaluator(BlastEvaluator):
     """Tells somebody which blasts are asked for, before they are run."""
 
     def __init__(
-        self, scenario: Scenario, watch: Callable[[list[tuple[Layout, Threat]]], None]
+        self, scenario: Scenario, watch: Callable[[list[tuple[Layout, LoadCase]]], None]
     ) -> None:
         super().__init__(scenario, "event")
         self._watch = watch
 
     def loads_of_many(
         self,
-        pairs: Iterable[tuple[Sequence[Element], Threat]],
+        pairs: Iterable[tuple[Sequence[Element], LoadCase]],
         processes: int = 1,
         progress: Callable[[float], None] | None = None,
     ) -> list[BlastLoads]:

@@ -21,7 +21,7 @@ from blast_env.design.search import (
 from blast_env.design.search.methods import PopulationAnnealingSearch
 from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.cases import practice_hidden
 from blast_env.layout import Placement
 from blast_env.site import AnyCharge, Scenario
@@ -100,7 +100,7 @@ def test_the_number_of_processes_changes_nothing(problem: DesignProblem) -> None
 @pytest.mark.parametrize("budget", [1, 2, 7, 33])
 def test_blasts_are_counted_and_never_exceed_the_budget(name: str, budget: int) -> None:
     """Distinct pairs that were asked for; nearly all of the budget is spent."""
-    asked: list[tuple[Layout, Threat]] = []
+    asked: list[tuple[Layout, LoadCase]] = []
     watched = WatchedEvaluator(small_scenario(), asked.extend)
     result = find_proposer(name).propose(small_problem(watched), budget, 0)
     assert result.blasts == len(asked) == len(set(asked)) <= budget
@@ -146,7 +146,7 @@ def _interrupted_after(blasts: int) -> DesignProblem:
     """Return the small problem; Ctrl-C comes when more blasts are asked for."""
     left = [blasts]
 
-    def watch(pairs: list[tuple[Layout, Threat]]) -> None:
+    def watch(pairs: list[tuple[Layout, LoadCase]]) -> None:
         left[0] -= len(pairs)
         if left[0] < 0:
             raise KeyboardInterrupt
@@ -178,7 +178,7 @@ def test_it_ends_when_there_is_nothing_new_left(name: str) -> None:
 @pytest.mark.parametrize("name", ["random", *FROM_RULES, "nsga2"])
 def test_it_can_begin_with_given_layouts(name: str, optimum: Layout) -> None:
     """They are among the first that are assessed, and a good one is not simply lost."""
-    asked: list[list[tuple[Layout, Threat]]] = []
+    asked: list[list[tuple[Layout, LoadCase]]] = []
     watched = small_problem(WatchedEvaluator(small_scenario(), asked.append))
     method = find_proposer(name, (optimum,))
     result = method.propose(watched, 40, 0)

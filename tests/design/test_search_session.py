@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.evaluation import BlastEvaluator, Case, DesignProblem, Threat
+from blast_env.evaluation import BlastEvaluator, Case, DesignProblem, LoadCase
 from blast_env.evaluation.cases import practice_hidden, practice_visible
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
@@ -188,9 +188,9 @@ def test_reductions_refer_to_the_threats_that_were_met(problem: DesignProblem) -
 
 @pytest.mark.parametrize(
     ("threats", "words"),
-    [((), "there are none"), ((Threat(WEST, 1), Threat(WEST, 1)), "appears twice")],
+    [((), "there are none"), ((LoadCase(WEST, 1), LoadCase(WEST, 1)), "appears twice")],
 )
-def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words: str) -> None:
+def test_threats_that_are_no_use_are_refused(threats: tuple[LoadCase, ...], words: str) -> None:
     with pytest.raises(BlastEnvError, match=words):
         DesignProblem(
             BlastEvaluator(small_scenario(), "event"),
@@ -201,7 +201,7 @@ def test_threats_that_are_no_use_are_refused(threats: tuple[Threat, ...], words:
 def test_a_site_without_a_build_zone_is_refused() -> None:
     scenario = small_scenario().model_copy(update={"build_zone": None})
     with pytest.raises(BlastEnvError, match="no build zone"):
-        DesignProblem(BlastEvaluator(scenario, "event"), Case(scenario, (Threat(WEST, 1),)))
+        DesignProblem(BlastEvaluator(scenario, "event"), Case(scenario, (LoadCase(WEST, 1),)))
 
 
 def test_a_layout_that_does_not_fit_is_refused(problem: DesignProblem) -> None:

@@ -57,7 +57,7 @@ from blast_env.design.surrogate.walls import (
 from blast_env.design.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats
+from blast_env.evaluation import BlastEvaluator, Case, LoadCase, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import Placement
@@ -561,7 +561,7 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
     surrogate, drawing = by_hand(), Drawing()
     proposed = LearntSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
     drawn = [tuple(sorted(each)) for each in drawing.sample(YARD, charge, 3)]
-    met = case() if charge is None else Case(YARD, (Threat(charge, 0),))
+    met = case() if charge is None else Case(YARD, (LoadCase(charge, 0),))
     likes = Guesses.of(surrogate, met).loads([(), *drawn])
     if charge is not None:
         assert proposed == [(), *drawn][int(likes.argmin())]
@@ -596,12 +596,12 @@ class WrongBy(DesignProblem):
 
     met: dict[Layout, int] = field(default_factory=dict)
 
-    def loads(self, pairs: Sequence[tuple[Layout, Threat]]) -> list[float]:
+    def loads(self, pairs: Sequence[tuple[Layout, LoadCase]]) -> list[float]:
         for layout, _ in pairs:
             self.met[layout] = self.met.get(layout, 0) + 1
         return [self.true_load(layout, (threat,)) for layout, threat in pairs]
 
-    def true_load(self, layout: Layout, threats: tuple[Threat, ...]) -> float:
+    def true_load(self, layout: Layout, threats: tuple[LoadCase, ...]) -> float:
         factor = 0.7 + 0.6 * random.Random(repr(layout)).random()
         return factor * Guesses.of(by_hand(), Case(YARD, threats)).loads([layout]).item()
 

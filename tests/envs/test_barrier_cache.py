@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BlastStore, Threat
+from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 from tests.envs.test_scenario_source import Sites
 
@@ -47,7 +47,7 @@ def test_an_evaluator_finds_the_blasts_of_an_environment(tmp_path: Path) -> None
     env = make(cache=str(tmp_path))
     info = play(env, seed=5)[-1][4]
     evaluator = BlastEvaluator(small_scenario(), ThinEngine(), cache=BlastStore(tmp_path))
-    threat = Threat(info["charges"][0], info["blast_seeds"][0][0])
+    threat = LoadCase(info["charges"][0], info["blast_seeds"][0][0])
     loads = evaluator.loads(info["layout"], threat)
     assert evaluator.blasts == 0
     assert loads.protected_impulse_pa_s == info["impulse_pa_s"]

@@ -9,7 +9,7 @@ import blast_env
 from blast_env.envs.observations import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Threat
+from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.layout import Placement
 from blast_env.site import Scenario
@@ -47,7 +47,7 @@ def test_the_final_information_is_that_of_the_same_blasts_run_by_hand() -> None:
     (charge,), (seeds,) = info["charges"], info["blast_seeds"]
     evaluator = BlastEvaluator(scenario, ThinEngine())
     by_hand = [
-        [evaluator.loads(layout, Threat(charge, seed)) for seed in seeds]
+        [evaluator.loads(layout, LoadCase(charge, seed)) for seed in seeds]
         for layout in (info["layout"], ())
     ]
     impulse, unprotected = (
@@ -182,7 +182,7 @@ def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
         info["charges"],
         info["blast_seeds"],
     )
-    before = evaluator.loads([(0, 4)], Threat(charge, seed)).protected_impulse_pa_s
+    before = evaluator.loads([(0, 4)], LoadCase(charge, seed)).protected_impulse_pa_s
     assert PA_PER_PSI * earned == pytest.approx(before - info["impulse_pa_s"], abs=1e-8)
     assert last == 0.0
 
@@ -274,7 +274,7 @@ def test_hidden_threats_count_as_their_mean_or_their_worst() -> None:
         assert len(set(info["charges"])) > 1
     evaluator = BlastEvaluator(small_scenario(), ThinEngine())
     each = [
-        evaluator.loads(info["layout"], Threat(charge, seed)).protected_impulse_pa_s
+        evaluator.loads(info["layout"], LoadCase(charge, seed)).protected_impulse_pa_s
         for charge, (seed,) in zip(info["charges"], info["blast_seeds"], strict=True)
     ]
     assert impulses["mean"] == pytest.approx(np.mean(each))

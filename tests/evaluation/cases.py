@@ -1,7 +1,7 @@
 """Scenario, layouts and threats that the tests of evaluations share."""
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import Threat, draw_threats
+from blast_env.evaluation import LoadCase, draw_threats
 
 COURTYARD = load_scenario("courtyard")
 SEEDS = (0, 1, 2, 3)
@@ -15,4 +15,4 @@ FEW = ((4, 0), (5, 0), (6, 1))
 SHADOW = tuple((row, 0) for row in range(22, 32))
 """All of the building as seen from `BEHIND_SHADOW`: y = 16.4 m to 20 m at x = 13 m."""
 
-BEHIND_SHADOW = tuple(Threat(Charge((5.0, 20.0), 100.0), seed) for seed in (0, 1, 2))
+BEHIND_SHADOW = tuple(LoadCase(Charge((5.0, 20.0), 100.0), seed) for seed in (0, 1, 2))

@@ -9,7 +9,7 @@ import pytest
 
 from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, SeedRange, Threat, draw_threats
+from blast_env.evaluation import Case, LoadCase, SeedRange, draw_threats
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, practice_hidden
 from blast_env.site import PointSource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk
@@ -24,10 +24,10 @@ def test_a_seed_draws_the_charge_of_its_blast() -> None:
 
 def test_numbers_of_other_types_make_the_same_threat() -> None:
     """They become keys of a cache and go into JSON files."""
-    plain = Threat(Charge((5.0, 15.0), 100.0), 3)
+    plain = LoadCase(Charge((5.0, 15.0), 100.0), 3)
     numpy_charge: Any = (np.array([5, 15]), np.float32(100.0))
     numpy_seed: Any = np.int64(3)
-    other = Threat(numpy_charge, numpy_seed)
+    other = LoadCase(numpy_charge, numpy_seed)
     assert other == plain
     assert hash(other) == hash(plain)
     assert type(other.seed) is int
@@ -52,9 +52,9 @@ def test_unusable_seeds_are_named(seeds: list, words: str) -> None:
 @pytest.mark.parametrize("charge", [5.0, ((1.0, 2.0, 3.0), 1.0), (("left", 1.0), 1.0)])
 def test_unusable_charges_are_named(charge: Any) -> None:
     with pytest.raises(BlastEnvError, match="must be"):
-        Threat(charge, 0)
+        LoadCase(charge, 0)
     with pytest.raises(BlastEnvError, match="seed is -1, must be an integer from 0"):
-        Threat(Charge((5.0, 15.0), 100.0), -1)
+        LoadCase(Charge((5.0, 15.0), 100.0), -1)
 
 
 def test_ranges_of_seeds_are_disjoint() -> None:
@@ -98,7 +98,7 @@ def test_realisations_are_averaged_before_the_risk() -> None:
     """Three charges, two realisations: charge by charge, then again; the risk sees means."""
     scenario = load_scenario("courtyard")
     charges = [Charge((5.0, y_m), 100.0) for y_m in (10.0, 15.0, 20.0)]
-    threats = tuple(Threat(charges[k % 3], k) for k in range(6))
+    threats = tuple(LoadCase(charges[k % 3], k) for k in range(6))
     worst = ConditionalValueAtRisk(0.9)
     impulses = [1.0, 2.0, 6.0, 3.0, 4.0, 2.0]
     assert Case(scenario, threats, 2).combined(impulses) == pytest.approx(3.0)
@@ -110,14 +110,14 @@ def test_a_charge_that_is_drawn_twice_counts_twice() -> None:
     """A risk over draws, not over places: a likely place weighs more."""
     scenario = load_scenario("courtyard")
     same, other = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)
-    case = Case(scenario, (Threat(same, 1), Threat(same, 2), Threat(other, 3)))
+    case = Case(scenario, (LoadCase(same, 1), LoadCase(same, 2), LoadCase(other, 3)))
     assert case.combined([1.0, 2.0, 6.0]) == pytest.approx(3.0)
 
 
 def test_threats_out_of_order_are_refused() -> None:
     scenario = load_scenario("courtyard")
     first, second = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)
-    threats = (Threat(first, 1), Threat(first, 2), Threat(second, 3), Threat(second, 4))
+    threats = (LoadCase(first, 1), LoadCase(first, 2), LoadCase(second, 3), LoadCase(second, 4))
     with pytest.raises(BlastEnvError, match=r"threats\[2\] .* in the order of the charges"):
         Case(scenario, threats, realisations=2)
     with pytest.raises(BlastEnvError, match="2 realisations of each charge"):

@@ -11,7 +11,7 @@ from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import (
     BlastEvaluator,
     LayoutEvaluation,
-    Threat,
+    LoadCase,
     draw_threats,
     evaluate_against,
     evaluate_layout,
@@ -87,7 +87,7 @@ def test_evaluate_layout_draws_the_threats_of_its_seeds(evaluation: LayoutEvalua
 
 
 def test_threats_may_be_given_instead_of_seeds(evaluator: BlastEvaluator) -> None:
-    light = [Threat(Charge((10.0, 15.0), 15.0), seed) for seed in (0, 1)]
+    light = [LoadCase(Charge((10.0, 15.0), 15.0), seed) for seed in (0, 1)]
     evaluation = evaluate_layout(COURTYARD, FEW, threats=[*light, THREATS[0]], engine="event")
     assert evaluation.threats == (*light, THREATS[0])
     assert not evaluation.in_range
@@ -116,7 +116,7 @@ def test_a_file_repeats_its_evaluation(tmp_path: Path) -> None:
     scenario = Scenario.from_document(content["scenario"], "evaluation.json")
     assert scenario.content_hash == content["scenario_hash"]
     threats = [
-        Threat(Charge((row["charge_x_m"], row["charge_y_m"]), row["tnt_kg"]), row["seed"])
+        LoadCase(Charge((row["charge_x_m"], row["charge_y_m"]), row["tnt_kg"]), row["seed"])
         for row in content["threats"]
     ]
     layout = [tuple(cell) for cell in content["layout"]]

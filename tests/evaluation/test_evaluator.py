@@ -10,7 +10,7 @@ import pytest
 from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import CalibrationError
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, BlastLoads, ParticleLoad, Threat
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, ParticleLoad
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
 from blast_env.geometry import Cell
 from blast_env.particles.run import BlastRun
@@ -44,7 +44,7 @@ def test_loads_are_those_of_simulate(scenario: Scenario, engine: str) -> None:
 
 
 def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluator) -> None:
-    light = evaluator.loads((), Threat(Charge((10.0, 15.0), 15.0), 0))
+    light = evaluator.loads((), LoadCase(Charge((10.0, 15.0), 15.0), 0))
     assert not light.in_range
     assert light.structures[0].notes == ("charge 15 kg TNT is not between 20 and 1000 kg",)
 
@@ -168,7 +168,7 @@ def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> None:
-    inside = [Threat(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]
+    inside = [LoadCase(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]
     with pytest.raises(ScenarioError, match="building"):
         BlastEvaluator(COURTYARD).loads_of_many([((), each) for each in inside], processes)
 
@@ -176,7 +176,7 @@ def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> Non
 def test_weights_and_all_structures_of_a_street_are_there() -> None:
     """The protected block of the street junction counts twice; the others do not count."""
     evaluator = BlastEvaluator(load_scenario("street_junction"))
-    loads = evaluator.loads((), Threat(Charge((10.0, 20.0), 100.0), 0))
+    loads = evaluator.loads((), LoadCase(Charge((10.0, 20.0), 100.0), 0))
     assert [load.protected for load in loads.structures] == [False, False, False, True]
     assert loads.protected_impulse_pa_s == 2.0 * loads.structures[3].impulse_pa_s > 0.0
     assert loads.module_impulse_sim.shape == (4 * 20 * 20,)

@@ -9,14 +9,14 @@ from blast_env.cli.evaluation_report import print_means
 from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, Threat, draw_threats, evaluate_against
+from blast_env.evaluation import BlastEvaluator, Case, LoadCase, draw_threats, evaluate_against
 from blast_env.site import ObjectiveSection, Scenario, ScenarioError
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, WorstRisk
 from blast_env.units import PA_PER_PSI
 from tests.gas_sites import WALL, hut, site_document
 
-NEAR, FAR = (Threat(Charge(place, 5.0), 0) for place in ((2.0, 4.0), (2.0, 1.5)))
+NEAR, FAR = (LoadCase(Charge(place, 5.0), 0) for place in ((2.0, 4.0), (2.0, 1.5)))
 
 
 def site(**objective: Any) -> Scenario:

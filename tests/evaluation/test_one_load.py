@@ -12,7 +12,7 @@ import pytest
 
 from blast_env.app.blasts import building_loads, gas_loads
 from blast_env.app.records import BlastRecord, EngineRecord, LoadJudge
-from blast_env.evaluation import BlastEvaluator, Threat, evaluate_layout
+from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.engines.oblique_walls import stepped_buildings
 from blast_env.report.loads import measure, targets_of
@@ -81,7 +81,7 @@ def test_tables_and_the_objective(result: GasResult, hall: Scenario, load_pa_s: 
 
 
 def test_evaluation_and_benchmark(hall: Scenario, load_pa_s: float) -> None:
-    threat = Threat(CHARGE, 0)
+    threat = LoadCase(CHARGE, 0)
     found = evaluate_layout(hall, (), threats=[threat], engine=ENGINE)
     (row,) = found.building_table.to_dict("records")
     assert row["impulse_pa_s"] == pytest.approx(load_pa_s)

@@ -9,7 +9,7 @@ from blast_env.evaluation import (
     Case,
     Evaluators,
     LayoutEvaluation,
-    Threat,
+    LoadCase,
     compare,
     draw_threats,
     evaluate_layout,
@@ -38,7 +38,7 @@ def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
 ) -> None:
     with_posts, bare = worst_places(SITE, SOURCE, POSTS), worst_places(SITE, SOURCE)
     for rank, outcome in enumerate(evaluation.outcomes):
-        assert outcome.threat == Threat(VehicleCharge(SOURCE, rank), rank)
+        assert outcome.threat == LoadCase(VehicleCharge(SOURCE, rank), rank)
         assert outcome.charge.position_m == with_posts.places_m[rank]
         assert outcome.stand_off_m == pytest.approx(with_posts.distances_m[rank])
         assert outcome.unprotected_stand_off_m == pytest.approx(bare.distances_m[rank])
@@ -80,7 +80,7 @@ def test_layouts_that_leave_the_vehicle_where_it_is_share_no_blast() -> None:
 
 
 def test_particles_judge_a_vehicle_too() -> None:
-    threat = Threat(VehicleCharge(SOURCE), 3)
+    threat = LoadCase(VehicleCharge(SOURCE), 3)
     evaluator = BlastEvaluator(SITE, "event")
     load = evaluator.loads(POSTS, threat).protected_impulse_sim
     place = worst_places(SITE, SOURCE, POSTS).charge(0)
@@ -105,4 +105,4 @@ def test_a_search_meets_the_worst_places_first() -> None:
 
 def test_a_threat_needs_a_sound_seed() -> None:
     with pytest.raises(BlastEnvError, match="seed is -1, must be an integer from 0"):
-        Threat(VehicleCharge(SOURCE), -1)
+        LoadCase(VehicleCharge(SOURCE), -1)

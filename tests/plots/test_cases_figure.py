@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import Case, Comparison, Threat
+from blast_env.evaluation import Case, Comparison, LoadCase
 from blast_env.plots.evaluation_figures import MOST_SHOWN, comparison_figure
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import Kinds
@@ -29,7 +29,7 @@ def comparison(
     """Return a comparison: case k has k + 1 modules, its charge on the road of the courtyard."""
     cases = []
     for number in range(len(reductions)):
-        threat = Threat(Charge((5.0, 8.0 + number), 100.0), number)
+        threat = LoadCase(Charge((5.0, 8.0 + number), 100.0), number)
         cases.append(Case(scenarios[number % len(scenarios)], (threat,)))
     return Comparison(
         cases=tuple(cases),

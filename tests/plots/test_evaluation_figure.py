@@ -8,7 +8,7 @@ from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import LayoutEvaluation, Threat, evaluate_layout
+from blast_env.evaluation import LayoutEvaluation, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.plots.evaluation_figures import evaluation_figure
 from blast_env.plots.figures import save_figure
@@ -18,12 +18,12 @@ from tests.gas_sites import hut
 
 WALL = [(row, 0) for row in range(22, 32)]
 THREATS = (
-    Threat(Charge((5.0, 20.0), 100.0), 0),
-    Threat(Charge((5.0, 9.0), 100.0), 1),
-    Threat(Charge((5.0, 14.0), 15.0), 2),  # no mass that the calibration was made for
+    LoadCase(Charge((5.0, 20.0), 100.0), 0),
+    LoadCase(Charge((5.0, 9.0), 100.0), 1),
+    LoadCase(Charge((5.0, 14.0), 15.0), 2),  # no mass that the calibration was made for
 )
 
-THREATS_OF_HUT = (Threat(Charge((2.0, 4.0), 5.0), 0),)
+THREATS_OF_HUT = (LoadCase(Charge((2.0, 4.0), 5.0), 0),)
 
 
 @pytest.fixture(scope="module")

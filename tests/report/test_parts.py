@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.evaluation.governing import Severity
 from blast_env.geometry import Piece
@@ -17,11 +18,11 @@ from blast_env.report.outcomes import check_limits
 from blast_env.report.peaks import CountedPeak, PeakSource
 from blast_env.report.study import Runs, layout_from
 from blast_env.report.threats import (
-    NamedCharge,
     asked_threats,
     chief_threats,
     other_masses,
     other_places,
+    place_text,
 )
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.scene import Charge
@@ -46,7 +47,7 @@ def test_threats_are_the_governing_places_of_their_sources_the_worst_first() -> 
     loads = {each.charge: float(number) for number, each in enumerate(places)}
     loads[places[1].charge] = 1e3
 
-    def severity(place: NamedCharge) -> Severity:
+    def severity(place: LoadCase) -> Severity:
         return Severity(load=loads[place.charge])
 
     first, second = chief_threats(places, severity, 6)
@@ -71,16 +72,16 @@ def test_no_place_of_a_street_is_nearer_than_those_looked_at(
     places = other_places(scenario, 1)
     shares = np.linspace(0.0, 1.0, 1000)
     nearest = min(away_m(x0 + s * (x1 - x0), y0 + s * (y1 - y0)) for s in shares)
-    looked_at_m = min(away_m(*each.against(scenario).position_m) for each in places)
+    looked_at_m = min(away_m(*each.charge_against(scenario).position_m) for each in places)
     assert looked_at_m == pytest.approx(nearest, abs=0.01)
 
 
 def test_other_places_are_spread_over_every_source() -> None:
     site = site_with(ROAD, YARD, ROAD)
     places = other_places(site, 3)
-    along_m = [each.against(site).position_m for each in places[:3]]
+    along_m = [each.charge_against(site).position_m for each in places[:3]]
     assert along_m == [(1.0, 1.0), (1.0, 4.0), (1.0, 7.0)]
-    assert 3.0 <= places[3].against(site).position_m[1] <= 5.0  # before the hut
+    assert 3.0 <= places[3].charge_against(site).position_m[1] <= 5.0  # before the hut
     assert len(places) == 4 + 9  # the second road has the same places, the yard its nearest corner
     assert {each.charge.tnt_kg for each in places[4:]} == {1.0}
 
@@ -90,14 +91,14 @@ def test_charge_of_a_vehicle_comes_as_near_as_the_layout_lets_it() -> None:
     places = other_places(site, 5)
     threat = places[0]
     # Its square of 2 m touches the hut at x = 10 m, or the posts at x = 4 m.
-    assert threat.against(site) == Charge((9.0, 4.0), 5.0)
-    assert threat.against(site, POSTS) == Charge((3.0, 4.0), 5.0)
-    assert threat.place_text(site, POSTS) == (
+    assert threat.charge_against(site) == Charge((9.0, 4.0), 5.0)
+    assert threat.charge_against(site, POSTS) == Charge((3.0, 4.0), 5.0)
+    assert place_text(threat, site, POSTS) == (
         "(9.0, 4.0) m without the layout, (3.0, 4.0) m with it"
     )
-    assert len({each.against(site, POSTS) for each in places}) == len(places) == 3
+    assert len({each.charge_against(site, POSTS) for each in places}) == len(places) == 3
     masses, notes = other_masses(site, threat.charge, (2.0, 1e9))
-    assert [each.against(site, POSTS) for each in masses] == [Charge((3.0, 4.0), 10.0)]
+    assert [each.charge_against(site, POSTS) for each in masses] == [Charge((3.0, 4.0), 10.0)]
     assert "5e+09 kg is omitted" in notes[0]
 
 

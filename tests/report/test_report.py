@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Threat
+from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.grid_error import convergence_index
@@ -479,7 +479,7 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     assert Counter(charges) == Counter(charge for each in parts for charge in each.charges)
     assert len(charges) == 2 + 4 + 4 + (len(LAYOUT) if items else 0)  # 2 to choose the threat by
 
-    threat = Threat(study.threats[0].charge, 0)
+    threat = LoadCase(study.threats[0].charge, 0)
     kept = BlastEvaluator(small_hut(), options.coarse, cache=tmp_path)
     anew = BlastEvaluator(small_hut(), options.coarse)
     for layout in ((), LAYOUT):

@@ -13,7 +13,7 @@ import pytest
 import blast_env
 from blast_env.design.rules import random_layout, wall_near_charge
 from blast_env.design.search import layouts_by_rule
-from blast_env.evaluation import BlastEvaluator, Case, Evaluators, Threat, draw_threats
+from blast_env.evaluation import BlastEvaluator, Case, Evaluators, LoadCase, draw_threats
 from blast_env.io.export import LayoutPlan
 from blast_env.layout import LayoutFile, Placement, check_layout, usable_cells
 from blast_env.site.scene import Charge
@@ -22,7 +22,7 @@ from blast_env.sites import SiteMeasures, turned
 NAME = "courtyard"
 COURTYARD = blast_env.load_scenario(NAME)
 CHARGE = Charge((5.0, 15.0), 100.0)
-THREAT = Threat(CHARGE, 0)
+THREAT = LoadCase(CHARGE, 0)
 
 PUBLIC = (
     "blast_env",

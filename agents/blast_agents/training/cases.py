@@ -9,7 +9,7 @@ from blast_agents.training.run_folder import TrainingSettings
 from blast_env.design.search import LayoutAgent
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, Evaluators, SeedRange, Threat, compare, draw_threats
+from blast_env.evaluation import Case, Evaluators, LoadCase, SeedRange, compare, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
@@ -84,7 +84,7 @@ def training_cases(
     hidden = settings.threat == "hidden"
     known_site = isinstance(source, SingleScenario)
     threats = settings.hidden_threats if hidden else 1
-    drawn: list[tuple[Scenario, tuple[Threat, ...]]] = []
+    drawn: list[tuple[Scenario, tuple[LoadCase, ...]]] = []
     for index in range(1 if hidden and known_site else count):
         sequence = np.random.SeedSequence((settings.seed, index))
         scenario = source.sample(np.random.default_rng(sequence))

@@ -15,7 +15,7 @@ from blast_env.app.records import (
     frames_in,
 )
 from blast_env.app.session import BARE, Session, Shown
-from blast_env.app.threats import NamedThreat
+from blast_env.evaluation import LoadCase
 from blast_env.site import ObjectiveSection
 
 _FILM: Final = "film"
@@ -179,7 +179,7 @@ class ResultsView:
         self._empty.text = _RUNNING if running else _NOTHING
         self._show_notes(records)
 
-    def _found(self, there: Sequence[tuple[Shown, int]], threat: NamedThreat) -> Iterator[_Found]:
+    def _found(self, there: Sequence[tuple[Shown, int]], threat: LoadCase) -> Iterator[_Found]:
         """Yield every blast with a record or frames, with the addresses of its pictures."""
         session = self._session
         for each, frames in there:
@@ -248,7 +248,7 @@ class ResultsView:
         added = f" ({parts} structures, weighted)" if parts > 1 else ""
         return f"{noun}: {self._loads[name, record.threat]}{added}"
 
-    def _show_chart(self, threat: NamedThreat) -> None:
+    def _show_chart(self, threat: LoadCase) -> None:
         self._chart.clear()
         self._chart.visible = self._what == _GAUGES
         if self._what != _GAUGES:

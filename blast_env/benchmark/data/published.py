@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.benchmark.data.gas_blasts import load
-from blast_env.evaluation import BlastEvaluator, BlastStore, Threat
+from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
 from blast_env.evaluation.engines import BlastLoads, StructureLoad, find_engine
 from blast_env.layout import Placement
 from blast_env.site import Charge, Scenario
@@ -40,7 +40,7 @@ def remember_published(store: BlastStore, scenarios: Iterable[Scenario]) -> int:
             found[tuple(blast)][structure] = impulse_pa_s, peak_pa
         for (text, x_m, y_m, tnt_kg, height_m), known in found.items():
             layout = [catalogue.element_from(tuple(each), "layout") for each in json.loads(text)]
-            threat = Threat(Charge((x_m, y_m), tnt_kg, height_m), 0)
+            threat = LoadCase(Charge((x_m, y_m), tnt_kg, height_m), 0)
             loads = tuple(
                 StructureLoad.on(each, *known[each.name], in_range=True)
                 for each in scenario.structures

@@ -22,7 +22,7 @@ from blast_env.design.surrogate.correction import Correction
 from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, DesignProblem, Threat
+from blast_env.evaluation import Case, DesignProblem, LoadCase
 from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
@@ -87,7 +87,7 @@ class Guesses:
         """Return all layouts with a prediction, the least load first."""
         return sorted(self._known, key=lambda layout: self._known[layout])
 
-    def _weighted(self, layouts: Sequence[Layout], threat: Threat) -> FloatArray:
+    def _weighted(self, layouts: Sequence[Layout], threat: LoadCase) -> FloatArray:
         charges = [threat.charge_against(self.case.scenario, each) for each in layouts]
         return self.surrogate.guess(self.site, layouts, charges).loads(self.site, layouts)
 
@@ -357,7 +357,7 @@ class _Estimates:
         """Return estimates without predictions."""
         problem = session.problem
 
-        def under(threats: Sequence[Threat]) -> Guesses:
+        def under(threats: Sequence[LoadCase]) -> Guesses:
             case = Case(problem.scenario, tuple(threats), risk=problem.case.risk)
             return Guesses.of(surrogate, case)
 

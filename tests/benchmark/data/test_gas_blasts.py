@@ -10,7 +10,7 @@ import pytest
 
 from blast_env.benchmark.data import COLUMNS, TABLES, as_tensors, load, remember_published, sources
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, BlastStore, Threat
+from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
 from blast_env.evaluation.engines import find_engine
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece
@@ -74,10 +74,10 @@ def test_published_blasts_are_served_for_the_same_cells_and_version(
     fine, same = (
         BlastEvaluator(site, find_engine("gas", each), cache=store) for each in (0.25, 0.5)
     )
-    assert store.get(fine.key(layout, Threat(charge, 0))) is None
+    assert store.get(fine.key(layout, LoadCase(charge, 0))) is None
     (load,) = (
         each
-        for each in same.loads(layout, Threat(charge, 0)).structures
+        for each in same.loads(layout, LoadCase(charge, 0)).structures
         if each.name == row["structure"]
     )
     assert load.impulse_pa_s == row["impulse_pa_s"]
