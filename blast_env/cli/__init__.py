@@ -32,7 +32,7 @@ class _Commands(LazyGroup):
             "search."
         ),
     }
-    functions = ("draw", "search", "assess")
+    functions = ("draw", "search", "assess", "evaluate")
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 
 

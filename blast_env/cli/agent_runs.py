@@ -28,13 +28,12 @@ from blast_env.cli.evaluation_report import (
     threats_text,
 )
 from blast_env.cli.output import (
-    ResultTable,
     percent,
     print_cost,
     print_line,
+    print_table,
     print_written,
     progress_bar,
-    result_console,
 )
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (
@@ -47,7 +46,6 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.grid_error import final_engine
 from blast_env.files import write_atomically
 from blast_env.io.export import LayoutPlan, export_layouts
 from blast_env.layout.build_scene import charge_against
@@ -85,14 +83,13 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     settings = configuration.settings
     weights = newest_weights(run)
     agent = load_agent(run, weights)
-    seeds = options.seed_range
     source: ScenarioSource = SingleScenario(folder.scenario(configuration))
     if settings.scenario in FAMILIES:
         source = scenario_source(settings.scenario)
     provenance = _provenance(run, settings, weights)
-    notes = [_overlap(settings, seeds)] if weights == "best" else [_NO_BEST]
+    notes = [_overlap(settings, options.seeds)] if weights == "best" else [_NO_BEST]
     for note in notes:
-        if note and not options.any_json:
+        if note and not options.is_json:
             print_line(f"note: {note}")
     if isinstance(source, SingleScenario) and settings.threat == "hidden":
         _report_hidden(agent, settings, source, provenance, options)
@@ -126,7 +123,7 @@ def _report_cases(
     options: EvaluateOptions,
 ) -> None:
     """Report on one layout per charge, or per site."""
-    seeds = options.seed_range
+    seeds = options.seeds
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
     evaluators = Evaluators(
@@ -139,7 +136,7 @@ def _report_cases(
         cases = [*distinct.values()]
     coarser = evaluators.coarser()
     told = [(each.scenario, each.charge) for each in cases]
-    if not options.any_json:
+    if not options.is_json:
         print_line(evaluators.engine.describe([case.scenario for case in cases]))
         print_cost(asked_blasts(cases, evaluators.engine))
     layouts, seconds = [], []
@@ -160,7 +157,7 @@ def _report_cases(
     record = {**comparison_record(comparison, evaluators.engine), "provenance": provenance}
     written = [] if options.out is None else _write(comparison, record, options.out)
     exported = _export(comparison, settings, provenance, options)
-    if options.any_json:
+    if options.is_json:
         files = [str(path) for path in [*written, *exported]]
         print_record(
             {**record, "cache": cache_record(evaluators, coarser), "files": files}, options
@@ -185,15 +182,15 @@ def _engine(
     """Return the engine that judges: gas dynamics for final statements, else that of the run."""
     own = settings.judge
     engine = own if own.name == options.engine != JUDGE else options.engine
-    return final_engine(engine, sites, options.cell_m, options.until, options.cells)
+    return options.engine_for(engine, sites)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:
     threats = tuple(
-        replace(threat, charge=options.fixed(case.scenario, threat.charge))
+        replace(threat, charge=options.given.fixed(case.scenario, threat.charge))
         for threat in case.threats
     )
-    charge = None if case.charge is None else options.fixed(case.scenario, case.charge)
+    charge = None if case.charge is None else options.given.fixed(case.scenario, case.charge)
     return replace(case, threats=threats, charge=charge)
 
 
@@ -211,10 +208,9 @@ def _export(
 
 
 def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
-    table, cases = ResultTable(title, _HEADERS), case_table(comparison)
-    objective = comparison.cases[0].scenario.objective
-    for row in cases.to_dict("records"):
-        table.add_row(
+    cases, objective = case_table(comparison), comparison.cases[0].scenario.objective
+    rows = [
+        (
             row["scenario"],
             f"({row['charge_x_m']:.1f}, {row['charge_y_m']:.1f})",
             f"{row['tnt_kg']:g}",
@@ -223,7 +219,9 @@ def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
             objective.text(row["load"]),
             percent(row["reduction"]) + ("" if row["in_range"] else " ~"),
         )
-    result_console().print(table)
+        for row in cases.to_dict("records")
+    ]
+    print_table(title, _HEADERS, rows)
     outside = int((~cases["in_range"]).sum())
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (marked ~)")

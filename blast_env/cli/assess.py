@@ -1,7 +1,7 @@
 """`blast-env assess`: the damage of buildings by charges; stand-offs, and largest charges."""
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Final
 
 import typer
 
@@ -38,6 +38,10 @@ from blast_env.site import load_scenario
 from blast_env.site.presets import CHARGE_PRESETS, TNT_EQUIVALENTS
 
 _SCREEN: Final = "With --screen"
+_MASS_HELP: Final = (
+    f"Charge at every place of the site's charges: {', '.join(CHARGE_PRESETS)}, or "
+    f"NAME=KG[,EXPLOSIVE] with {', '.join(TNT_EQUIVALENTS)}; else the site's own. May be repeated."
+)
 _OF_SCREENING: Final = ("mass", "gas")
 _OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg")
 _OF_ASSESSMENT: Final = ("without_fallen", "view", "diagram", "table")
@@ -47,90 +51,67 @@ def assess(
     context: typer.Context,
     scenario: ScenarioArgument,
     layout: LayoutOption = None,
-    screen: Annotated[
-        bool,
-        typer.Option(
-            "--screen",
-            help="Print only level of protection and stand-offs by the curves in the open, in "
-            "seconds, without a blast.",
-        ),
-    ] = False,
-    capacity: Annotated[
-        bool,
-        typer.Option(
-            "--capacity",
-            help="Print only the largest charge at each place, and the least stand-off, that keep "
-            "each level.",
-        ),
-    ] = False,
+    screen: bool = typer.Option(
+        False,
+        "--screen",
+        help="Print only level of protection and stand-offs by the curves in the open, in "
+        "seconds, without a blast.",
+    ),
+    capacity: bool = typer.Option(
+        False,
+        "--capacity",
+        help="Print only the largest charge at each place, and the least stand-off, that keep "
+        "each level.",
+    ),
     target: TargetOption = None,
     charges: DrawsOption = 16,
     cell_m: FinalCellOption = None,
     cells: FinalCellsOption = None,
     mass_error: MassErrorOption = 0.1,
-    without_fallen: Annotated[
-        bool,
-        typer.Option(
-            "--without-fallen",
-            help="Remove pieces that overturn before the blast is over, and run it again.",
-        ),
-    ] = False,
+    without_fallen: bool = typer.Option(
+        False,
+        "--without-fallen",
+        help="Remove pieces that overturn before the blast is over, and run it again.",
+    ),
     require: RequireOption = None,
-    glazing: Annotated[
-        str | None,
-        typer.Option(help="Windows of protected structures that have no facade, a component."),
-    ] = None,
-    wall: Annotated[
-        str | None,
-        typer.Option(help="Walls of protected structures that have no facade, a component."),
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            help="Picture of the facades under the worst charge; of the stand-offs as rings "
-            "(--screen); of the probability over the mass (--capacity): .png, .svg, .pdf.",
-            callback=writes(*PICTURES),
-        ),
-    ] = None,
-    view: Annotated[
-        Path | None,
-        typer.Option(
-            help="Picture of the site in three dimensions, bays by their damage.",
-            callback=writes(*PICTURES),
-        ),
-    ] = None,
-    diagram: Annotated[
-        Path | None,
-        typer.Option(
-            help="Pressure-impulse diagram with every bay on it.", callback=writes(*PICTURES)
-        ),
-    ] = None,
-    table: Annotated[
-        Path | None,
-        typer.Option(
-            help="Table of every bay under every charge: .csv, .xlsx.",
-            callback=writes(".csv", ".xlsx"),
-        ),
-    ] = None,
+    glazing: str | None = typer.Option(
+        None, help="Windows of protected structures that have no facade, a component."
+    ),
+    wall: str | None = typer.Option(
+        None, help="Walls of protected structures that have no facade, a component."
+    ),
+    picture: Path | None = typer.Option(
+        None,
+        help="Picture of the facades under the worst charge; of the stand-offs as rings "
+        "(--screen); of the probability over the mass (--capacity): .png, .svg, .pdf.",
+        callback=writes(*PICTURES),
+    ),
+    view: Path | None = typer.Option(
+        None,
+        help="Picture of the site in three dimensions, bays by their damage.",
+        callback=writes(*PICTURES),
+    ),
+    diagram: Path | None = typer.Option(
+        None, help="Pressure-impulse diagram with every bay on it.", callback=writes(*PICTURES)
+    ),
+    table: Path | None = typer.Option(
+        None,
+        help="Table of every bay under every charge: .csv, .xlsx.",
+        callback=writes(".csv", ".xlsx"),
+    ),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
-    mass: Annotated[
-        list[str] | None,
-        typer.Option(
-            help=f"Charge at every place of the site's charges: {', '.join(CHARGE_PRESETS)}, or "
-            f"NAME=KG[,EXPLOSIVE] with {', '.join(TNT_EQUIVALENTS)}; else the site's own. May be "
-            "repeated.",
-            rich_help_panel=_SCREEN,
-        ),
-    ] = None,
-    gas: Annotated[
-        bool,
-        typer.Option(
-            "--gas",
-            help="Gas dynamics of each worst place, for comparison.",
-            rich_help_panel=_SCREEN,
-        ),
-    ] = False,
+    mass: list[str] = typer.Option(
+        [],
+        help=_MASS_HELP,
+        rich_help_panel=_SCREEN,
+    ),
+    gas: bool = typer.Option(
+        False,
+        "--gas",
+        help="Gas dynamics of each worst place, for comparison.",
+        rich_help_panel=_SCREEN,
+    ),
 ) -> None:
     """Assess the damage of buildings by charges: panes, panels, level of protection.
 
@@ -154,7 +135,7 @@ def assess(
     if screen:
         refuse_given(context, _OF_DRAWN_CHARGES + _OF_ASSESSMENT, "does not apply to --screen")
         *_, last = layouts.values()
-        print_screening(site, last, mass or (), required, engine if gas else None, picture)
+        print_screening(site, last, mass, required, engine if gas else None, picture)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
     drawn = GivenCharge.of(charge, tnt_kg).fixed_charges(site, charges)

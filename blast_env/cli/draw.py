@@ -1,7 +1,6 @@
 """`blast-env draw`: checks of scenario files, and pictures of their sites before any blast."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -15,30 +14,24 @@ from blast_env.site import find_problems, load_scenario
 
 
 def draw(
-    scenarios: Annotated[list[str], typer.Argument(help="Bundled names, or scenario files.")],
-    layout: Annotated[
-        Path | None, typer.Option(help="Layout file; without it, the empty site.")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Picture to write: .png, .svg, .pdf.",
-            show_default="the scenario's name, .png",
-            callback=writes(*PICTURES),
-        ),
-    ] = None,
-    view: Annotated[str, typer.Option(help="both, plan or oblique.")] = "both",
-    corner: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            help="Corner of the viewpoint: southwest, southeast, northeast, northwest.",
-            show_default="on the side of the charges",
-        ),
-    ] = None,
-    check_only: Annotated[
-        bool, typer.Option("--check-only", help="Check the files, and draw nothing.")
-    ] = False,
+    scenarios: list[str] = typer.Argument(help="Bundled names, or scenario files."),
+    layout: Path | None = typer.Option(None, help="Layout file; without it, the empty site."),
+    out: Path | None = typer.Option(
+        None,
+        help="Picture to write: .png, .svg, .pdf.",
+        show_default="the scenario's name, .png",
+        callback=writes(*PICTURES),
+    ),
+    view: str = typer.Option("both", help="both, plan or oblique."),
+    corner: str | None = typer.Option(
+        None,
+        "--from",
+        help="Corner of the viewpoint: southwest, southeast, northeast, northwest.",
+        show_default="on the side of the charges",
+    ),
+    check_only: bool = typer.Option(
+        False, "--check-only", help="Check the files, and draw nothing."
+    ),
 ) -> None:
     """Check scenario files, and draw the plan and the oblique view of each site.
 

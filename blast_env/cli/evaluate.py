@@ -1,25 +1,85 @@
 """`blast-env evaluate`: a layout, or the agent of a run, against no barrier."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from blast_env.cli.command import option
+import typer
+
+from blast_env.cli.command import note_target, writes
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
-from blast_env.cli.options import running_on
+from blast_env.cli.options import (
+    UNTIL_HELP,
+    CacheOption,
+    ChargeOption,
+    ClusterAddress,
+    CvarOption,
+    EngineOption,
+    FinalCellOption,
+    FinalCellsOption,
+    GivenCharge,
+    JsonAllOption,
+    JsonOption,
+    ProcessesOption,
+    TntOption,
+    any_json,
+    resume_words,
+    running_on,
+)
+from blast_env.cli.output import resumable
+from blast_env.cli.targets import Target
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.grid_error import final_engine
-from blast_env.io.export import LayoutPlan
+from blast_env.evaluation import BlastEvaluator, SeedRange
+from blast_env.evaluation.engines import JUDGE
+from blast_env.io.export import LayoutPlan, is_file
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.site import load_scenario
-from blast_env.statistics import check_cvar_level
+from blast_env.statistics import CVAR_LEVEL, check_cvar_level
 
 _SCENARIO: Final = "courtyard"
 
 
-@dataclass(frozen=True, kw_only=True)
-class EvaluateCommand(EvaluateOptions):
+def _note_export(context: typer.Context, value: Path | None) -> Path | None:
+    """Add the target of `--export`, a file or a folder; `check_target` checks other suffixes."""
+    if value is not None and (is_file(value) or not value.suffix):
+        suffixes = (value.suffix.lower(),) if is_file(value) else ()
+        note_target(context, Target("--export", value, suffixes))
+    return value
+
+
+def evaluate(
+    layout: Path | None = typer.Option(None, help="JSON file of the (row, column) cells."),
+    run: Path | None = typer.Option(
+        None, help="Folder of a training run, whose agent proposes the layouts."
+    ),
+    scenario: str | None = typer.Option(
+        None, help="Bundled name, or a scenario file, for --layout.", show_default=_SCENARIO
+    ),
+    seeds: int = typer.Option(32, help="Number of threats.", min=1),
+    first_seed: int | None = typer.Option(
+        None, help="First seed.", min=0, show_default="the first one outside training and search"
+    ),
+    engine: EngineOption = JUDGE,
+    cell_m: FinalCellOption = None,
+    cells: FinalCellsOption = None,
+    until: str | None = typer.Option(None, help=UNTIL_HELP, show_default="structures"),
+    cvar_level: CvarOption = CVAR_LEVEL,
+    export: Path | None = typer.Option(
+        None,
+        help="Folder for the layouts as JSON, CSV, GeoJSON and DXF; or, for one layout, a file "
+        "with one of these suffixes.",
+        callback=_note_export,
+    ),
+    out: Path | None = typer.Option(
+        None, help="Folder for the JSON file, the tables and the figure.", callback=writes()
+    ),
+    charge: ChargeOption = None,
+    tnt_kg: TntOption = None,
+    processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
+    cache: CacheOption = None,
+    as_json: JsonOption = False,
+    json_all: JsonAllOption = False,
+) -> None:
     """Compare layouts with no barrier, both exposed to the same threats.
 
     Each seed draws a charge from the scenario; for particles, also the fan and the air. With --run,
@@ -29,40 +89,54 @@ class EvaluateCommand(EvaluateOptions):
     Gas dynamics runs on cells of 0.25 m. The worst charge runs on cells twice as large as well: the
     difference gives the error of the cells beside each number.
     """
-
-    layout: Path | None = option(None, "JSON file of the (row, column) cells.")
-    run: Path | None = option(None, "Folder of a training run, whose agent proposes the layouts.")
-    scenario: str | None = option(
-        None, "Bundled name, or a scenario file, for --layout.", show_default=_SCENARIO
+    check_cvar_level(cvar_level)
+    if first_seed is None:
+        drawn = SeedRange.JUDGEMENT.seeds(0, seeds)
+    else:
+        drawn = range(first_seed, first_seed + seeds)
+    options = EvaluateOptions(
+        given=GivenCharge.of(charge, tnt_kg),
+        seeds=drawn,
+        engine=engine,
+        cell_m=cell_m,
+        cells=cells,
+        until=until,
+        cvar_level=cvar_level,
+        processes=processes,
+        cache=cache,
+        export=export,
+        out=out,
+        is_json=any_json(as_json, json_all),
+        json_all=json_all,
     )
+    with running_on(cluster), resumable(resume_words(cache)):
+        if run is not None:
+            _evaluate_run(run, layout, scenario, options)
+        elif layout is not None:
+            _evaluate_file(layout, scenario or _SCENARIO, options)
+        else:
+            raise BlastEnvError("--layout or --run is missing: give the layouts to evaluate")
 
-    def __call__(self) -> None:
-        """Run the blasts; print and write the results."""
-        check_cvar_level(self.cvar_level)
-        with running_on(self.cluster):
-            if self.run is not None:
-                self._evaluate_run(self.run)
-            elif self.layout is not None:
-                self._evaluate_file(self.layout)
-            else:
-                raise BlastEnvError("--layout or --run is missing: give the layouts to evaluate")
 
-    def _evaluate_file(self, path: Path) -> None:
-        scenario = load_scenario(self.scenario or _SCENARIO)
-        layout = load_layout(path, scenario)
-        plan = LayoutPlan(scenario, layout, provenance=LayoutFile.load(path).provenance)
-        engine = final_engine(self.engine, [scenario], self.cell_m, self.until, self.cells)
-        report_layout(plan, BlastEvaluator(scenario, engine, cache=self.cache), self)
+def _evaluate_file(path: Path, name: str, options: EvaluateOptions) -> None:
+    scenario = load_scenario(name)
+    layout = load_layout(path, scenario)
+    plan = LayoutPlan(scenario, layout, provenance=LayoutFile.load(path).provenance)
+    engine = options.engine_for(options.engine, [scenario])
+    report_layout(plan, BlastEvaluator(scenario, engine, cache=options.cache), options)
 
-    def _evaluate_run(self, run: Path) -> None:
-        """Evaluate the agent of a run; refuse options that the run folder already fixes."""
-        if self.layout is not None:
-            raise BlastEnvError(
-                "--layout and --run exclude each other: a run's agent proposes the layouts"
-            )
-        if self.scenario is not None:
-            raise BlastEnvError("--scenario cannot be used with --run: the run folder contains it")
-        # Here, because runs need the extras.
-        with import_extra("agents,render", "--run"):
-            from blast_env.cli.agent_runs import evaluate_run
-        evaluate_run(run, self)
+
+def _evaluate_run(
+    run: Path, layout: Path | None, scenario: str | None, options: EvaluateOptions
+) -> None:
+    """Evaluate the agent of a run; refuse options that the run folder already fixes."""
+    if layout is not None:
+        raise BlastEnvError(
+            "--layout and --run exclude each other: a run's agent proposes the layouts"
+        )
+    if scenario is not None:
+        raise BlastEnvError("--scenario cannot be used with --run: the run folder contains it")
+    # Here, because runs need the extras.
+    with import_extra("agents,render", "--run"):
+        from blast_env.cli.agent_runs import evaluate_run
+    evaluate_run(run, options)

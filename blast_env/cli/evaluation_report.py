@@ -1,4 +1,4 @@
-"""The options of `blast-env evaluate`, and its printed and written output."""
+"""The printed and written output of `blast-env evaluate`."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,94 +6,64 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Final, TypeAlias
 
-from blast_env.cli.command import FOLDER, option
-from blast_env.cli.options import (
-    CELLS_HELP,
-    CVAR_HELP,
-    ENGINE_HELP,
-    FINAL_CELL_HELP,
-    FINAL_CELLS,
-    UNTIL_HELP,
-    CacheOptions,
-    ChargeOptions,
-    ClusterOptions,
-    JsonOptions,
-    ProcessOptions,
-)
+from blast_env.cli.options import GivenCharge
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
-    ResultTable,
     building_words,
     percent,
     print_cost,
     print_json,
     print_line,
+    print_table,
     print_written,
     progress_bar,
-    result_console,
     save_layout_picture,
     save_pictures,
 )
-from blast_env.cli.targets import Target
 from blast_env.evaluation import (
     BlastEvaluator,
     Case,
     Evaluators,
     LayoutEvaluation,
     LoadCase,
-    SeedRange,
     draw_threats,
     evaluate_against,
 )
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
 from blast_env.evaluation.comparison import Comparison
-from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.engines.contract import BlastLoads
-from blast_env.evaluation.grid_error import GridError, points, with_errors, worse
+from blast_env.evaluation.grid_error import GridError, final_engine, points, with_errors, worse
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
-from blast_env.io.export import LayoutPlan, check_target, export_layouts, is_file
+from blast_env.io.export import LayoutPlan, check_target, export_layouts
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
-from blast_env.statistics import CVAR_LEVEL, Estimate, reductions
+from blast_env.statistics import Estimate, reductions
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOptions, JsonOptions):
-    """The options common to a layout file and a run; see `evaluate`."""
+class EvaluateOptions:
+    """The options of an evaluation common to a layout file and a run; see `evaluate`."""
 
-    seeds: int = option(32, "Number of threats.", min=1)
-    first_seed: int | None = option(
-        None,
-        "First seed.",
-        min=0,
-        show_default="the first one outside training and search",
-    )
-    engine: str = option(JUDGE, ENGINE_HELP)
-    cell_m: float | None = option(None, FINAL_CELL_HELP)
-    cells: str | None = option(None, CELLS_HELP, show_default=FINAL_CELLS)
-    until: str | None = option(None, UNTIL_HELP, show_default="structures")
-    cvar_level: float = option(CVAR_LEVEL, CVAR_HELP)
-    export: Path | None = option(
-        None,
-        "Folder for the layouts as JSON, CSV, GeoJSON and DXF; or, for one layout, a file with one "
-        "of these suffixes.",
-    )
-    out: Path | None = option(
-        None, "Folder for the JSON file, the tables and the figure.", writes=FOLDER
-    )
+    given: GivenCharge
+    seeds: range
+    engine: str
+    cell_m: float | None
+    cells: str | None
+    until: str | None
+    cvar_level: float
+    processes: int
+    cache: Path | None
+    export: Path | None
+    out: Path | None
+    is_json: bool
+    json_all: bool
 
-    def targets(self) -> list[Target]:
-        """Return the targets of the command; `check_target` checks the suffix of `export`."""
-        targets = super().targets()
-        if self.export is None:
-            return targets
-        if is_file(self.export):
-            targets.append(Target("--export", self.export, (self.export.suffix.lower(),)))
-        elif not self.export.suffix:
-            targets.append(Target("--export", self.export, FOLDER))
-        return targets
+    def engine_for(self, engine: str | Engine, sites: Sequence[Scenario]) -> Engine:
+        """Return an engine with the requested cells, for final statements on sites."""
+        return final_engine(engine, sites, self.cell_m, self.until, self.cells)
 
     def threats(self, scenario: Scenario, engine: Engine) -> tuple[LoadCase, ...]:
         """Return the threats drawn by the seeds, with the user's place and mass of the charge.
@@ -101,18 +71,11 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         Fixed charges come in turn, each once before any repeats. Without noise a charge has one
         realisation: repeated ones are dropped.
         """
-        drawn = in_turn(scenario, draw_threats(scenario, self.seed_range))
+        drawn = in_turn(scenario, draw_threats(scenario, self.seeds))
         threats = tuple(
-            LoadCase(self.fixed(scenario, threat.charge), threat.seed) for threat in drawn
+            LoadCase(self.given.fixed(scenario, threat.charge), threat.seed) for threat in drawn
         )
         return threats if engine.has_noise else one_of_each_charge(threats)
-
-    @property
-    def seed_range(self) -> range:
-        """The seeds of the threats, by default those of judgement."""
-        if self.first_seed is None:
-            return SeedRange.JUDGEMENT.seeds(0, self.seeds)
-        return range(self.first_seed, self.first_seed + self.seeds)
 
     def prepare_files(self, layouts: int) -> None:
         """Check the targets before the blasts, so that no result is lost.
@@ -125,9 +88,8 @@ class EvaluateOptions(ChargeOptions, ProcessOptions, ClusterOptions, CacheOption
         """
         if self.export is not None:
             check_target(self.export, layouts)
-        if self.out is None:
-            return
-        make_folder(self.out)
+        if self.out is not None:
+            make_folder(self.out)
 
 
 AnyEvaluator: TypeAlias = BlastEvaluator | Evaluators
@@ -248,7 +210,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
     engine, coarser = evaluator.engine, evaluator.coarser()
     threats = options.threats(plan.scenario, engine)
     options.prepare_files(1)
-    if not options.any_json:
+    if not options.is_json:
         print_line(engine.describe([plan.scenario]))
         print_cost(asked_blasts([Case(plan.scenario, threats)], engine))
     with progress_bar(f"{2 * len(threats)} blasts in {plan.scenario.name}") as progress:
@@ -264,7 +226,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
     written = [] if options.out is None else _write(evaluation, options.out)
     if options.export is not None:
         written += export_layouts({"layout": plan}, options.export)
-    if options.any_json:
+    if options.is_json:
         record = {
             **evaluation.to_dict(),
             "scenario_name": plan.scenario.name,
@@ -275,7 +237,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
         }
         print_record(record, options)
         return
-    _print_evaluation(evaluation, options.seed_range)
+    _print_evaluation(evaluation, options.seeds)
     print_written(written)
     print_line(cache_text(evaluator, coarser))
 
@@ -306,24 +268,23 @@ def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
     """Print the buildings' mean loads, and the effect of the layout over all threats."""
     count = len(evaluation.threats)
-    table = ResultTable(
-        f"{evaluation.scenario.name}: {layout_counts(evaluation.layout, 'barrier')} against none, "
-        f"{threats_text(count, seeds)}",
-        _HEADERS,
-        text_columns=2,
-    )
+    rows = []
     for row in evaluation.building_table.to_dict("records"):
         reduction = Estimate(row["reduction"], row["reduction_low"], row["reduction_high"])
-        table.add_row(
-            building_words(evaluation.scenario, str(row["structure"])),
-            "yes" if row["protected"] else "no",
-            _number(row["unprotected_impulse_pa_s"], row["unprotected_impulse_error_pa_s"]),
-            _number(row["impulse_pa_s"], row["impulse_error_pa_s"]),
-            percent(reduction.value) + _of_cells(points(row["reduction_error"])),
-            interval(reduction),
-            f"{row['threats_in_range']} of {count}",
+        rows.append(
+            (
+                building_words(evaluation.scenario, str(row["structure"])),
+                "yes" if row["protected"] else "no",
+                _number(row["unprotected_impulse_pa_s"], row["unprotected_impulse_error_pa_s"]),
+                _number(row["impulse_pa_s"], row["impulse_error_pa_s"]),
+                percent(reduction.value) + _of_cells(points(row["reduction_error"])),
+                interval(reduction),
+                f"{row['threats_in_range']} of {count}",
+            )
         )
-    result_console().print(table)
+    barriers = layout_counts(evaluation.layout, "barrier")
+    title = f"{evaluation.scenario.name}: {barriers} against none, {threats_text(count, seeds)}"
+    print_table(title, _HEADERS, rows, text_columns=2)
     _print_totals(evaluation)
     print_if_all_charges(evaluation.scenario, [each.charge for each in evaluation.threats])
     for note in evaluation.notes:

@@ -126,6 +126,17 @@ JsonAllOption = Annotated[
 ]
 
 
+def any_json(as_json: bool, json_all: bool) -> bool:
+    """Return whether the result is printed as JSON.
+
+    Raises:
+        BlastEnvError: If the short and the complete form are both given.
+    """
+    if as_json and json_all:
+        raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
+    return as_json or json_all
+
+
 @contextmanager
 def running_on(cluster: str | None) -> Iterator[None]:
     """Run the blasts of this block on a cluster, if one is given; see `on_cluster`."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import cycle, islice
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import typer
@@ -76,6 +76,7 @@ from blast_env.tables import write_csv
 
 ThreatName = Literal["visible", "hidden"]
 
+_METHOD_HELP: Final = f"{', '.join(proposers())}. package runs no blast."
 _SURROGATE: Final = "surrogate"
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
@@ -89,70 +90,51 @@ _WITH_BLASTS: Final = (
 
 def search(
     context: typer.Context,
-    method: Annotated[
-        str, typer.Option(help=f"{', '.join(proposers())}. package runs no blast.")
-    ] = "genetic",
-    scenario: Annotated[str, typer.Option(help=SCENARIO_HELP)] = "courtyard",
-    budget: Annotated[
-        int | None,
-        typer.Option(
-            help="Most blasts that may be spent; with --verify, on the comparison: it limits the "
-            "rules, then the charges.",
-            show_default=f"{DEFAULT_BUDGET}; with --verify as many as are needed",
-            min=1,
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Decides threats and search.", min=0)] = 0,
-    threat: Annotated[
-        ThreatName,
-        typer.Option(help="visible: one known charge; hidden: a layout for all possible charges."),
-    ] = "visible",
-    threats: Annotated[
-        int | None, typer.Option(help="Charges of a hidden threat; 16 unless given.", min=1)
-    ] = None,
-    realisations: Annotated[
-        int | None,
-        typer.Option(
-            help="Particle blasts per charge; 2 (visible) or 1 (hidden) unless given.", min=1
-        ),
-    ] = None,
-    risk: Annotated[
-        str | None,
-        typer.Option(
-            help="mean, cvar or worst, over the charges.",
-            show_default="as in the scenario's objective",
-        ),
-    ] = None,
+    method: str = typer.Option("genetic", help=_METHOD_HELP),
+    scenario: str = typer.Option("courtyard", help=SCENARIO_HELP),
+    budget: int | None = typer.Option(
+        None,
+        help="Most blasts that may be spent; with --verify, on the comparison: it limits the "
+        "rules, then the charges.",
+        show_default=f"{DEFAULT_BUDGET}; with --verify as many as are needed",
+        min=1,
+    ),
+    seed: int = typer.Option(0, help="Decides threats and search.", min=0),
+    threat: ThreatName = typer.Option(
+        "visible", help="visible: one known charge; hidden: a layout for all possible charges."
+    ),
+    threats: int | None = typer.Option(
+        None, help="Charges of a hidden threat; 16 unless given.", min=1
+    ),
+    realisations: int | None = typer.Option(
+        None, help="Particle blasts per charge; 2 (visible) or 1 (hidden) unless given.", min=1
+    ),
+    risk: str | None = typer.Option(
+        None,
+        help="mean, cvar or worst, over the charges.",
+        show_default="as in the scenario's objective",
+    ),
     cvar_level: CvarOption = CVAR_LEVEL,
     engine: EngineOption = JUDGE,
     cell_m: CellOption = None,
     cells: CellsOption = None,
-    start_from: Annotated[
-        list[Path] | None, typer.Option(help="Initial layout file; may be given again.")
-    ] = None,
-    surrogate: Annotated[
-        Path | None,
-        typer.Option(
-            help="File of the surrogate for --method surrogate (studies.surrogate fit).",
-            show_default="the package's",
-        ),
-    ] = None,
-    held_out: Annotated[
-        int, typer.Option(help="Number of threats for the final check of the result.", min=1)
-    ] = 32,
-    verify: Annotated[
-        bool,
-        typer.Option(
-            "--verify",
-            help="With --method package: compare it by gas dynamics with no barrier and the rules.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder for layout, its plan, history, front and figure.", callback=writes()
-        ),
-    ] = None,
+    start_from: list[Path] = typer.Option([], help="Initial layout file; may be given again."),
+    surrogate: Path | None = typer.Option(
+        None,
+        help="File of the surrogate for --method surrogate (studies.surrogate fit).",
+        show_default="the package's",
+    ),
+    held_out: int = typer.Option(
+        32, help="Number of threats for the final check of the result.", min=1
+    ),
+    verify: bool = typer.Option(
+        False,
+        "--verify",
+        help="With --method package: compare it by gas dynamics with no barrier and the rules.",
+    ),
+    out: Path | None = typer.Option(
+        None, help="Folder for layout, its plan, history, front and figure.", callback=writes()
+    ),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
@@ -183,7 +165,7 @@ def search(
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
         if out is not None:
             make_folder(out)
-        proposer, digest = _method(method, site, start_from or (), surrogate)
+        proposer, digest = _method(method, site, start_from, surrogate)
         model = find_threat_model(threat, threats)
         repeats = find_realisations(realisations, threat, used)
         measure = find_risk(risk, cvar_level)

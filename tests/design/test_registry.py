@@ -137,7 +137,7 @@ def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> 
 
 
 def test_verdicts_are_by_gas_dynamics_unless_told_otherwise() -> None:
-    for command in (search.search, evaluate.EvaluateCommand):
+    for command in (search.search, evaluate.evaluate):
         assert signature(command).parameters["engine"].default == "gas"
     assert problem_of(hut(), None).evaluator.engine.name == "gas"
 
