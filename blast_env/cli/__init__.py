@@ -32,7 +32,7 @@ class _Commands(LazyGroup):
             "search."
         ),
     }
-    functions = ("draw", "search", "assess", "evaluate")
+    functions = ("draw", "search", "assess", "evaluate", "simulate")
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 
 

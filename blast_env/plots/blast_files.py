@@ -1,0 +1,200 @@
+"""The film and the pictures of one blast by either engine, or of two side by side."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
+from blast_env.evaluation.engines import Blast, BlastResult
+from blast_env.runner import Tell, share_of
+from blast_env.values import plain_number
+
+if TYPE_CHECKING:  # Numba takes half a second to import
+    from blast_env.evaluation.engines.gas import GasBlast, GasResult
+    from blast_env.gas.engine import Recorders
+    from blast_env.plots.pressure_frames import VerticalSection
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlastFiles:
+    """Paths of the film and the pictures of a blast, `None` for those not wanted.
+
+    Attributes:
+        film: Film of the spread of the blast, .mp4 or .gif.
+        heat_map: Load over the protected facades.
+        history: Load over time; by gas dynamics at a gauge.
+        scheme: Initial state of the particles.
+        velocities: Velocities of the fan.
+        impulse_map: Impulse over the ground, by gas dynamics.
+        peak_map: Peak overpressure over the ground.
+        risk_map: Risks to windows and eardrums.
+        quantity: Quantity of the heat map by gas dynamics: impulse, unless peak.
+        gauge: Gauge of the history; by default the scenario's first.
+        film_height_m: Height of the film's plan by gas dynamics, m.
+        film_section: Vertical section of the film: x=M or y=M.
+    """
+
+    film: Path | None = None
+    heat_map: Path | None = None
+    history: Path | None = None
+    scheme: Path | None = None
+    velocities: Path | None = None
+    impulse_map: Path | None = None
+    peak_map: Path | None = None
+    risk_map: Path | None = None
+    quantity: str | None = None
+    gauge: str | None = None
+    film_height_m: float | None = None
+    film_section: str | None = None
+
+    def check(self, blast: "Blast | GasBlast") -> None:
+        """Refuse files that cannot be made, before the blast.
+
+        Raises:
+            BlastEnvError: If an option is invalid, or lacks its film, history or gauge.
+            MissingExtraError: If the extra `render` is missing for one of them.
+        """
+        if isinstance(blast, Blast):
+            return
+        for option, value in (
+            ("--film-height", self.film_height_m),
+            ("--film-section", self.film_section),
+        ):
+            if value is not None and self.film is None:
+                raise BlastEnvError(f"{option} is for --film: no film is to be written")
+        if self.heat_map is not None:
+            with import_extra("render", "pictures and films"):
+                from blast_env.plots.gas import kind_of
+            kind_of(self.quantity or "impulse")
+        self._section()
+        names = [each.name for each in blast.site.gauges]
+        if self.history is None:
+            if self.gauge is not None:
+                raise BlastEnvError("--gauge is for --history: no history is to be drawn")
+        elif not names:
+            raise BlastEnvError(
+                f"--history: {blast.scenario.name} has no gauges ([[gauges]]), and gas dynamics "
+                "keeps the load over time at gauges only"
+            )
+        elif self.gauge is not None and self.gauge not in names:
+            raise UnknownNameError("gauge", self.gauge, names)
+
+    def run(self, blasts: Sequence[Any], progress: Tell) -> tuple[Any, ...]:
+        """Run one or two blasts by one engine, and write their film; return their results.
+
+        Args:
+            blasts: The blasts, from left to right.
+            progress: Called with the finished share.
+        """
+        *beside, blast = blasts
+        bare = beside[0] if beside else None
+        is_gas = not isinstance(blast, Blast)
+        if self.film is None:
+            recorders = (self._recorders(),) if is_gas else ()
+            count = len(blasts)
+            return tuple(
+                each.run(share_of(progress, number, count), *recorders)
+                for number, each in enumerate(blasts)
+            )
+        # Here, because films need the extra `render`.
+        if is_gas:
+            from blast_env.plots.pressure_film import PLAN_HEIGHT_M, write_pressure_film
+
+            return write_pressure_film(
+                blast,
+                self.film,
+                beside=bare,
+                height_m=PLAN_HEIGHT_M if self.film_height_m is None else self.film_height_m,
+                section=self._section(),
+                further=self._recorders(),
+                progress=progress,
+            )
+        from blast_env.plots.film import write_film
+
+        return write_film(blast, self.film, beside=bare, progress=progress)
+
+    def draw(self, results: Sequence[Any]) -> list[Path]:
+        """Draw the pictures of the results of `run`; return their files.
+
+        Pictures of gas dynamics have two blasts side by side. Those of particles go into files of
+        their own, that of the first blast with `_without` at the end of its name.
+        """
+        every = (self.heat_map, self.history, self.scheme, self.velocities)
+        if not any((*every, self.impulse_map, self.peak_map, self.risk_map)):
+            return []
+        if isinstance(results[-1], BlastResult):
+            return self._draw_particles(results)
+        return self._draw_gas(*reversed(results))
+
+    def _draw_particles(self, results: Sequence[BlastResult]) -> list[Path]:
+        # Here, because pictures need the extra `render`.
+        from blast_env.plots import figures
+
+        blast, written = results[-1].blast, []
+        for number, each in enumerate(reversed(results)):
+            if self.heat_map is not None:
+                figure = figures.heat_map(each, scale=figures.common_scale(results))
+                written.append(figures.save_figure(figure, _named(self.heat_map, number)))
+            if self.history is not None:
+                figure = figures.impulse_over_time(each)
+                written.append(figures.save_figure(figure, _named(self.history, number)))
+        if self.scheme is not None:
+            written.append(figures.save_figure(figures.model_scheme(blast.scene), self.scheme))
+        if self.velocities is not None:
+            figure = figures.initial_velocities(blast.scenario.parameters)
+            written.append(figures.save_figure(figure, self.velocities))
+        return written
+
+    def _draw_gas(self, result: "GasResult", bare: "GasResult | None" = None) -> list[Path]:
+        # Here, because pictures need the extra `render`.
+        from blast_env.plots import gas
+        from blast_env.plots.figures import save_figure
+        from blast_env.plots.ground_map import ground_map, threshold_map
+
+        kind = gas.kind_of(self.quantity or "impulse")
+        gauge = self.gauge or next((each.name for each in result.run.site.gauges), "")
+        history = partial(gas.gauge_history, result, gauge, free_field=True, beside=bare)
+        pictures = (
+            (self.heat_map, partial(gas.facades, result, quantity=kind, beside=bare)),
+            (self.history, history),
+            (self.impulse_map, partial(ground_map, result, "impulse", bare)),
+            (self.peak_map, partial(ground_map, result, "peak", bare)),
+            (self.risk_map, partial(threshold_map, result, bare)),
+        )
+        return [save_figure(draw(), path) for path, draw in pictures if path is not None]
+
+    def _recorders(self) -> "Recorders":
+        """Return the recorders of the ground, if a map of it is wanted."""
+        if not any((self.impulse_map, self.peak_map, self.risk_map)):
+            return lambda _: ()
+        from blast_env.plots.ground_map import ground_recorders
+
+        return ground_recorders
+
+    def _section(self) -> "VerticalSection | None":
+        """Return the section of the film.
+
+        Raises:
+            BlastEnvError: If it is no section.
+        """
+        if self.film_section is None:
+            return None
+        with import_extra("render", "pictures and films"):
+            from blast_env.plots.pressure_frames import VerticalSection
+
+        axis, _, number = self.film_section.partition("=")
+        with suppress(BlastEnvError):
+            at_m = plain_number("--film-section", number)
+            if axis in ("x", "y"):
+                return VerticalSection("x" if axis == "x" else "y", at_m)
+        raise BlastEnvError(
+            f"--film-section is {self.film_section!r}, must be x=M or y=M, e.g. x=12.5"
+        )
+
+
+def _named(path: Path, number: int) -> Path:
+    """Return the path of a picture, that of the site without a barrier beside it."""
+    return path.with_name(f"{path.stem}_without{path.suffix}") if number else path
