@@ -1,17 +1,19 @@
 """`blast-env calibrate`: a free-field study, its three laws, and a stored calibration."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
-from blast_env.cli.command import FOLDER, option
-from blast_env.cli.options import ClusterOptions, ProcessOptions, running_on
+import typer
+
+from blast_env.cli.command import writes
+from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, running_on
 from blast_env.cli.output import (
     ResultTable,
     print_line,
     print_written,
     progress_bar,
     result_console,
+    resumable,
     save_pictures,
 )
 from blast_env.errors import BlastEnvError
@@ -33,93 +35,81 @@ if TYPE_CHECKING:  # takes a third of a second to import
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
 Burst = Literal["hemispherical", "spherical"]
+_ENGINES: Final = f"{' or '.join(CALIBRATED_ENGINES)}."
 
 
-@dataclass(frozen=True, kw_only=True)
-class CalibrateCommand(ProcessOptions, ClusterOptions):
+def calibrate(
+    name: str = typer.Option(help="Name of the calibration and of its files."),
+    reference: ReferenceName = typer.Option(
+        help="paper_ufc, or Kingery-Bulmash: reflected_ or incident_impulse.", metavar="REFERENCE"
+    ),
+    distances: str = typer.Option(
+        "15,30,45,60,75,90,105,120",
+        help="Distances from charge to facade, m, separated by commas.",
+    ),
+    seeds: int = typer.Option(16, help="Blasts at each distance.", min=2),
+    first_seed: int = typer.Option(1000, help="First seed.", min=0),
+    scenario: str = typer.Option(
+        "free_field", help="A scenario with one point charge and one structure."
+    ),
+    preset: str | None = typer.Option(None, help="Parameters of this name."),
+    engine: str = typer.Option("pymunk", help=_ENGINES),
+    law: LawName = typer.Option(
+        "power", help="The law to store: proportional, linear or power.", metavar="LAW"
+    ),
+    simulated: SimulatedQuantity = typer.Option(
+        "impulse",
+        help="Convert impulse (m|v|), or transferred_impulse (momentum really transferred).",
+        metavar="QUANTITY",
+    ),
+    burst: Burst = typer.Option(
+        "hemispherical", help="For Kingery-Bulmash: hemispherical or spherical.", metavar="BURST"
+    ),
+    tnt_kg: TntOption = None,
+    tnt_range: str | None = typer.Option(
+        None, help="LOW,HIGH: masses, kg, for which the law shall hold by scaling."
+    ),
+    out: Path = typer.Option(
+        Path("out/calibration"), help="Folder for all files.", callback=writes()
+    ),
+    processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
+) -> None:
     """Run blasts at many distances, fit the three laws, and store one as a calibration.
 
     Finished blasts are stored in NAME.ENGINE.runs.sqlite: after an interruption, the same command
     resumes from there.
     """
+    # Here, because pandas and SciPy take a third of a second to import.
+    from blast_env.evaluation.free_field import FreeFieldStudy
+    from blast_env.evaluation.free_field import calibrate as fit_laws
 
-    name: str = option(..., "Name of the calibration and of its files.")
-    reference: ReferenceName = option(
-        ...,
-        "paper_ufc, or Kingery-Bulmash: reflected_ or incident_impulse.",
-        metavar="REFERENCE",
-    )
-    distances: str = option(
-        "15,30,45,60,75,90,105,120", "Distances from charge to facade, m, separated by commas."
-    )
-    seeds: int = option(16, "Blasts at each distance.", min=2)
-    first_seed: int = option(1000, "First seed.", min=0)
-    scenario: str = option("free_field", "A scenario with one point charge and one structure.")
-    preset: str | None = option(None, "Parameters of this name.")
-    engine: str = option("pymunk", f"{' or '.join(CALIBRATED_ENGINES)}.")
-    law: LawName = option(
-        "power", "The law to store: proportional, linear or power.", metavar="LAW"
-    )
-    simulated: SimulatedQuantity = option(
-        "impulse",
-        "Convert impulse (m|v|), or transferred_impulse (momentum really transferred).",
-        metavar="QUANTITY",
-    )
-    burst: Burst = option(
-        "hemispherical", "For Kingery-Bulmash: hemispherical or spherical.", metavar="BURST"
-    )
-    tnt_kg: float | None = option(
-        None, "Mass of the charge, kg TNT, instead of the scenario's.", metavar="KG"
-    )
-    tnt_range: str | None = option(
-        None, "LOW,HIGH: masses, kg, for which the law shall hold by scaling."
-    )
-    out: Path = option(Path("out/calibration"), "Folder for all files.", writes=FOLDER)
-
-    def how_to_resume(self) -> str:
-        """Return the way to resume after Ctrl-C."""
-        return "the same command resumes after the finished blasts"
-
-    @property
-    def stem(self) -> str:
-        """Path of all files without their suffix."""
-        return str(self.out / f"{self.name}.{self.engine}")
-
-    def __call__(self) -> None:
-        """Run the study, write its files and print its tables."""
-        # Here, because pandas and SciPy take a third of a second to import.
-        from blast_env.evaluation.free_field import FreeFieldStudy
-        from blast_env.evaluation.free_field import calibrate as fit_laws
-
-        distances_m = _parse_numbers("--distances", self.distances)
-        tnt_range_kg = _parse_range(self.tnt_range)
-        make_folder(self.out)
-        engine = find_engine(self.engine)
-        seeds = tuple(range(self.first_seed, self.first_seed + self.seeds))
-        study = FreeFieldStudy(self._scenario(), distances_m, seeds, engine.name)
-        reference = _reference(self.reference, study, self.burst)
-        kept = Path(f"{self.stem}.runs.sqlite")
-        count = len(seeds) * len(distances_m)
-        with running_on(self.cluster), progress_bar(f"{count} blasts") as progress:
-            runs = study.run(self.processes, kept, progress)
-        report = fit_laws(study, runs, reference, self.simulated)
-        stored = report.calibration(self.name, self.law)
-        stored = stored.model_copy(update={"tnt_range_kg": tnt_range_kg})
-        written = _write(report, stored, self.stem)
-        print_line(engine.describe([study.scenario]))
-        _print(report, stored)
-        print_written([*written, kept])
-
-    def _scenario(self) -> Scenario:
-        scenario = load_scenario(self.scenario)
-        if self.preset is not None:
-            scenario = scenario.with_simulation(self.preset)
-        if self.tnt_kg is None:
-            return scenario
-        document = scenario.model_dump()
+    distances_m = _parse_numbers("--distances", distances)
+    tnt_range_kg = _parse_range(tnt_range)
+    make_folder(out)
+    used = find_engine(engine)
+    site = load_scenario(scenario).with_simulation(preset)
+    if tnt_kg is not None:
+        document = site.model_dump()
         for source in document["charge"]:
-            source["tnt_kg"] = self.tnt_kg
-        return Scenario.from_document(document, f"{self.scenario} with --tnt-kg")
+            source["tnt_kg"] = tnt_kg
+        site = Scenario.from_document(document, f"{scenario} with --tnt-kg")
+    study = FreeFieldStudy(
+        site, distances_m, tuple(range(first_seed, first_seed + seeds)), used.name
+    )
+    compared = _reference(reference, study, burst)
+    stem = str(out / f"{name}.{engine}")
+    kept = Path(f"{stem}.runs.sqlite")
+    label = f"{seeds * len(distances_m)} blasts"
+    resume = "the same command resumes after the finished blasts"
+    with resumable(resume), running_on(cluster), progress_bar(label) as progress:
+        runs = study.run(processes, kept, progress)
+    report = fit_laws(study, runs, compared, simulated)
+    stored = report.calibration(name, law).model_copy(update={"tnt_range_kg": tnt_range_kg})
+    written = _write(report, stored, stem)
+    print_line(used.describe([study.scenario]))
+    _print(report, stored)
+    print_written([*written, kept])
 
 
 def _parse_numbers(option: str, text: str) -> tuple[float, ...]:

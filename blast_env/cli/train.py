@@ -1,18 +1,21 @@
 """`blast-env train`: an agent that proposes layouts."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import typer
 
-from blast_env.cli.command import FOLDER, option, options_of
+from blast_env.cli.command import writes
 from blast_env.cli.options import (
     BY_SITE,
-    CELL_HELP,
-    CELLS_HELP,
     ENGINE_HELP,
-    ClusterOptions,
+    CellOption,
+    CellsOption,
+    ClusterAddress,
+    refuse_given,
     running_on,
 )
 from blast_env.cli.output import (
@@ -20,6 +23,7 @@ from blast_env.cli.output import (
     print_line,
     print_written,
     progress_bar,
+    resumable,
     save_layout_picture,
 )
 from blast_env.envs.strategies import scenario_source
@@ -36,122 +40,148 @@ _DEFAULT_ALGORITHM: Final = "maskable_ppo"
 _POLICIES: Final = {"features": "MlpPolicy", "image": "CnnPolicy"}
 """Policies of the observations other than planes, for which the YAML files hold policies."""
 _DEFAULT_SCENARIO: Final = "courtyard"
+_ENGINE_HELP: Final = f"{ENGINE_HELP} surrogate guesses them."
 _WITH_RESUME: Final = ("resume", "scenario", "cluster")
 """Options allowed with `--resume`; the run folder fixes the others."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrainCommand(ClusterOptions):
-    """Train an agent that proposes layouts, or resume an interrupted training."""
-
-    algo: str | None = option(
-        None, "ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM
-    )
-    scenario: str | None = option(
+def train(
+    context: typer.Context,
+    algo: str | None = typer.Option(
+        None, help="ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM
+    ),
+    scenario: str | None = typer.Option(
         None,
-        "Bundled name, a scenario file, or 'sites' for generated ones.",
+        help="Bundled name, a scenario file, or 'sites' for generated ones.",
         show_default=_DEFAULT_SCENARIO,
-    )
-    steps: int | None = option(
+    ),
+    steps: int | None = typer.Option(
         None,
-        "Steps: one module each (self_labelling: one threat and its layout each); else as in the "
-        "YAML file.",
+        help="Steps: one module each (self_labelling: one threat and its layout each); else as in "
+        "the YAML file.",
         min=1,
-    )
-    seed: int | None = option(None, "Decides everything.", min=0, show_default="0")
-    envs: int | None = option(
+    ),
+    seed: int | None = typer.Option(None, help="Decides everything.", min=0, show_default="0"),
+    envs: int | None = typer.Option(
         None,
-        "Parallel environments (self_labelling: worker processes); else as in the YAML file.",
+        help="Parallel environments (self_labelling: worker processes); else as in the YAML file.",
         min=1,
-    )
-    run: Path | None = option(None, "Folder for the run; new or empty.", writes=FOLDER)
-    threat: str | None = option(
-        None, "visible or hidden: whether the agent sees the charge.", show_default="visible"
-    )
-    engine: str | None = option(
-        None, f"{ENGINE_HELP} surrogate guesses them.", show_default=BY_SITE
-    )
-    cell_m: float | None = option(None, CELL_HELP)
-    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
-    observation: str | None = option(
+    ),
+    run: Path | None = typer.Option(
+        None, help="Folder for the run; new or empty.", callback=writes()
+    ),
+    threat: str | None = typer.Option(
         None,
-        "Observation: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
+        help="visible or hidden: whether the agent sees the charge.",
+        show_default="visible",
+    ),
+    engine: str | None = typer.Option(None, help=_ENGINE_HELP, show_default=BY_SITE),
+    cell_m: CellOption = None,
+    cells: CellsOption = None,
+    observation: str | None = typer.Option(
+        None,
+        help="Observation: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
         "MlpPolicy).",
         show_default="grid",
-    )
-    changes: tuple[str, ...] = option(
-        (), "key=value, e.g. ent_coef=0.01; may be given again.", flag="--set"
-    )
-    start_from: Path | None = option(
-        None, "Run folder with the initial weights (its best), for a scenario of this size."
-    )
-    resume: Path | None = option(
-        None, "Resume the run of this folder; no other option but --cluster."
-    )
+    ),
+    changes: list[str] = typer.Option(
+        [], "--set", help="key=value, e.g. ent_coef=0.01; may be given again."
+    ),
+    start_from: Path | None = typer.Option(
+        None, help="Run folder with the initial weights (its best), for a scenario of this size."
+    ),
+    resume: Path | None = typer.Option(
+        None, help="Resume the run of this folder; no other option but --cluster."
+    ),
+    cluster: ClusterAddress = None,
+) -> None:
+    """Train an agent that proposes layouts, or resume an interrupted training."""
+    folder = resume or run
+    if folder is None:
+        raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
+    with running_on(cluster), resumable(partial(_how_to_resume, folder)):
+        if resume is not None:
+            fixed = {each.name or "" for each in context.command.params} - {*_WITH_RESUME}
+            refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")
+            result = _go_on(resume, scenario)
+        else:
+            given = {
+                "steps": steps,
+                "seed": seed,
+                "threat": threat,
+                "engine": engine,
+                "observation": observation,
+                "cell_m": cell_m,
+                "cells": cells,
+            }
+            known = {name: value for name, value in given.items() if value is not None}
+            known["start_from"] = None if start_from is None else str(start_from)
+            result = _train(
+                folder,
+                algo or _DEFAULT_ALGORITHM,
+                scenario or _DEFAULT_SCENARIO,
+                known,
+                changes,
+                envs,
+            )
+    _print_result(result)
 
-    def how_to_resume(self) -> str:
-        """Return the way to resume an interrupted training."""
-        folder = self.resume or self.run
-        if folder is None:
-            return ""
-        # Here, because torch takes seconds to start, and is an extra.
-        from blast_agents.training.run_folder import RunFolder
 
-        if RunFolder(folder).is_run:
-            return f"blast-env train --resume {folder} continues the run"
-        return "the run had not begun: the same command starts it again"
+def _how_to_resume(folder: Path) -> str:
+    """Return the way to resume an interrupted training."""
+    # Here, because torch takes seconds to start, and is an extra.
+    from blast_agents.training.run_folder import RunFolder
 
-    def __call__(self) -> None:
-        """Train, and print the result."""
-        with running_on(self.cluster):
-            if self.resume is not None:
-                result = self._go_on(self.resume)
-            elif self.run is None:
-                raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
-            else:
-                result = self._train(self.run)
-        _print_result(result)
+    if RunFolder(folder).is_run:
+        return f"blast-env train --resume {folder} continues the run"
+    return "the run had not begun: the same command starts it again"
 
-    def _go_on(self, folder: Path) -> "TrainingResult":
-        # Here, because torch takes seconds to start, and is an extra.
-        with import_extra("agents,render", "training"):
-            from blast_agents.training import resume
 
-        for each in options_of(type(self)):
-            if each.name not in _WITH_RESUME and getattr(self, each.name) != each.default:
-                raise BlastEnvError(
-                    f"{each.flag} cannot be changed with --resume: the run folder fixes it"
-                )
-        with progress_bar(f"training {folder}") as progress:
-            return resume(folder, self.scenario, progress)
+def _go_on(folder: Path, scenario: str | None) -> "TrainingResult":
+    # Here, because torch takes seconds to start, and is an extra.
+    with import_extra("agents,render", "training"):
+        from blast_agents.training import resume
 
-    def _train(self, run: Path) -> "TrainingResult":
-        # Here, because torch takes seconds to start, and is an extra.
-        with import_extra("agents,render", "training"):
-            from blast_agents.training import load_hyperparameters, train
-            from blast_agents.training.environments import environment_id
-            from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
-            from blast_agents.training.run_folder import SETTING_KEYS, settings_from
+    with progress_bar(f"training {folder}") as progress:
+        return resume(folder, scenario, progress)
 
-        algorithm = self.algo or _DEFAULT_ALGORITHM
-        scenario = self.scenario or _DEFAULT_SCENARIO
-        changes = parse_options(self.changes, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
-        if self.observation in _POLICIES:
-            changes.setdefault("policy", _POLICIES[self.observation])
-        names = ("steps", "seed", "threat", "engine", "observation", "cell_m", "cells")
-        given = {name: getattr(self, name) for name in names}
-        values = {name: value for name, value in given.items() if value is not None}
-        site = scenario_source(scenario).representative
-        values.setdefault("engine", default_engine(site, particles="event"))
-        values["start_from"] = None if self.start_from is None else str(self.start_from)
-        values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
-        hyperparameters = load_hyperparameters(
-            algorithm, environment_id(scenario), changes, self.envs
-        )
-        fixed = {"steps": hyperparameters.n_timesteps, "algorithm": algorithm, "scenario": scenario}
-        settings = settings_from(fixed | values)
-        with progress_bar(f"training {run}") as progress:
-            return train(settings, hyperparameters, run, progress)
+
+def _train(
+    run: Path,
+    algorithm: str,
+    scenario: str,
+    given: Mapping[str, Any],
+    set_to: Sequence[str],
+    envs: int | None,
+) -> "TrainingResult":
+    """Train in a new run folder.
+
+    Args:
+        run: The folder.
+        algorithm: Name of the algorithm.
+        scenario: The scenario, or the name of a family of sites.
+        given: Settings of the run other than the defaults.
+        set_to: Changes of hyperparameters and settings, `key=value`.
+        envs: Number of environments; `None` for the default.
+    """
+    # Here, because torch takes seconds to start, and is an extra.
+    with import_extra("agents,render", "training"):
+        from blast_agents.training import load_hyperparameters, train
+        from blast_agents.training.environments import environment_id
+        from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
+        from blast_agents.training.run_folder import SETTING_KEYS, settings_from
+
+    changes = parse_options(set_to, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
+    if given.get("observation") in _POLICIES:
+        changes.setdefault("policy", _POLICIES[given["observation"]])
+    site = scenario_source(scenario).representative
+    values = {"engine": default_engine(site, particles="event"), **given}
+    values |= {name: changes.pop(name) for name in SETTING_KEYS if name in changes}
+    hyperparameters = load_hyperparameters(algorithm, environment_id(scenario), changes, envs)
+    fixed = {"steps": hyperparameters.n_timesteps, "algorithm": algorithm, "scenario": scenario}
+    settings = settings_from(fixed | values)
+    with progress_bar(f"training {run}") as progress:
+        return train(settings, hyperparameters, run, progress)
 
 
 def _print_result(result: "TrainingResult") -> None:
