@@ -295,7 +295,7 @@ def _print_gas(result: "GasResult") -> None:
         for each in result.buildings.to_dict("records")
     ]
     _print_loads(result, charge, f"{charge.height_m:g} m high", _GAS_HEADERS, rows)
-    rows = [
+    gauges = [
         (
             *(each["name"], f"{each['x_m']:.2f}", f"{each['y_m']:.2f}", f"{each['z_m']:.2f}"),
             f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
@@ -304,8 +304,8 @@ def _print_gas(result: "GasResult") -> None:
         )
         for each in result.gauges.to_dict("records")
     ]
-    if rows:
-        print_table("gauges", _GAUGES, rows)
+    if gauges:
+        print_table("gauges", _GAUGES, gauges)
     print_pieces(result.pieces, "stability of the barrier")
     notes = dict.fromkeys(note for each in scaled.values() for note in each.get("notes", ()))
     texts = [f"outside the validated range (marked ~): {note}" for note in notes]

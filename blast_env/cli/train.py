@@ -114,7 +114,9 @@ def train(
                 "cell_m": cell_m,
                 "cells": cells,
             }
-            known = {name: value for name, value in given.items() if value is not None}
+            known: dict[str, Any] = {
+                name: value for name, value in given.items() if value is not None
+            }
             known["start_from"] = None if start_from is None else str(start_from)
             result = _train(
                 folder,
