@@ -161,6 +161,10 @@ class BlastEvaluator:
         """
         self._keep(self.key(layout, threat), loads)
 
+    def knows(self, layout: Sequence[Element], threat: LoadCase) -> bool:
+        """Return whether the loads of a blast are stored."""
+        return self._known(self.key(layout, threat)) is not None
+
     def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
         cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))

@@ -9,7 +9,6 @@ import numpy as np
 
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.consequences import Consequences
-from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.plots.facade import damage_view, facade_picture
 from blast_env.plots.figures import png_of
@@ -25,8 +24,8 @@ from blast_env.plots.plan import (
     vehicle_features,
     without,
 )
-from blast_env.plots.pressure_film import record_planes, scale_end_kpa
-from blast_env.plots.pressure_frames import PressurePainter, default_section
+from blast_env.plots.pressure_film import scale_end_kpa
+from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 from blast_env.plots.site_picture import draw_north, draw_scale
 from blast_env.plots.site_plan import (
@@ -40,7 +39,6 @@ from blast_env.plots.site_plan import (
 from blast_env.plots.style import count_of, render_extra, unit_interval
 from blast_env.report.loads import MeasuredBlast, ReportedBuilding, UnitSystem
 from blast_env.report.outcomes import FrontPoint, ItemWorth, Outcome
-from blast_env.runner import Tell, share_of
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.site.worst_places import nearest_point_m
@@ -59,7 +57,6 @@ _DOTS_PER_IN: Final = 120
 _WIDTH_IN: Final = 9.0
 _HEIGHTS_IN: Final = (3.6, 8.5)
 _STILL_PX: Final = 1200
-_STILL_HEIGHT_M: Final = 1.5
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
 _ZONE: Final = (Kinds.BUILD_ZONE, Kinds.KEEP_OUT, Kinds.COST_AREA, Kinds.GATE, Kinds.ACCESS_WAY)
 
@@ -229,20 +226,8 @@ def risk_picture(bare: MeasuredBlast, walled: MeasuredBlast) -> Picture:
     return "risk to windows and eardrums, for the choice of assembly points", png(figure)
 
 
-def film_stills(
-    bare: GasBlast,
-    walled: GasBlast,
-    moments_s: Sequence[float],
-    progress: Tell,
-) -> tuple[Picture, ...]:
+def film_stills(shots: Sequence[PressureShot], moments_s: Sequence[float]) -> tuple[Picture, ...]:
     """Return stills of two blasts side by side, in plan and in a section."""
-    if not moments_s:
-        return ()
-    section = default_section(walled.site)
-    shots = []
-    for number, blast in enumerate((bare, walled)):
-        height_m = min(_STILL_HEIGHT_M, 0.5 * blast.site.air_height_m)
-        shots.append(record_planes(blast, height_m, section, share_of(progress, number, 2)))
     painter = PressurePainter(shots, scale_end_kpa([each.result for each in shots]), _STILL_PX)
     pictures = []
     for moment_s in moments_s:

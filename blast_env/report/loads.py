@@ -15,9 +15,12 @@ from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.contract import counted_parts
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
 from blast_env.evaluation.engines.gas_tables import means_by_wall
+from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
-from blast_env.gas.solver import Gas
+from blast_env.gas.solver import Gas, Recorder
 from blast_env.geometry import Rectangle
+from blast_env.plots.pressure_film import record_planes
+from blast_env.plots.pressure_frames import PressureShot, VerticalSection
 from blast_env.report.peaks import CountedPeak, counted_peak
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.scene import WALLS, BlastSite, WallName
@@ -220,11 +223,13 @@ class MeasuredBlast:
         result: The blast.
         histories: Mean overpressures on walls.
         targets: The buildings.
+        shot: Its film, if it was recorded.
     """
 
     result: GasResult
     histories: WallHistories
     targets: tuple[ReportedBuilding, ...]
+    shot: PressureShot | None = None
 
     @cached_property
     def loads(self) -> dict[str, TargetLoad]:
@@ -291,6 +296,7 @@ class MeasuredBlast:
         return first_phase_s(self.histories.time_s, pressure)
 
 
+_STILL_HEIGHT_M: Final = 1.5
 _NO_PHASE: Final = float("nan")
 
 
@@ -322,10 +328,24 @@ def measure(
     blast: GasBlast,
     targets: Sequence[ReportedBuilding],
     progress: Callable[[float], None] | None = None,
+    section: VerticalSection | None = None,
 ) -> MeasuredBlast:
-    """Run a blast and return the loads on buildings."""
+    """Run a blast and return the loads on buildings.
+
+    Args:
+        blast: The blast.
+        targets: The buildings.
+        progress: Called periodically with the elapsed share of the time limit.
+        section: Section of its film in plan and section; without one, no film is recorded.
+    """
     histories = WallHistories(targets, blast.site)
     from blast_env.gas.probes import GroundMap  # Numba takes half a second to import
 
-    result = blast.run(progress, lambda grid: (histories, GroundMap(grid)))
-    return MeasuredBlast(result, histories, tuple(targets))
+    def recorders(grid: GasGrid) -> tuple[Recorder, ...]:
+        return (histories, GroundMap(grid))
+
+    if section is None:
+        return MeasuredBlast(blast.run(progress, recorders), histories, tuple(targets))
+    height_m = min(_STILL_HEIGHT_M, 0.5 * blast.site.air_height_m)
+    shot = record_planes(blast, height_m, section, progress or (lambda _: None), recorders)
+    return MeasuredBlast(shot.result, histories, tuple(targets), shot)

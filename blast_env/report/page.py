@@ -180,7 +180,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "facade_pictures": [
             (each.name, picture)
             for each in study.threats[:1]
-            for picture in study.pictures[each.name]
+            for picture in study.pictures.get(each.name, ())
             if picture[0].endswith("facades unfolded")
         ],
         "uncertainty": study.uncertainty,

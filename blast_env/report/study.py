@@ -1,6 +1,6 @@
 """The study behind a report: its blasts and their results."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, Piece, layout_text, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import Placement, check_layout
+from blast_env.plots.pressure_frames import VerticalSection, default_section
 from blast_env.report.details import ReportDetails
 from blast_env.report.figures import (
     Picture,
@@ -33,6 +34,7 @@ from blast_env.report.loads import (
     UNITS,
     MeasuredBlast,
     ReportedBuilding,
+    TargetLoad,
     UnitSystem,
     measure,
     targets_of,
@@ -53,6 +55,7 @@ from blast_env.report.threats import (
     other_places,
 )
 from blast_env.response.buildings import LevelOfProtection
+from blast_env.runner import Tell, as_completed
 from blast_env.site import AnyCharge, Scenario
 from blast_env.statistics import reductions
 
@@ -60,9 +63,8 @@ MOST_THREATS: Final = 6
 MOST_FRONT: Final = 30
 _MASSES: Final = (0.5, 2.0)
 _BARE, _WALLED = "without a barrier", "with the layout"
-_FILM, _MASSES_PART, _ITEMS, _PLACES, _FRONT = (
-    *("film", "other masses", "without each item", "other places", "front"),
-)
+_MASSES_PART, _ITEMS = "other masses", "without each item"
+_PLACES, _FRONT = "other places", "front"
 
 
 def final_cells(scenario: Scenario) -> tuple[Cells, Cells]:
@@ -170,7 +172,8 @@ class Study:
         bare: Response of the buildings without the layout, with the finer cells.
         walled: Response of the buildings and of the barrier with it.
         walled_coarse: The same with the coarser cells.
-        pictures: Facades and histories, by threat.
+        pictures: Facades and histories with the finer cells, by threat; none if it was stopped
+            before those.
         stills: Moments of the film of the first threat.
         items: The worth of each module or piece, the most valuable one first.
         masses: The threats with other masses, by the name of the threat.
@@ -282,7 +285,6 @@ def run_study(
     front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, asked, progress)
-    stills: tuple[Picture, ...] = ()
     masses: dict[str, tuple[Outcome, ...]] = {}
     left_out: tuple[str, ...] = ()
     items: tuple[ItemWorth, ...] = ()
@@ -293,8 +295,6 @@ def run_study(
         if not asked:
             runs.choose_threats()
         runs.run_threats()
-        part = _FILM
-        stills = runs.film() if options.stills else ()
         part = _MASSES_PART
         masses, left_out = runs.other_masses()
         part = _ITEMS
@@ -320,8 +320,8 @@ def run_study(
         bare=runs.consequences(fine, walled=False),
         walled=runs.consequences(fine, walled=True),
         walled_coarse=runs.consequences(coarse, walled=True),
-        pictures=runs.pictures[fine],
-        stills=stills,
+        pictures=runs.pictures,
+        stills=runs.stills,
         items=items,
         masses=masses,
         places=places,
@@ -360,13 +360,13 @@ def blasts_of(
     first = [] if options.charges else places  # the candidates for the threats
     known = {(each, charge) for each in both for charge in (*first, *own)}
     parts = [PlannedPart(_PLACES, coarse, tuple(first * len(both)))] if first else []
+    last = options.sizes[-1]
     parts += [
-        PlannedPart(_label(threat, words, size), size, (threat.charge,), is_drawn=True)
-        for size in options.sizes
+        PlannedPart(_label(threat, words, size), size, (threat.charge,), size == last)
+        for size in (options.sizes[-1:] if first else options.sizes)
         for threat in threats
         for words in (_BARE, _WALLED)
     ]
-    parts.append(PlannedPart(_FILM, coarse, (own[0],) * 2 if options.stills else ()))
 
     def asked(label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]) -> None:
         pairs = dict.fromkeys((each, charge) for each in layouts for charge in charges)
@@ -406,8 +406,37 @@ def threats_of(scenario: Scenario, options: StudyOptions) -> tuple[LoadCase, ...
     return chief_threats(places, lambda _: Severity(), options.most_threats)
 
 
+class _Blast(NamedTuple):
+    """The numbers of a report from a blast, without its pressures and pictures.
+
+    Attributes:
+        on_targets: Load on each building with a wall in the air, by name.
+        found: Response of buildings and barrier.
+        loads: Loads on the structures.
+        notes: Reasons to distrust the loads.
+        digest: Digest of the blast.
+    """
+
+    on_targets: dict[str, TargetLoad]
+    found: Consequences
+    loads: BlastLoads
+    notes: tuple[str, ...]
+    digest: str
+
+    @classmethod
+    def of(cls, measured: MeasuredBlast) -> "_Blast":
+        result = measured.result
+        found = consequences_of(result.blast.scenario, result, result.run.site.charge)
+        return cls(measured.loads, found, result.loads(), measured.notes, result.digest)
+
+
+def _measured(work: tuple[GasBlast, tuple[ReportedBuilding, ...]]) -> _Blast:
+    """Run a blast, in this process or a worker."""
+    return _Blast.of(measure(*work))
+
+
 class Runs:
-    """The blasts of a report, one part after the other."""
+    """The blasts of a report, one part after the other; each is run once."""
 
     def __init__(
         self,
@@ -421,9 +450,11 @@ class Runs:
         self.scenario, self.layout, self.options = scenario, layout, options
         self.targets, self.threats, self.progress = targets, threats, progress
         self.pairs: list[LoadPair] = []
-        self.pictures: dict[Cells, dict[str, tuple[Picture, ...]]] = {}
+        self.pictures: dict[str, tuple[Picture, ...]] = {}
+        self.stills: tuple[Picture, ...] = ()
         self.notes: list[str] = []
         self.digests: list[tuple[str, str]] = []
+        self._ahead: dict[tuple[Layout, LoadCase], _Blast] = {}
         self._found: dict[tuple[Cells, bool], list[Consequences]] = {}
         self._evaluators = {
             size: BlastEvaluator(scenario, GasEngine.with_cells(size), cache=options.cache)
@@ -436,20 +467,32 @@ class Runs:
 
         The coarser ones come first: they suffice for a report if the rest is stopped.
         """
-        for size in self.options.sizes:
+        *coarser, fine = self.options.sizes
+        for size in coarser:
             for threat in self.threats:
-                both = [self._measured(threat, size, layout) for layout in ((), self.layout)]
-                self.pairs += self._pairs(threat, size, both[0], both[1])
-                for is_walled, measured in enumerate(both):
-                    charge = threat.charge_against(self.scenario, self.layout if is_walled else ())
-                    found = consequences_of(self.scenario, measured.result, charge)
-                    self._found.setdefault((size, bool(is_walled)), []).append(found)
-                # Drawn now, because only these two results are in memory at once.
-                self.pictures.setdefault(size, {})[threat.name] = (
-                    *self._damage_pictures(threat.name, size),
-                    risk_picture(*both),
-                    *blast_pictures(both[0], both[1], self.options.units),
-                )
+                self._keep(threat, size, *(self._coarse(threat, each) for each in self._layouts))
+        for threat in self.threats:
+            shown = threat is self.threats[0] and self.options.stills > 0
+            section = None
+            if shown:
+                section = default_section(self._blast(threat, fine, self.layout).site)
+            both = [self._drawn(threat, fine, layout, section) for layout in self._layouts]
+            self._keep(threat, fine, *map(_Blast.of, both))
+            # Drawn now, because only these two results are in memory at once.
+            bare, walled = (self._found[fine, is_walled][-1] for is_walled in (False, True))
+            self.pictures[threat.name] = (
+                *damage_pictures(self.scenario, self.layout, bare, walled, threat.name),
+                risk_picture(*both),
+                *blast_pictures(both[0], both[1], self.options.units),
+            )
+            shots = [each.shot for each in both if each.shot is not None]
+            moments_s = self._moments_s() if shots else []
+            if moments_s:
+                self.stills = film_stills(shots, moments_s)
+
+    @property
+    def _layouts(self) -> tuple[Layout, Layout]:
+        return (), self.layout
 
     def options_of_what_is_done(self) -> StudyOptions:
         """Return the options of a report on the finished cells, perhaps the coarser ones alone.
@@ -457,51 +500,55 @@ class Runs:
         Raises:
             KeyboardInterrupt: If not even these are finished.
         """
+        count = len(self.threats)
         done = [
             size
             for size in self.options.cells
-            if self.threats and len(self.pictures.get(size, {})) == len(self.threats)
+            if count and len(self._found.get((size, True), ())) == count
         ]
         if not done:
             raise KeyboardInterrupt
+        if len(self.pictures) < count:
+            self.pictures.clear()
         return replace(self.options, cells=(done[0], done[-1]))
 
     def consequences(self, cells: Cells, *, walled: bool) -> Consequences:
         """Return the consequences of all threats on the given cells, without or with the layout."""
         return Consequences.together(self._found[cells, walled])
 
-    def _damage_pictures(self, threat: str, cells: Cells) -> tuple[Picture, ...]:
-        bare, walled = (self._found[cells, is_walled][-1] for is_walled in (False, True))
-        return damage_pictures(self.scenario, self.layout, bare, walled, threat)
+    def _blast(self, threat: LoadCase, cells: Cells, layout: Layout) -> GasBlast:
+        return GasBlast(self.scenario, layout, 0, GasEngine.with_cells(cells), threat.charge)
 
-    def _measured(self, threat: LoadCase, cells: Cells, layout: Layout) -> MeasuredBlast:
+    def _told(self, threat: LoadCase, cells: Cells, layout: Layout) -> Tell:
         label = _label(threat, _WALLED if layout else _BARE, cells)
-        engine = GasEngine.with_cells(cells)
-        blast = GasBlast(self.scenario, layout, 0, engine, threat.charge)
-        measured = measure(blast, self.targets, partial(self.progress, label))
-        self.notes += [f"{label}: {note}" for note in measured.notes]
-        self.digests.append((label, measured.result.digest))
-        loads = measured.result.loads()
-        self._evaluators[cells].keep(layout, threat, loads)
-        return measured
+        return partial(self.progress, label)
 
-    def _pairs(
-        self, threat: LoadCase, cells: Cells, bare: MeasuredBlast, walled: MeasuredBlast
-    ) -> Iterator[LoadPair]:
+    def _coarse(self, threat: LoadCase, layout: Layout) -> _Blast:
+        """Return a blast with the coarser cells, which may be among those run ahead."""
+        if (layout, threat) in self._ahead:
+            return self._ahead[layout, threat]
+        size = self.options.cells[0]
+        told = self._told(threat, size, layout)
+        return _Blast.of(measure(self._blast(threat, size, layout), self.targets, told))
+
+    def _drawn(
+        self, threat: LoadCase, cells: Cells, layout: Layout, section: VerticalSection | None
+    ) -> MeasuredBlast:
+        blast, told = self._blast(threat, cells, layout), self._told(threat, cells, layout)
+        return measure(blast, self.targets, told, section)
+
+    def _keep(self, threat: LoadCase, cells: Cells, bare: _Blast, walled: _Blast) -> None:
+        """Keep the numbers of both blasts of a threat."""
+        for layout, words, each in (((), _BARE, bare), (self.layout, _WALLED, walled)):
+            label = _label(threat, words, cells)
+            self.notes += [f"{label}: {note}" for note in each.notes]
+            self.digests.append((label, each.digest))
+            self._found.setdefault((cells, bool(layout)), []).append(each.found)
+            self._evaluators[cells].keep(layout, threat, each.loads)
         for target in self.targets:
-            if target.name in bare.loads and target.name in walled.loads:
-                loads = bare.loads[target.name], walled.loads[target.name]
-                yield LoadPair(target, threat, cells, *loads)
-
-    def film(self) -> tuple[Picture, ...]:
-        """Return stills of the first threat, without and with the layout."""
-        charge = self.threats[0].charge
-        blasts = [
-            GasBlast(self.scenario, layout, 0, self.options.coarse, charge)
-            for layout in ((), self.layout)
-        ]
-        moments_s = self._moments_s()
-        return film_stills(blasts[0], blasts[1], moments_s, partial(self.progress, _FILM))
+            if target.name in bare.on_targets and target.name in walled.on_targets:
+                loads = bare.on_targets[target.name], walled.on_targets[target.name]
+                self.pairs.append(LoadPair(target, threat, cells, *loads))
 
     def _moments_s(self) -> list[float]:
         """Return the times of the stills, s: around the arrival at a protected building."""
@@ -538,20 +585,39 @@ class Runs:
         return self._outcomes(_PLACES, places)
 
     def choose_threats(self) -> None:
-        """Choose the worst places as threats, by loads with the layout, as in the verdict."""
+        """Choose the worst places as threats, by loads with the layout, as in the verdict.
+
+        Their blasts with the coarser cells are kept for `run_threats`.
+        """
         places = other_places(self.scenario, self.options.places)
-        charges = [each.charge for each in places]
-        loads = self._blasts(_PLACES, ((), self.layout), charges)[len(places) :]
+        if len(self.options.sizes) > 1:
+            self._run_ahead(places)
+        loads = self._blasts(_PLACES, self._layouts, places)[len(places) :]
         objective = self.scenario.objective
-        found = dict(
-            zip(charges, (Severity.of_loads(each, objective) for each in loads), strict=True)
-        )
-        most = self.options.most_threats
-        self.threats = chief_threats(places, lambda each: found[each.charge], most)
+        severities = (Severity.of_loads(each, objective) for each in loads)
+        found = dict(zip(places, severities, strict=True))
+        self.threats = chief_threats(places, lambda each: found[each], self.options.most_threats)
+        self._ahead = {key: each for key, each in self._ahead.items() if key[1] in self.threats}
+
+    def _run_ahead(self, places: Sequence[LoadCase]) -> None:
+        """Run and measure the blasts at places that the store lacks."""
+        asked = [
+            (layout, place)
+            for layout in self._layouts
+            for place in places
+            if not self._evaluator.knows(layout, place)
+        ]
+        size = self.options.cells[0]
+        work = [(self._blast(place, size, layout), self.targets) for layout, place in asked]
+        for done, (index, blast) in enumerate(
+            as_completed(_measured, work, self.options.processes), start=1
+        ):
+            self._ahead[asked[index]] = blast
+            self._evaluator.keep(*asked[index], blast.loads)
+            self.progress(_PLACES, done / len(work))
 
     def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[Outcome, ...]:
-        layouts: tuple[Layout, ...] = ((), self.layout)
-        impulses = self._loads(label, layouts, [each.charge for each in charges])
+        impulses = self._loads(label, self._layouts, charges)
         return tuple(
             Outcome(each.name, each.why, float(bare), float(walled))
             for each, (bare, walled) in zip(charges, impulses.T, strict=True)
@@ -560,8 +626,8 @@ class Runs:
     def item_worths(self) -> tuple[ItemWorth, ...]:
         """Return the worth of every module or piece, by the impulse if it alone is left out."""
         pieces = standing(self.layout)
-        charges = [each.charge for each in self.threats]
-        impulses = self._loads(_ITEMS, ((), self.layout, *_fewer(self.layout)), charges)
+        layouts = ((), self.layout, *_fewer(self.layout))
+        impulses = self._loads(_ITEMS, layouts, self.threats)
         bare, whole, without = impulses[0], impulses[1], impulses[2:]
         worths = ((without - whole) / bare).mean(axis=1)
         items = [
@@ -578,8 +644,7 @@ class Runs:
         """Return layouts of a front with their reductions by gas dynamics, the cheapest first."""
         if not layouts:
             return ()
-        charges = [each.charge for each in self.threats]
-        impulses = self._loads(_FRONT, ((), *layouts), charges)
+        impulses = self._loads(_FRONT, ((), *layouts), self.threats)
         bare = np.broadcast_to(impulses[0], impulses[1:].shape)
         gone = reductions(impulses[1:], bare).mean(axis=1)
         points = [
@@ -589,18 +654,18 @@ class Runs:
         return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
 
     def _loads(
-        self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
+        self, label: str, layouts: Sequence[Layout], threats: Sequence[LoadCase]
     ) -> FloatArray:
-        """Return the counted loads on the protected structures (layouts, charges)."""
+        """Return the counted loads on the protected structures (layouts, threats)."""
         objective = self.scenario.objective
-        counted = [each.load(objective) for each in self._blasts(label, layouts, charges)]
-        return np.asarray(np.reshape(counted, (len(layouts), len(charges))))
+        counted = [each.load(objective) for each in self._blasts(label, layouts, threats)]
+        return np.asarray(np.reshape(counted, (len(layouts), len(threats))))
 
     def _blasts(
-        self, label: str, layouts: Sequence[Layout], charges: Sequence[AnyCharge]
+        self, label: str, layouts: Sequence[Layout], threats: Sequence[LoadCase]
     ) -> list[BlastLoads]:
-        """Return the loads of every layout under every charge, from the cache if possible."""
-        pairs = [(layout, LoadCase(charge)) for layout in layouts for charge in charges]
+        """Return the loads of every layout under every threat, from the store if possible."""
+        pairs = [(layout, threat) for layout in layouts for threat in threats]
         told = partial(self.progress, label)
         return self._evaluator.loads_of_many(pairs, self.options.processes, told)
 
