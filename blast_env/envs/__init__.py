@@ -26,5 +26,6 @@ def _register_barrier(environment_id: str, **arguments: str) -> None:
     gym.register(
         id=environment_id,
         entry_point=BARRIER_ENTRY_POINT,
+        vector_entry_point="blast_env.envs.vector_env:BlastBarrierVectorEnv",
         kwargs=arguments,
     )

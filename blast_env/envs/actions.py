@@ -199,6 +199,10 @@ class NumberedActions:
         *first, finish = np.cumsum([0, *counts]).tolist()
         return cls(scenario, sources or scenario.charge, choices, tuple(first), finish)
 
+    def with_sources(self, sources: tuple[AnySource, ...]) -> "NumberedActions":
+        """Return the actions for other places of the charge, as shown to the agent."""
+        return NumberedActions(self.scenario, sources, self.choices, self.first, self.finish)
+
     @property
     def catalogue(self) -> Catalogue:
         """The catalogue of modules or pieces."""
@@ -235,18 +239,17 @@ class NumberedActions:
         """
         option = action - self.first[chosen.choices]
         possible = chosen.possible & (self.choices[chosen.choices] == option)
-        if not possible.any():
+        places = possible.ravel().nonzero()[0]
+        if not len(places):
             return None
         made = chosen.choices + 1
-        while made < len(self.choices) and np.ptp(self.choices[made][possible]) == 0:
+        while made < len(self.choices) and np.ptp(self.choices[made].flat[places]) == 0:
             made += 1
-        first = int(possible.argmax())
         if made == len(self.choices):
-            if np.count_nonzero(possible) > 1:
-                first = int(np.where(possible, self._beside_m, np.inf).argmin())
-            return self.catalogue.element(first)
+            nearest = self._beside_m.flat[places].argmin() if len(places) > 1 else 0
+            return self.catalogue.element(int(places[nearest]))
         possible.flags.writeable = False
-        options = tuple(int(each.flat[first]) for each in self.choices[:made])
+        options = tuple(int(each.flat[places[0]]) for each in self.choices[:made])
         return ActionChoice(possible, made, options)
 
     def nearest(self, chosen: ActionChoice, action: int) -> int | None:

@@ -39,7 +39,7 @@ from blast_env.envs.strategies import (
 )
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.engines import Engine, default_engine, find_engine
-from blast_env.evaluation.evaluator import BlastAsked, Evaluators
+from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element
 from blast_env.layout import Placement
@@ -272,21 +272,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         if self.render_mode == "human":
             self._display.show(self._episode)
         return self._episode.observe(), 0.0, ended, False, info
-
-    def blasts_due(self, action: np.int64 | int) -> tuple[BlastAsked, ...]:
-        """Return the blasts that `step` requests if this action ends the episode; else none.
-
-        The caller of several environments can thus run their blasts together in advance and leave
-        the loads in a shared `cache` (`Evaluators.run_ahead`). Blasts requested by an observation,
-        or by a reward before the end, are not included.
-
-        Args:
-            action: The action of the next call of `step`.
-
-        Raises:
-            gymnasium.error.ResetNeeded: If `reset` has not been called.
-        """
-        return self._episode.blasts_due(int(action), self.illegal)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return the mask of actions that are legal now, (actions,).

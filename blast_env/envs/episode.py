@@ -1,6 +1,6 @@
 """One episode of placing, and the task common to all episodes of an environment."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import fsum, isnan
 from typing import Any, Final
@@ -12,6 +12,7 @@ from blast_env.envs.actions import ActionChoice, Actions, NumberedActions
 from blast_env.envs.arguments import ResetOptions, strategy
 from blast_env.envs.observations import (
     MASK,
+    BatchedObservation,
     EpisodeObservation,
     Observable,
     Observation,
@@ -30,12 +31,11 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import Case, LoadCase, SeedRange
 from blast_env.evaluation.comparison import Assessment
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import BlastAsked, Evaluators
+from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.evaluation.problem import DesignProblem
 from blast_env.geometry import Layout
 from blast_env.layout import Placement
-from blast_env.layout.placement import met_by_blasts
-from blast_env.site import AnyCharge, Scenario
+from blast_env.site import AnyCharge, AnySource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
 
@@ -63,25 +63,6 @@ class IllegalActions:
     limit: int
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """The state after an action.
-
-    Attributes:
-        placement: The modules placed.
-        chosen: The choices for the next module or piece.
-        is_illegal: Whether the action was illegal.
-        has_effect: Whether it changed the placement or the choices, or finished.
-        ended: Whether the episode ends.
-    """
-
-    placement: Placement
-    chosen: ActionChoice
-    is_illegal: bool
-    has_effect: bool
-    ended: bool
-
-
 @dataclass
 class Episode:
     """The state of an episode.
@@ -93,10 +74,13 @@ class Episode:
         initial: The layout at the start.
         placement: The modules placed so far.
         actions: The numbered actions.
-        chosen: The choices so far for the next module or piece.
+        chosen: The choices so far for the next module or piece; `None` before the first.
         illegal_actions: Number of illegal actions so far.
         without_effect: Number of those that changed nothing.
         repeated: The last action if it changed nothing; `None` otherwise.
+        before: The modules placed before the last action.
+        has_effect: Whether that changed the placement or the choices, or finished.
+        stops: Whether it ends the episode, however many places are left.
         begun: Whether there has been an action.
         ended: Whether the charge has gone off.
     """
@@ -107,15 +91,20 @@ class Episode:
     initial: Layout
     placement: Placement
     actions: NumberedActions
-    chosen: ActionChoice = field(init=False)
+    chosen: ActionChoice | None = None
     illegal_actions: int = 0
     without_effect: int = 0
     repeated: int | None = None
+    before: Placement = field(init=False)
+    has_effect: bool = True
+    stops: bool = False
     begun: bool = False
     ended: bool = False
 
-    def __post_init__(self) -> None:
-        self.chosen = ActionChoice(self.placement.legal)
+    @property
+    def choice(self) -> ActionChoice:
+        """The choices so far for the next module or piece."""
+        return self.chosen or ActionChoice(self.placement.legal)
 
     def action_mask(self) -> NDArray[np.bool_]:
         """Return the mask of legal actions (actions,); see `NumberedActions.mask`.
@@ -123,17 +112,21 @@ class Episode:
         When the charge has gone off, only finishing is legal.
         """
         if not self.ended:
-            return self.actions.mask(self.chosen)
+            return self.actions.mask(self.choice)
         mask = np.zeros(self.actions.finish + 1, dtype=np.bool_)
         mask[-1] = True
         return mask
 
+    @property
+    def shown(self) -> Placement:
+        """The placement to observe: the choices so far limit the cells that it shows as free."""
+        if self.chosen is None:
+            return self.placement
+        return self.placement.limited_to(self.chosen.possible)
+
     def observe(self) -> Any:
-        """Return the observation; the choices so far limit the cells that it shows as free."""
-        placement = self.placement
-        if self.chosen.choices:
-            placement = placement.limited_to(self.chosen.possible)
-        observed = self.observation.observe(placement)
+        """Return the observation."""
+        observed = self.observation.observe(self.shown)
         if isinstance(observed, Mapping):
             return {**observed, MASK: self.action_mask().astype(np.int8)}
         return observed
@@ -149,15 +142,35 @@ class Episode:
         Raises:
             BlastEnvError: If the reward has a term with the reserved name `ILLEGAL_TERM`.
         """
-        before = self.placement
-        after = self._after(action, illegal)
-        self.placement, self.chosen, self.ended = after.placement, after.chosen, after.ended
-        self.illegal_actions += after.is_illegal
-        self.without_effect += not after.has_effect
-        self.repeated = None if after.has_effect else action
+        self.move(action, illegal)
+        return self.pay(reward, illegal)
+
+    def move(self, action: int, illegal: IllegalActions) -> None:
+        """Do the first part of `act`, which needs neither the next mask nor a blast."""
+        self.before, choice = self.placement, self.choice
+        finishes = action == self.actions.finish and choice.choices == 0
+        found = None if finishes else self.actions.narrowed(choice, action)
+        if found is None and not finishes:
+            self.illegal_actions += 1
+            nearest = self.actions.nearest(choice, action) if illegal.moves else None
+            found = None if nearest is None else self.actions.narrowed(choice, nearest)
+        if isinstance(found, ActionChoice):
+            self.chosen = found
+        elif found is not None:
+            self.placement, self.chosen = self.placement.place(found), None
+        self.has_effect = finishes or found is not None
+        self.without_effect += not self.has_effect
+        repeats = illegal.moves and action == self.repeated
+        exhausted = self.without_effect >= illegal.limit
+        self.stops = finishes or (not self.has_effect and (repeats or exhausted))
+        self.repeated = None if self.has_effect else action
+
+    def pay(self, reward: Reward, illegal: IllegalActions) -> dict[str, float]:
+        """Do the second part of `act`, with the blasts."""
+        self.ended = self.ends
         transition = Transition(
             initial=self.initial,
-            before=before.checked,
+            before=self.before.checked,
             after=self.placement.checked,
             begins=not self.begun,
             ended=self.ended,
@@ -169,46 +182,20 @@ class Episode:
             raise BlastEnvError(
                 f"the reward has a term {ILLEGAL_TERM!r}, which the environment adds itself"
             )
-        return {**terms, ILLEGAL_TERM: 0.0 if after.has_effect else -illegal.cost}
+        return {**terms, ILLEGAL_TERM: 0.0 if self.has_effect else -illegal.cost}
 
-    def blasts_due(self, action: int, illegal: IllegalActions) -> tuple[BlastAsked, ...]:
-        """Return the blasts that `final_information` requests if the action ends the episode.
+    @property
+    def ends(self) -> bool:
+        """Whether the charge goes off after the last move."""
+        return self.stops or self.placement.is_full
 
-        Args:
-            action: The action of the next call of `act`.
-            illegal: The consequences of an illegal action.
-        """
-        after = self._after(action, illegal)
-        case = self.problem.case
-        barrier = met_by_blasts(after.placement.layout)
-        layouts = (barrier, ()) if after.ended else ()
-        return tuple(
-            BlastAsked(case.scenario, layout, threat)
-            for layout in layouts
-            for threat in case.threats
-        )
-
-    def _after(self, action: int, illegal: IllegalActions) -> _Outcome:
-        """Return the state after an action."""
-        placement, chosen = self.placement, self.chosen
-        if action == self.actions.finish and chosen.choices == 0:
-            return _Outcome(placement, chosen, is_illegal=False, has_effect=True, ended=True)
-        found = self.actions.narrowed(chosen, action)
-        is_illegal = found is None
-        if is_illegal and illegal.moves:
-            nearest = self.actions.nearest(chosen, action)
-            found = None if nearest is None else self.actions.narrowed(chosen, nearest)
-        if found is None:
-            exhausted = self.without_effect + 1 >= illegal.limit
-            repeats = illegal.moves and action == self.repeated
-            ended = exhausted or repeats or placement.is_full
-            return _Outcome(placement, chosen, is_illegal=True, has_effect=False, ended=ended)
-        if isinstance(found, ActionChoice):
-            chosen = found
-        else:
-            placement = placement.place(found)
-            chosen = ActionChoice(placement.legal)
-        return _Outcome(placement, chosen, is_illegal, has_effect=True, ended=placement.is_full)
+    def blasts_due(self) -> Iterator[tuple[BlastEvaluator, Layout, LoadCase]]:
+        """Yield the blasts without a barrier on the first move, and those at the end."""
+        layouts: list[Layout] = [] if self.begun else [()]
+        layouts += [self.placement.checked] if self.ends else []
+        for layout in layouts:
+            for threat in self.problem.threats:
+                yield self.problem.evaluator, layout, threat
 
     def assess(self) -> tuple[Assessment, Assessment]:
         """Return the assessments of the layout and of the site without a barrier.
@@ -282,6 +269,36 @@ HIDDEN_THREATS: Final = 16
 """Default number of charges for a hidden threat, one blast each."""
 
 
+_MOST_OBSERVATIONS: Final = 64
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """Parts that episodes on one site have in common.
+
+    Attributes:
+        empty: The site without a barrier.
+        actions: The numbered actions.
+        observations: Observations by the places of the charge as shown to the agent.
+    """
+
+    empty: Placement
+    actions: NumberedActions
+    observations: dict[tuple[AnySource, ...], EpisodeObservation] = field(default_factory=dict)
+
+    def observation(self, kind: Observation, observable: Observable) -> EpisodeObservation:
+        """Return the observation of an episode; those that are observed in batches are kept."""
+        found = self.observations.get(observable.sources)
+        if found is not None:
+            return found
+        made = kind.episode(observable)
+        if isinstance(made, BatchedObservation):
+            if len(self.observations) == _MOST_OBSERVATIONS:
+                self.observations.clear()
+            self.observations[observable.sources] = made
+        return made
+
+
 @dataclass(frozen=True, eq=False)
 class Task:
     """The task of an environment: scenarios, threats, observations and actions.
@@ -294,6 +311,7 @@ class Task:
         observation: The kind of observation.
         actions: The kind of action space.
         evaluators: Run the blasts.
+        prepared: Parts of episodes on the last site, for the next one on it.
     """
 
     source: ScenarioSource
@@ -303,6 +321,7 @@ class Task:
     observation: Observation
     actions: Actions
     evaluators: Evaluators
+    prepared: "list[_Prepared]" = field(default_factory=list, repr=False)
 
     def start(self, rng: np.random.Generator, options: ResetOptions) -> Episode:
         """Draw an episode; options do not change the amount drawn from the random stream.
@@ -313,7 +332,7 @@ class Task:
             BlastEnvError: If the scenario has another size than the representative one.
         """
         scenario = self.source.sample(rng)
-        check_size(scenario, self.source.representative)
+        prepared = self._prepared_for(scenario)
         drawn = self.threat_model.draw(scenario, rng)
         seeds = SeedRange.TRAINING.draw(rng, (len(drawn), self.realisations))
         if options.blast_seed is not None:
@@ -327,15 +346,29 @@ class Task:
             SimulatedModuleLoads(self.evaluators),
             bool(self.source.representative.vehicles),
         )
-        placement = Placement.of(possible, options.layout)
+        placement = prepared.empty
+        if possible is not scenario or len(options.layout):
+            placement = Placement.of(possible, options.layout)
         return Episode(
             observable=observable,
             problem=DesignProblem(evaluator, self._case(scenario, charges, seeds)),
-            observation=self.observation.episode(observable),
+            observation=prepared.observation(self.observation, observable),
             initial=placement.checked,
             placement=placement,
-            actions=NumberedActions.of(self.actions, scenario, observable.sources),
+            actions=prepared.actions.with_sources(observable.sources),
         )
+
+    def _prepared_for(self, scenario: Scenario) -> "_Prepared":
+        """Return what episodes on a site have in common.
+
+        Raises:
+            BlastEnvError: If the scenario has another size than the representative one.
+        """
+        if not self.prepared or self.prepared[0].empty.scenario is not scenario:
+            check_size(scenario, self.source.representative)
+            actions = NumberedActions.of(self.actions, scenario)
+            self.prepared[:] = [_Prepared(Placement.empty(scenario), actions)]
+        return self.prepared[0]
 
     def _case(
         self, scenario: Scenario, charges: Sequence[AnyCharge], seeds: NDArray[np.int64]

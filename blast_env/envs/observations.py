@@ -1,7 +1,9 @@
 """Observations of an agent, and their parts."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import ceil, hypot, inf
 from types import MappingProxyType
 from typing import Any, ClassVar, Final, Protocol
@@ -159,6 +161,31 @@ class EpisodeObservation(Protocol):
         """Return a new element of the space, for the modules placed so far."""
 
 
+class BatchedObservation(ABC):
+    """Observes one episode, or several of them in one array; keeps no state between placements."""
+
+    @staticmethod
+    @abstractmethod
+    def observe_many(episodes: Sequence[Any], placements: Sequence[Placement]) -> Any:
+        """Return the observations of episodes of this class, with a leading axis (episodes, ...).
+
+        Args:
+            episodes: The episodes, whose spaces are equal.
+            placements: The modules placed so far in each of them.
+        """
+
+    def observe(self, placement: Placement) -> Any:
+        """Return a new element of the space, for the modules placed so far."""
+        return one_of(self.observe_many([self], [placement]), 0)
+
+
+def one_of(observed: Any, index: int) -> Any:
+    """Return one of several observations."""
+    if isinstance(observed, dict):
+        return {key: each[index] for key, each in observed.items()}
+    return observed[index]
+
+
 class Observation(Protocol):
     """A kind of observation."""
 
@@ -190,17 +217,18 @@ def height_share(height_m: float | None) -> float:
     return 1.0 if height_m is None else min(height_m / FULL_HEIGHT_M, 1.0)
 
 
-def stock_shares(placement: Placement) -> tuple[float, float, float]:
-    """Return the remaining stock and budget as values from 0 to 1.
+def stock_shares(placements: Sequence[Placement]) -> FloatArray:
+    """Return the remaining stock and budget as values from 0 to 1 (placements, 3).
 
-    Returns:
-        The share of the stock, the number of modules or pieces as a share of 100 (at most 1), and
-        the share of the budget (1 without a budget).
+    They are the share of the stock, the number of modules or pieces as a share of 100 (at most 1),
+    and the share of the budget (1 without a budget).
     """
-    zone = placement.scenario.zone
-    left, budget_left = placement.stock_left, placement.budget_left
-    of_budget = 1.0 if zone.budget is None or budget_left is None else budget_left / zone.budget
-    return left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget
+    rows = []
+    for each in placements:
+        zone, left, budget_left = each.scenario.zone, each.stock_left, each.budget_left
+        of_budget = 1.0 if zone.budget is None or budget_left is None else budget_left / zone.budget
+        rows.append((left / zone.stock, min(left / FULL_STOCK, 1.0), of_budget))
+    return np.array(rows)
 
 
 def cost_shares(scenario: Scenario) -> FloatArray:
@@ -209,12 +237,15 @@ def cost_shares(scenario: Scenario) -> FloatArray:
     return np.asarray(costs / costs.max())
 
 
-def occupied_cells(placement: Placement) -> BoolArray:
-    """Return the mask of cells of the build zone that hold a module, (rows, columns)."""
-    occupied = np.zeros(placement.usable.shape, dtype=bool)
-    if placement.cells:
-        occupied[tuple(np.array(placement.cells).T)] = True
-    return occupied
+def cells_shown(placements: Sequence[Placement], legal: BoolArray) -> BoolArray:
+    """Return where modules stand and where some may be placed (placements, 2, rows, columns).
+
+    Args:
+        placements: The placements.
+        legal: `Placement.legal` of each (placements, variants, rows, columns).
+    """
+    occupied = np.stack([each.standing for each in placements]) > 0
+    return np.stack((occupied, legal.any(axis=1)), axis=1)
 
 
 def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
@@ -230,21 +261,34 @@ def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
     return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
 
 
-def items_placed(placement: Placement) -> tuple[FloatArray, FloatArray]:
-    """Return the values of a catalogue that change with the layout.
+def items_placed(placements: Sequence[Placement], legal: BoolArray) -> tuple[FloatArray, Plane]:
+    """Return the values of a catalogue that change with the layouts.
+
+    Args:
+        placements: The placements.
+        legal: As for `cells_shown`.
 
     Returns:
-        The remaining share of the pieces of each item (items,); and for each cell the height of
-        its module, whether that stops vehicles, and whether a piece of each variant may have its
-        lower left cell there (2 + variants, rows, columns).
+        The remaining share of the pieces of each item (placements, items); and for each cell the
+        height of its module, whether that stops vehicles, and whether a piece of each variant may
+        have its lower left cell there (placements, 2 + variants, rows, columns).
     """
-    stocks = np.array(placement.catalogue.stocks)
-    left = np.array(placement.stocks_left, dtype=np.float64) / np.maximum(stocks, 1)
-    standing = np.zeros((2, *placement.usable.shape))
-    for module in placement.modules:
-        row, column = module.cell
-        standing[:, row, column] = height_share(module.height_m), module.stops_vehicles
-    return left, np.concatenate((standing, placement.legal))
+    on_cells = np.empty((len(legal), 2 + legal.shape[1], *legal.shape[2:]), dtype=np.float32)
+    on_cells[:, 2:] = legal
+    tables: dict[int, Plane] = {}
+    for own, each in zip(on_cells, placements, strict=True):
+        if id(each.catalogue) not in tables:
+            rows = [(height_share(v.height_m), v.stops_vehicles) for v in each.catalogue.variants]
+            tables[id(each.catalogue)] = np.array([(0.0, 0.0), *rows], dtype=np.float32).T
+        np.take(tables[id(each.catalogue)], each.standing, axis=1, out=own[:2], mode="clip")
+    return items_left(placements), on_cells
+
+
+def items_left(placements: Sequence[Placement]) -> FloatArray:
+    """Return the remaining share of the pieces of each item (placements, items)."""
+    stocks = np.array([each.catalogue.stocks for each in placements])
+    left: FloatArray = np.array([each.stocks_left for each in placements]) / np.maximum(stocks, 1)
+    return left
 
 
 # ---- The grid of squares of 0.5 m over a site.
@@ -341,6 +385,17 @@ class Lattice:
         """Return values of the modules (..., rows, columns) on the grid, weighted by area."""
         plane: Plane = self.along_y @ values.astype(np.float32) @ self.along_x.T
         return plane
+
+    @cached_property
+    def squares(self) -> tuple[slice, slice] | None:
+        """Rows and columns of the grid that the modules fill, one square each; `None` if not so."""
+        found = []
+        for share in (self.along_y, self.along_x):
+            first, count = int(share[:, 0].argmax()), share.shape[1]
+            found.append(slice(first, first + count))
+            if not np.array_equal(share, np.eye(len(share), count, -first)):
+                return None
+        return found[0], found[1]
 
 
 def _shares(squares: int, start_m: float, modules: int) -> Plane:
@@ -533,7 +588,7 @@ class GridWithLoadObservation(GridObservation):
 
 
 @dataclass(frozen=True, eq=False)
-class GridEpisode:
+class GridEpisode(BatchedObservation):
     """The planes of one episode.
 
     Attributes:
@@ -548,25 +603,48 @@ class GridEpisode:
     channels: tuple[str, ...]
     vehicles: VehicleView
 
-    def observe(self, placement: Placement) -> Plane:
-        """Return all planes for the modules placed so far, (channels, rows, columns)."""
-        return self.levels(placement).astype(np.float32) / _LEVELS
+    @staticmethod
+    def observe_many(episodes: Sequence["GridEpisode"], placements: Sequence[Placement]) -> Plane:
+        """Return the planes of several episodes (episodes, channels, rows, columns)."""
+        planes = np.stack([each.static for each in episodes])
+        GridEpisode.draw(episodes, placements, planes)
+        return planes.astype(np.float32) / _LEVELS
 
-    def levels(self, placement: Placement) -> NDArray[np.uint8]:
-        """Return the same planes as integers, 255 for 1."""
-        planes = self.static.copy()
-        cells = np.stack((occupied_cells(placement), placement.free))
-        self.show(planes, ("barrier", "free"), self.zone.plane(cells))
-        shares = np.array(stock_shares(placement))
-        self.show(planes, ("stock_share", "stock", "budget_share"), shares)
-        if BARRIER_HEIGHT in self.channels:
-            left, on_cells = items_placed(placement)
-            names = (BARRIER_HEIGHT, "stops_vehicles", *self.ending(":legal"))
-            self.show(planes, names, self.zone.plane(on_cells))
-            self.show(planes, self.ending(":left"), left)
-        if REACH in self.channels:
-            self.show(planes, (REACH,), self.vehicles.reached(placement.layout)[np.newaxis])
-        return planes
+    @staticmethod
+    def draw(
+        episodes: Sequence["GridEpisode"],
+        placements: Sequence[Placement],
+        planes: NDArray[np.uint8],
+    ) -> None:
+        """Draw the planes that change over the constant ones, 255 for 1.
+
+        Args:
+            episodes: The episodes.
+            placements: The modules placed so far in each.
+            planes: All planes (episodes, channels, rows, columns), changed in place.
+        """
+        channels = episodes[0].channels
+        legal = np.stack([each.legal for each in placements])
+        uniform, on_cells = stock_shares(placements), cells_shown(placements, legal)
+        names, cell_names = ["stock_share", "stock", "budget_share"], ["barrier", "free"]
+        if BARRIER_HEIGHT in channels:
+            left, of_items = items_placed(placements, legal)
+            uniform = np.hstack((uniform, left))
+            names += episodes[0].ending(":left")
+            on_cells = np.concatenate((on_cells, of_items), axis=1)
+            cell_names += [BARRIER_HEIGHT, "stops_vehicles", *episodes[0].ending(":legal")]
+        planes[:, [channels.index(each) for each in names]] = _levels(uniform)[..., None, None]
+        numbers = [channels.index(each) for each in cell_names]
+        levels = _levels(on_cells)
+        for own, of_cells, whole, each, placement in zip(
+            planes, levels, on_cells, episodes, placements, strict=True
+        ):
+            if each.zone.squares is None:
+                own[numbers] = _levels(each.zone.plane(whole))
+            else:
+                own[numbers, *each.zone.squares] = of_cells
+            if REACH in channels:
+                own[channels.index(REACH)] = _levels(each.vehicles.reached(placement.layout))
 
     def ending(self, ending: str) -> tuple[str, ...]:
         """Return the names of the planes with an ending, in their order."""
@@ -580,12 +658,18 @@ class GridEpisode:
             names: Names of the planes to set.
             values: (names, rows, columns), or (names,) for planes with one value everywhere.
         """
-        steps = np.rint(_LEVELS * np.minimum(values.astype(np.float32), np.float32(1.0)))
         shape = values.shape if values.ndim == 3 else (*values.shape, 1, 1)
-        planes[[self.channels.index(name) for name in names]] = steps.reshape(shape)
+        levels = _levels(values).reshape(shape)
+        planes[[self.channels.index(name) for name in names]] = levels
 
 
 _LEVELS: Final = np.float32(255.0)
+
+
+def _levels(values: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return values from 0 to 1 in steps of 1/255; larger ones become 1."""
+    shares = np.minimum(values.astype(np.float32), np.float32(1.0))
+    return np.rint(_LEVELS * shares).astype(np.uint8)
 
 
 def _structure_planes(grid: SiteGrid, scenario: Scenario) -> tuple[Plane, Plane, Plane]:
@@ -648,28 +732,35 @@ class ImageObservation:
         """Draw the planes that do not change."""
         shape = self.space(observable.scenario).shape
         assert shape is not None
-        return ImageEpisode(self.planes.episode(observable), shape[:2])
+        planes = self.planes.episode(observable)
+        static = np.zeros((*shape[:2], len(planes.static)), dtype=np.uint8)
+        _, rows, columns = planes.static.shape
+        static[:rows, :columns] = np.moveaxis(planes.static, 0, -1)
+        return ImageEpisode(planes, static)
 
 
 @dataclass(frozen=True, eq=False)
-class ImageEpisode:
+class ImageEpisode(BatchedObservation):
     """The images of one episode.
 
     Attributes:
         planes: The planes of the episode.
-        size: Height and width of the image, pixels.
+        static: The image of the constant planes (height, width, channels).
     """
 
     planes: GridEpisode
-    size: tuple[int, ...]
+    static: NDArray[np.uint8]
 
-    def observe(self, placement: Placement) -> NDArray[np.uint8]:
-        """Return the image for the modules placed so far, (height, width, channels)."""
-        planes = np.moveaxis(self.planes.levels(placement), 0, -1)
-        rows, columns, channels = planes.shape
-        image = np.zeros((*self.size, channels), dtype=np.uint8)
-        image[:rows, :columns] = planes
-        return image
+    @staticmethod
+    def observe_many(
+        episodes: Sequence["ImageEpisode"], placements: Sequence[Placement]
+    ) -> NDArray[np.uint8]:
+        """Return the images of several episodes (episodes, height, width, channels)."""
+        images = np.stack([each.static for each in episodes])
+        _, rows, columns = episodes[0].planes.static.shape
+        planes = np.moveaxis(images[:, :rows, :columns], -1, 1)
+        GridEpisode.draw([each.planes for each in episodes], placements, planes)
+        return images
 
 
 # ---- A vector.
@@ -749,7 +840,7 @@ class FeaturesObservation:
 
 
 @dataclass(frozen=True, eq=False)
-class FeaturesEpisode:
+class FeaturesEpisode(BatchedObservation):
     """The vector of one episode.
 
     Attributes:
@@ -766,16 +857,31 @@ class FeaturesEpisode:
     vehicles: VehicleView
     shows_vehicles: bool
 
-    def observe(self, placement: Placement) -> Array:
-        """Return all values for the modules placed so far, (features,)."""
-        parts = [np.array(stock_shares(placement)), self.site]
-        parts += [occupied_cells(placement), placement.free, self.costs, self.items]
-        if placement.catalogue.has_items:
-            parts += items_placed(placement)
-        if self.shows_vehicles:
-            parts.append(_stand_off(self.vehicles, placement.layout))
-        values = np.concatenate([part.ravel() for part in parts]).astype(np.float32)
-        return np.clip(values, 0.0, 1.0)
+    @staticmethod
+    def observe_many(
+        episodes: Sequence["FeaturesEpisode"], placements: Sequence[Placement]
+    ) -> Array:
+        """Return the vectors of several episodes (episodes, features)."""
+        legal = np.stack([each.legal for each in placements])
+        parts: list[NDArray[Any]] = [
+            stock_shares(placements),
+            np.stack([each.site for each in episodes]),
+        ]
+        parts += [cells_shown(placements, legal), np.stack([each.costs for each in episodes])]
+        parts.append(np.stack([each.items for each in episodes]))
+        if placements[0].catalogue.has_items:
+            parts += items_placed(placements, legal)
+        if episodes[0].shows_vehicles:
+            pairs = zip(episodes, placements, strict=True)
+            parts.append(np.stack([_stand_off(each.vehicles, own.layout) for each, own in pairs]))
+        return _joined(parts)
+
+
+def _joined(parts: Sequence[NDArray[Any]]) -> Plane:
+    """Return values of several episodes (episodes, ...) as vectors (episodes, n), from 0 to 1."""
+    rows = [each.reshape(len(each), -1) for each in parts]
+    joined: Plane = np.concatenate(rows, axis=1, dtype=np.float32, casting="unsafe")
+    return np.clip(joined, 0.0, 1.0, out=joined)
 
 
 def _structures(scenario: Scenario) -> FloatArray:
@@ -841,31 +947,45 @@ class DictObservation:
 
     def episode(self, observable: Observable) -> "DictEpisode":
         """Compute the constant values."""
-        return DictEpisode(self.planes.episode(observable), observable)
+        scenario, sources = observable.scenario, observable.sources
+        items = item_values(scenario.zone) if scenario.zone.items else ()
+        return DictEpisode(
+            self.planes.episode(observable),
+            np.concatenate((_charge_and_corner(scenario, sources), *items)),
+            VehicleView.of(scenario, sources),
+            observable.shows_vehicles,
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class DictEpisode:
+class DictEpisode(BatchedObservation):
     """The dictionaries of one episode.
 
     Attributes:
         planes: The images of the episode.
-        observable: The observable part of the episode.
+        site: Values of charge, corner of the build zone and items.
+        vehicles: The observable vehicles.
+        shows_vehicles: Whether the stand-off is the last value.
     """
 
     planes: ImageEpisode
-    observable: Observable
+    site: FloatArray
+    vehicles: VehicleView
+    shows_vehicles: bool
 
-    def observe(self, placement: Placement) -> dict[str, Array]:
-        """Return planes and vector for the modules placed so far."""
-        scenario, sources = self.observable.scenario, self.observable.sources
-        parts = [np.array(stock_shares(placement)), _charge_and_corner(scenario, sources)]
-        if placement.catalogue.has_items:
-            parts += [*item_values(scenario.zone), items_placed(placement)[0]]
-        if self.observable.shows_vehicles:
-            parts.append(_stand_off(VehicleView.of(scenario, sources), placement.layout))
-        vector = np.clip(np.concatenate(parts).astype(np.float32), 0.0, 1.0)
-        return {"planes": self.planes.observe(placement), "vector": vector}
+    @staticmethod
+    def observe_many(
+        episodes: Sequence["DictEpisode"], placements: Sequence[Placement]
+    ) -> dict[str, Array]:
+        """Return planes and vectors of several episodes, with a leading axis (episodes, ...)."""
+        parts = [stock_shares(placements), np.stack([each.site for each in episodes])]
+        if placements[0].catalogue.has_items:
+            parts.append(items_left(placements))
+        if episodes[0].shows_vehicles:
+            pairs = zip(episodes, placements, strict=True)
+            parts.append(np.stack([_stand_off(each.vehicles, own.layout) for each, own in pairs]))
+        planes = ImageEpisode.observe_many([each.planes for each in episodes], placements)
+        return {"planes": planes, "vector": _joined(parts)}
 
 
 def _charge_and_corner(scenario: Scenario, sources: tuple[AnySource, ...]) -> FloatArray:

@@ -261,10 +261,11 @@ class Case:
             loads: One per threat, in their order; all, or only the first ones, at least one.
         """
         values = np.asarray(loads, dtype=np.float64)
-        count = min(len(self.charges), len(values))
-        means = [float(values[index :: len(self.charges)].mean()) for index in range(count)]
+        count = len(self.threats) // self.realisations
+        if len(values) > count:
+            values = np.array([values[index::count].mean() for index in range(count)])
         risk = self.risk or self.scenario.objective.risk
-        return risk(np.array(means))
+        return risk(values)
 
     def counted(self, loads: Sequence[float] | FloatArray, layout: Sequence[Element] = ()) -> float:
         """Return the objective value of a layout, which may include its cost.

@@ -3,11 +3,11 @@
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase
-from blast_env.evaluation.engines import BlastLoads, Engine, find_engine
+from blast_env.evaluation.engines import BlastLoads, Engine, EngineBlast, find_engine
 from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
@@ -190,31 +190,49 @@ def _run(
 
     The charges are those of the keys, or the vehicles that carry them.
     """
-    keys = list(missing)
-    work = [(each.engine, each.scenario, key, charge) for key, (each, charge) in missing.items()]
-    for index, loads in as_completed(_run_one, work, processes):
-        missing[keys[index]][0]._keep(keys[index], loads)
-        yield keys[index], loads
+    if not missing:
+        return
+    engine = next(iter(missing.values()))[0].engine
+    keys, size = list(missing), engine.at_once
+    lots = [keys[first : first + size] for first in range(0, len(keys), size)]
+
+    def asked(key: BlastKey) -> EngineBlast:
+        evaluator, charge = missing[key]
+        return EngineBlast(evaluator.scenario, key.layout, charge, key.seed)
+
+    work = [(engine, [asked(key) for key in lot]) for lot in lots]
+    for index, of_lot in as_completed(_run_lot, work, processes):
+        for key, loads in zip(lots[index], of_lot, strict=True):
+            missing[key][0]._keep(key, loads)
+            yield key, loads
 
 
-def _run_one(work: tuple[Engine, Scenario, BlastKey, AnyCharge]) -> BlastLoads:
-    """Run a blast, in this process or a worker."""
-    engine, scenario, key, charge = work
-    return engine.loads(scenario, key.layout, charge, key.seed)
+def _run_lot(work: tuple[Engine, Sequence[EngineBlast]]) -> list[BlastLoads]:
+    """Run blasts, in this process or a worker."""
+    engine, blasts = work
+    return engine.loads_at_once(blasts)
 
 
-class BlastAsked(NamedTuple):
-    """A blast that will be requested.
+def run_together(
+    asked: Iterable[tuple[BlastEvaluator, Layout, LoadCase]], processes: int = 1
+) -> None:
+    """Run blasts of evaluators with one engine in one batch and cache their loads.
 
-    Attributes:
-        scenario: The scenario.
-        layout: The layout.
-        threat: The charge and the seed.
+    Args:
+        asked: Blasts that will be requested; cached ones are not run.
+        processes: Number of worker processes; it changes only the time.
+
+    Raises:
+        LayoutError: If a layout does not fit its build zone; nothing is simulated then.
+        ScenarioError: If a charge is not clear of a structure or the border.
     """
-
-    scenario: Scenario
-    layout: Layout
-    threat: LoadCase
+    missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
+    for evaluator, layout, threat in asked:
+        key = evaluator.key(layout, threat)
+        if key not in missing and evaluator._known(key) is None:
+            missing[key] = evaluator, threat.charge
+    for _ in _run(missing, processes):
+        pass
 
 
 _MOST_EVALUATORS: Final = 4
@@ -272,32 +290,6 @@ class Evaluators:
         """Return evaluators with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
         return None if engine is None else Evaluators(engine, self._store, self._most)
-
-    def run_ahead(self, asked: Sequence[BlastAsked], processes: int = 1) -> list[bool]:
-        """Run blasts of any scenarios in one batch and cache their loads.
-
-        Args:
-            asked: Blasts that will be requested; cached ones are not run.
-            processes: Number of worker processes; it changes only the time.
-
-        Returns:
-            Whether each of them was run; of equal ones, only the first is marked.
-
-        Raises:
-            LayoutError: If a layout does not fit its build zone; nothing is simulated then.
-            ScenarioError: If a charge is not clear of a structure or the border.
-        """
-        missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
-        numbers: dict[BlastKey, int] = {}
-        for number, (scenario, layout, threat) in enumerate(asked):
-            evaluator = self.of(scenario)
-            key = evaluator.key(layout, threat)
-            if key not in missing and evaluator._known(key) is None:
-                missing[key], numbers[key] = (evaluator, threat.charge), number
-        was_run = [False] * len(asked)
-        for key, _ in _run(missing, processes):
-            was_run[numbers[key]] = True
-        return was_run
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
         """Return the evaluator of a scenario.

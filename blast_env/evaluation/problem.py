@@ -118,7 +118,8 @@ class DesignProblem:
             BudgetError: As for `loads`.
             LayoutError: If the layout does not fit the build zone.
         """
-        pairs = [(tuple(layout), threat) for threat in self.threats]
+        cells = layout if isinstance(layout, tuple) else tuple(layout)  # may be a CheckedLayout
+        pairs = [(cells, threat) for threat in self.threats]
         self.spend(pairs)
         return self.evaluator.loads_of_many(pairs, self.processes)
 

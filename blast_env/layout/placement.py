@@ -101,13 +101,26 @@ class Placement:
             LayoutError: If it is not available; the message is that of `explain`.
         """
         element = self.catalogue.element_from(element, self._word)
-        reason = self.explain(element)
-        if reason is not None:
-            raise LayoutError(reason)
+        if not self._is_known_legal(element):
+            reason = self.explain(element)
+            if reason is not None:
+                raise LayoutError(reason)
         placed = Placement(self.scenario, (*self.layout, element))
-        # Looking it up would double the time of a step of the environment.
-        vars(placed)["_empty_zone"] = self._empty_zone
+        # Deriving them anew would double the time of a step of the environment.
+        standing = self.standing.copy()
+        self._stand(standing, element)
+        vars(placed).update(_empty_zone=self._empty_zone, standing=standing)
         return placed
+
+    def _is_known_legal(self, element: Element) -> bool:
+        """Return whether the mask has been computed and has the element."""
+        legal: BoolArray | None = vars(self).get("legal")
+        row, column = element[:2]
+        if legal is None or not self._zone.has((row, column)):
+            return False
+        if self.catalogue.reason_against(element) is not None:
+            return False
+        return bool(legal[self.catalogue.variant_number(element), row, column])
 
     def explain(self, element: Element) -> str | None:
         """Return the reason why an element cannot be placed, as a sentence, or `None` if it can.
@@ -143,18 +156,22 @@ class Placement:
         Shape (variants, rows, columns) as in `Catalogue`: raveled, it is a mask of actions.
         (1, 0, 0) without a build zone.
         """
-        cells = self._empty_zone
-        if self.stock_left <= 0:
-            legal = np.zeros(cells.fits.shape, dtype=bool)
-        else:
-            legal = cells.places(cells.usable & ~self._taken) & (cells.costs <= self._spendable)
-            if self._closing is not None:
-                legal &= ~self._closing
-        if self.catalogue.has_items:
-            left = np.array(self.stocks_left)
-            legal &= left[[each.item for each in self.catalogue.variants], None, None] > 0
-        legal.flags.writeable = False
+        legal: BoolArray = _legal_of([self])[0]
         return legal
+
+    @cached_property
+    def standing(self) -> NDArray[np.uint8]:
+        """Number of the variant on each cell, from 1, or 0 (rows, columns); not to be changed."""
+        standing = np.zeros(self._zone.shape, dtype=np.uint8)
+        for element in self.layout:
+            self._stand(standing, element)
+        return standing
+
+    def _stand(self, standing: NDArray[np.uint8], element: Element) -> None:
+        number = self.catalogue.variant_number(element)
+        variant = self.catalogue.variants[number]
+        row, column = element[:2]
+        standing[row : row + variant.rows, column : column + variant.columns] = number + 1
 
     @cached_property
     def free(self) -> BoolArray:
@@ -187,7 +204,7 @@ class Placement:
             possible: A subset of `legal`, of the same shape.
         """
         limited = Placement(self.scenario, self.layout)
-        vars(limited).update(_empty_zone=self._empty_zone, legal=possible)
+        vars(limited).update(_empty_zone=self._empty_zone, standing=self.standing, legal=possible)
         return limited
 
     def places(self, cells: BoolArray) -> BoolArray:
@@ -255,10 +272,15 @@ class Placement:
         """Number of modules, or of pieces in all, that remain in the stock."""
         return self._zone.stock - len(self.layout)
 
-    @property
+    @cached_property
     def stocks_left(self) -> tuple[int, ...]:
         """Number of pieces of each item that remain in the stock."""
-        return tuple(map(self._stock_left_of, range(len(self.catalogue.stocks))))
+        catalogue, most = self.catalogue, self.stock_left
+        if not catalogue.has_items:
+            return (most,)
+        placed = Counter(each.item for each in self.layout if isinstance(each, Piece))
+        each_left = zip(catalogue.stocks, catalogue.names, strict=True)
+        return tuple(min(stock - placed[name], most) for stock, name in each_left)
 
     @cached_property
     def cost(self) -> float:
@@ -305,12 +327,10 @@ class Placement:
             scenario.site,
         )
 
-    @cached_property
+    @property
     def _taken(self) -> BoolArray:
         """Whether each cell has a module (rows, columns)."""
-        taken = np.zeros(self._zone.shape, dtype=bool)
-        if self.cells:
-            taken[tuple(zip(*self.cells, strict=True))] = True
+        taken: BoolArray = self.standing > 0
         return taken
 
     @cached_property
@@ -321,19 +341,6 @@ class Placement:
             return None
         passable = self._empty_zone.passable & ~self._taken
         return np.stack([*closing_places(way, passable, self.catalogue.variants)])
-
-    @cached_property
-    def _placed_of(self) -> Counter[str]:
-        """Number of placed pieces by item; that of modules has the empty name."""
-        return Counter(each.item if isinstance(each, Piece) else "" for each in self.layout)
-
-    def _stock_left_of(self, item: int) -> int:
-        """Return the number of pieces of an item that remain in the stock."""
-        catalogue = self.catalogue
-        if not catalogue.has_items:
-            return self.stock_left
-        left = catalogue.stocks[item] - self._placed_of[catalogue.names[item]]
-        return min(left, self.stock_left)
 
     @property
     def _is_sound(self) -> bool:
@@ -399,7 +406,7 @@ class Placement:
             what = "piece" if self.catalogue.has_items else "module"
             return f"the stock of {_counted(len(self.layout), what)} is used up"
         item = self.catalogue.variant(element).item
-        if self._stock_left_of(item) > 0:
+        if self.stocks_left[item] > 0:
             return None
         stock = _counted(self.catalogue.stocks[item], f"{self.catalogue.names[item]!r}", "")
         return f"the stock of {stock} is used up"
@@ -425,6 +432,35 @@ class Placement:
     def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
         """Pickle scenario and layout alone: cached arrays would come back writeable."""
         return Placement, (self.scenario, self.layout)
+
+
+def find_legal(placements: Iterable[Placement]) -> None:
+    """Compute `Placement.legal` of placements, of those on one site in one array."""
+    of_sites: dict[int, list[Placement]] = {}
+    for each in placements:
+        if "legal" not in vars(each):
+            of_sites.setdefault(id(each.scenario), []).append(each)
+    for own in of_sites.values():
+        for placement, legal in zip(own, _legal_of(own), strict=True):
+            vars(placement)["legal"] = legal
+
+
+def _legal_of(placements: Sequence[Placement]) -> BoolArray:
+    """Return `Placement.legal` of placements on one site (placements, variants, rows, columns)."""
+    cells, catalogue = placements[0]._empty_zone, placements[0].catalogue
+    taken = np.stack([each.standing for each in placements]) > 0
+    legal = cells.places(cells.usable & ~taken)
+    if placements[0]._zone.budget is not None:
+        spendable = np.array([each._spendable for each in placements])
+        legal &= cells.costs <= spendable[:, np.newaxis, np.newaxis, np.newaxis]
+    left = np.array([each.stocks_left for each in placements])
+    of_variants = left[:, [each.item for each in catalogue.variants]]
+    legal &= (of_variants > 0)[..., np.newaxis, np.newaxis]
+    for own, each in zip(legal, placements, strict=True):
+        if each._closing is not None:
+            own &= ~each._closing
+    legal.flags.writeable = False
+    return legal
 
 
 def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
@@ -499,4 +535,6 @@ def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
     """
     if isinstance(layout, CheckedLayout) and layout.scenario is scenario:
         return layout
+    if isinstance(layout, tuple) and not layout:
+        return ()
     return Placement.of(scenario, layout).layout

@@ -170,9 +170,10 @@ def _beside(chain: BoolArray, width: int, rows: int, columns: int) -> BoolArray:
 
 
 def counts_before(mask: BoolArray) -> NDArray[np.int32]:
-    """Return the number of true cells below and left of each corner (rows + 1, columns + 1)."""
-    counts = np.zeros((mask.shape[0] + 1, mask.shape[1] + 1), dtype=np.int32)
-    np.cumsum(np.cumsum(mask, axis=0, dtype=np.int32), axis=1, out=counts[1:, 1:])
+    """Return the number of true cells below and left of corners (..., rows + 1, columns + 1)."""
+    *many, rows, columns = mask.shape
+    counts = np.zeros((*many, rows + 1, columns + 1), dtype=np.int32)
+    np.cumsum(np.cumsum(mask, axis=-2, dtype=np.int32), axis=-1, out=counts[..., 1:, 1:])
     return counts
 
 
@@ -185,10 +186,10 @@ def any_in_windows(counts: NDArray[np.int32], rows: int, columns: int) -> BoolAr
         columns: Columns of a window.
 
     Returns:
-        By lower left cell; empty for windows larger than the grid.
+        By lower left cell (..., rows, columns); empty for windows larger than the grid.
     """
-    strips = counts[rows:] - counts[:-rows]
-    return strips[:, columns:] > strips[:, :-columns]
+    strips = counts[..., rows:, :] - counts[..., :-rows, :]
+    return strips[..., columns:] > strips[..., :-columns]
 
 
 def _along_columns(way: AccessWay, cells: BoolArray) -> BoolArray:

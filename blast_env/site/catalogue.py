@@ -383,8 +383,8 @@ class Catalogue:
 
     def element(self, action: int) -> Element:
         """Return the element that an action below `finish` places."""
-        variant, row, column = np.unravel_index(action, (len(self.variants), *self.shape))
-        return self.element_at(int(variant), int(row), int(column))
+        place, column = divmod(action, self.shape[1])
+        return self.element_at(*divmod(place, self.shape[0]), column)
 
     def element_at(self, variant: int, row: int, column: int) -> Element:
         """Return the element of a variant at a lower left cell."""

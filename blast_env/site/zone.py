@@ -417,7 +417,11 @@ class EmptyZone:
     def places(self, free: BoolArray) -> BoolArray:
         """Return whether each variant covers only free cells, all of them on one level.
 
-        Shape (variants, rows, columns).
+        Args:
+            free: Masks of free cells (..., rows, columns).
+
+        Returns:
+            Shape (..., variants, rows, columns).
         """
         if len(self.levels):
             flat = replace(self, levels=self.levels[:0])
@@ -425,15 +429,19 @@ class EmptyZone:
             return anywhere
         variants = self.catalogue.variants
         if len(variants) == 1 and variants[0].rows == variants[0].columns == 1:
-            return free[np.newaxis]  # the usual case
-        places = np.zeros((len(variants), *free.shape), dtype=bool)
+            return free[..., np.newaxis, :, :]  # the usual case
+        *many, rows, columns = free.shape
+        places = np.zeros((*many, len(variants), rows, columns), dtype=bool)
         taken = counts_before(~free)
-        for place, variant in zip(places, variants, strict=True):
+        windows: dict[tuple[int, int], BoolArray] = {}
+        for number, variant in enumerate(variants):
+            place, size = places[..., number, :, :], (variant.rows, variant.columns)
             if variant.is_measure:
-                place[0, 0] = True
+                place[..., 0, 0] = True
                 continue
-            anything = any_in_windows(taken, variant.rows, variant.columns)
-            place[: anything.shape[0], : anything.shape[1]] = ~anything
+            if size not in windows:
+                windows[size] = ~any_in_windows(taken, *size)
+            place[..., : windows[size].shape[-2], : windows[size].shape[-1]] = windows[size]
         return places
 
 

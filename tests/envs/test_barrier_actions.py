@@ -17,6 +17,7 @@ from blast_env.layout import Placement
 from blast_env.site import Scenario
 from tests.catalogue_sites import WALL, yard
 from tests.envs.small import make, play, same, small_scenario
+from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 
 BY_CHOICE = ["item_then_place", "item_then_block"]
@@ -132,7 +133,6 @@ def test_what_does_not_go_with_a_choice_is_illegal_and_changes_nothing() -> None
         assert (reward, ended, info["illegal_actions"]) == (-0.001, False, count)
         assert same(env.action_masks(), mask)
     assert env.placement.layout == ()
-    assert env.blasts_due(finish) == ()
 
 
 def test_observations_show_what_is_still_possible() -> None:
@@ -257,16 +257,13 @@ def test_the_nearest_place_is_of_the_same_item_in_the_same_rotation() -> None:
 @pytest.mark.parametrize("name", list(ACTIONS))
 def test_no_policy_that_repeats_an_action_gets_stuck(name: str) -> None:
     """With masks disregarded; every episode ends in a layout, not by the limit of 100 actions."""
-    env = yard_env(action=name, illegal_action_limit=100)
+    env = BlastBarrierEnv(yard(), engine=ShadeEngine(), action=name, illegal_action_limit=100)
     for action in range(0, int(env.action_space.n), 7):  # type: ignore[attr-defined]
         env.reset(seed=0)
-        actions = 0
-        while True:
-            due = env.blasts_due(action)
-            actions += 1
-            if due:  # the end; the blast itself takes seconds
-                break
-            env.step(action)
+        actions, ended = 1, False
+        while not ended:
+            _, _, ended, _, _ = env.step(action)
+            actions += not ended
         assert actions <= 3 * env.task.source.representative.zone.stock
 
 
@@ -283,7 +280,6 @@ def test_what_repeats_without_effect_ends_the_episode() -> None:
     assert not env.step(0)[2]  # an action with an effect between two without
     env.step(int(np.flatnonzero(env.action_masks())[0]))
     assert not env.step(other_choice)[2]
-    assert env.blasts_due(other_choice)
     _, _, ended, _, info = env.step(other_choice)
     assert (ended, info["illegal_actions"], len(info["layout"])) == (True, 3, 1)
 

@@ -90,7 +90,7 @@ def rollout(mode: str | None, **arguments: Any) -> list[Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["async", None])
+@pytest.mark.parametrize("mode", ["async"])
 @pytest.mark.parametrize("limit", [{}, {"max_episode_steps": 2}])
 def test_every_mode_gives_the_same(mode: str | None, limit: dict[str, int]) -> None:
     steps, expected = rollout(mode, **limit), rollout("sync", **limit)

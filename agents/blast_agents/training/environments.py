@@ -1,23 +1,29 @@
 """The environments of a training, with their wrappers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from multiprocessing import get_all_start_methods, get_context
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor
+from stable_baselines3.common.vec_env.base_vec_env import (
+    VecEnvIndices,
+    VecEnvObs,
+    VecEnvStepReturn,
+)
 
 from blast_agents.training.hyperparameters import DEFAULT_SECTION
 from blast_agents.training.run_folder import RunConfiguration
 from blast_env.envs.observations import Array
 from blast_env.envs.strategies import ScenarioSource
-from blast_env.evaluation import Evaluators
-from blast_env.evaluation.engines import Engine
+from blast_env.envs.vector_env import BlastBarrierVectorEnv
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.store import BlastStore
 from blast_env.runner import workers_told
 from blast_env.sites import FAMILIES
@@ -33,6 +39,22 @@ class _Masked(gym.Wrapper[Array, np.int64, Array, np.int64]):
         """Return the mask of the actions that are legal now (actions,)."""
         masks: NDArray[np.bool_] = self.env.get_wrapper_attr("action_masks")()
         return masks
+
+
+class _Pool:
+    """A fixed set of seeds of episodes, drawn with replacement; arguments as for `ThreatPool`."""
+
+    def __init__(self, size: int, seed: int) -> None:
+        sequence = np.random.SeedSequence(checked_seed(seed))
+        self.seeds = sequence.generate_state(whole_number("size", size, 1, 100_000)).tolist()
+        self._rng = np.random.default_rng(sequence)
+
+    def draw(self, seed: int | None = None) -> int:
+        """Return the seed of the next episode; `seed` determines the order from here on."""
+        if seed is not None:
+            self._rng = np.random.default_rng(seed)
+        drawn: int = self.seeds[self._rng.integers(len(self.seeds))]
+        return drawn
 
 
 class ThreatPool(_Masked):
@@ -53,17 +75,14 @@ class ThreatPool(_Masked):
 
     def __init__(self, env: _Env, size: int, seed: int = 0) -> None:
         super().__init__(env)
-        sequence = np.random.SeedSequence(checked_seed(seed))
-        self.seeds = sequence.generate_state(whole_number("size", size, 1, 100_000)).tolist()
-        self._rng = np.random.default_rng(sequence)
+        self._pool = _Pool(size, seed)
+        self.seeds = self._pool.seeds
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Begin an episode of the set; the seed determines their order."""
-        if seed is not None:
-            self._rng = np.random.default_rng(seed)
-        return self.env.reset(seed=self.seeds[self._rng.integers(len(self.seeds))], options=options)
+        return self.env.reset(seed=self._pool.draw(seed), options=options)
 
 
 SITES_ID: Final = "BlastBarrierSites-v0"
@@ -82,98 +101,182 @@ def environment_id(scenario: str) -> str:
     return DEFAULT_SECTION
 
 
-class SharedBlastsVecEnv(DummyVecEnv):
-    """Environments in this process whose blasts run on other workers, all those of a step at once.
+class BatchVecEnv(VecEnv):
+    """A `BlastBarrierVectorEnv` for algorithms of stable-baselines3, masked ones included.
 
-    It suits blasts that dominate the time of a step, and more workers than one machine has: the
-    runner sends the blasts to the workers of `on_cluster`. The number of parallel blasts is that of
-    the episodes that end in a step, so there should be several environments per worker; they begin
-    together, and those that use up the stock end together.
-
-    Observations, rewards and masks are those of any other vector of the same environments.
+    It suits engines that compute many blasts at once, and workers of `on_cluster`, to which the
+    blasts of all episodes that end in a step are sent together. Observations, rewards and masks are
+    those of any other vector of the same environments.
 
     Args:
-        makers: Create the `BlastBarrier` environments, which share `cache`.
-        engine: The engine of all environments.
-        cache: Store of the loads.
+        envs: The environments, with the autoreset mode `"Disabled"`.
+        pools: Sizes and seeds of a `ThreatPool` of each environment; empty for none.
+
+    Raises:
+        BlastEnvError: If the autoreset mode is another one.
     """
 
     def __init__(
-        self,
-        makers: Sequence[Callable[[], gym.Env[Any, Any]]],
-        engine: str | Engine,
-        cache: BlastStore,
+        self, envs: BlastBarrierVectorEnv, pools: Sequence[Mapping[str, int]] = ()
     ) -> None:
-        super().__init__([*makers])
-        self._evaluators = Evaluators(engine, cache)
-        self._blasts = np.zeros(len(makers), dtype=np.int64)
+        if envs.autoreset_mode != AutoresetMode.DISABLED:
+            raise BlastEnvError(
+                f"autoreset_mode is {envs.autoreset_mode.value!r}, must be 'Disabled'"
+            )
+        self.envs = envs
+        self._pools = [_Pool(each["size"], each.get("seed", 0)) for each in pools]
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> VecEnvObs:
+        """Begin an episode in every environment."""
+        options = self._options[0] or None
+        observations, infos = self.envs.reset(seed=self._drawn(self._seeds), options=options)
+        self.reset_infos = [_of_one(infos, index) for index in range(self.num_envs)]
+        self._reset_seeds()
+        self._reset_options()
+        return cast("VecEnvObs", observations)
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Set the actions of `step_wait`."""
+        self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Run the blasts that the actions require, then step the environments."""
-        due = [env.get_wrapper_attr("blasts_due") for env in self.envs]
-        blasts_due = [of(action) for of, action in zip(due, self.actions, strict=True)]
-        owners = [index for index, blasts in enumerate(blasts_due) for _ in blasts]
-        was_run = self._evaluators.run_ahead([blast for blasts in blasts_due for blast in blasts])
-        np.add.at(self._blasts, owners, was_run)
-        observations, rewards, ended, infos = super().step_wait()
-        for blasts, info in zip(self._blasts.tolist(), infos, strict=True):
-            if "blasts" in info:  # the environment that requested a blast counts it
-                info["blasts"] += blasts
-                info["cache_hits"] -= blasts
-                asked = info["blasts"] + info["cache_hits"]
-                info["cache_hit_rate"] = info["cache_hits"] / asked
-        return observations, rewards, ended, infos
+        """Make the actions, and begin other episodes where one ends."""
+        observations, rewards, terminated, truncated, infos = self.envs.step(self._actions)
+        ended, of_each = terminated | truncated, []
+        for index in range(self.num_envs):
+            of_each.append(_of_one(infos, index))
+            cut = bool(truncated[index] and not terminated[index])
+            of_each[index]["TimeLimit.truncated"] = cut
+            if ended[index]:
+                of_each[index]["terminal_observation"] = _of_one(observations, index)
+        if ended.any():
+            seeds = self._drawn([None] * self.num_envs, ended)
+            observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": ended})
+        return cast("VecEnvObs", observations), rewards.astype(np.float32), ended, of_each
+
+    def _drawn(
+        self, seeds: Sequence[int | None], chosen: Iterable[bool] = repeat(True)
+    ) -> list[int | None]:
+        """Return the seeds of the next episodes of the environments, from their pools if any."""
+        if not self._pools:
+            return [*seeds]
+        each = zip(self._pools, seeds, chosen, strict=False)
+        return [pool.draw(seed) if begins else None for pool, seed, begins in each]
+
+    def close(self) -> None:
+        """Close the environments."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """Return an attribute, the same for all environments."""
+        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(
+        self,
+        attr_name: str,
+        value: Any,
+        indices: VecEnvIndices = None,  # noqa: ARG002
+    ) -> None:
+        """Set an attribute for all environments."""
+        setattr(self.envs, attr_name, value)
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Return what a method of the vector gives for environments, as `action_masks` does."""
+        found = getattr(self.envs, method_name)(*method_args, **method_kwargs)
+        return [found[index] for index in self._get_indices(indices)]
+
+    def env_is_wrapped(
+        self,
+        wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]],  # noqa: ARG002
+        indices: VecEnvIndices = None,
+    ) -> list[bool]:
+        """Return that no environment has a wrapper."""
+        return [False for _ in self._get_indices(indices)]
+
+
+def _of_one(values: Any, index: int) -> Any:
+    """Return the values of one environment from arrays over all, with masks as in Gymnasium."""
+    if not isinstance(values, dict):
+        return values[index]
+    everyone = {index: True}
+    return {
+        key: _of_one(each, index)
+        for key, each in values.items()
+        if not key.startswith("_") and values.get(f"_{key}", everyone)[index]
+    }
 
 
 @dataclass(frozen=True)
 class EnvironmentMaker:
-    """Creates one of the parallel environments; can be pickled.
+    """Creates one of the parallel environments, or a batch of them; can be pickled.
 
     Attributes:
         configuration: Configuration of the run.
         source: Source of the episodes' scenarios.
         index: Index of the environment.
-        cache: Store of the loads; by default a separate one in memory.
     """
 
     configuration: RunConfiguration
     source: ScenarioSource
     index: int
-    cache: BlastStore | None = None
 
     def __call__(self) -> gym.Env[Any, Any]:
         """Return the environment with its wrappers."""
+        env: gym.Env[Any, Any] = gym.make(
+            "blast_env:BlastBarrier-v0", disable_env_checker=True, **self._arguments(1)
+        )
+        for pool in self._pools([self.index]):
+            env = ThreatPool(env, **pool)
+        return Monitor(env)
+
+    def batch(self) -> VecEnv:
+        """Return the environments from this one on in one batch, with their wrappers."""
+        count = self.configuration.ppo.n_envs - self.index
+        envs = BlastBarrierVectorEnv(count, AutoresetMode.DISABLED, **self._arguments(count))
+        pools = self._pools(range(self.index, self.index + count))
+        return VecMonitor(BatchVecEnv(envs, pools))
+
+    def _arguments(self, count: int) -> dict[str, Any]:
         settings = self.configuration.settings
         threats = {"threats": settings.hidden_threats} if settings.threat == "hidden" else {}
-        env: gym.Env[Any, Any] = gym.make(
-            "blast_env:BlastBarrier-v0",
-            disable_env_checker=True,
-            scenario=self.source,
-            reward="relative",
-            realisations=1,
-            engine=settings.blast_engine,
-            observation=settings.observation,
-            cache=BlastStore(size=_LOADS) if self.cache is None else self.cache,
-            threat=settings.threat,
+        return {
+            "scenario": self.source,
+            "reward": "relative",
+            "realisations": 1,
+            "engine": settings.blast_engine,
+            "observation": settings.observation,
+            "cache": BlastStore(size=_LOADS * count),
+            "threat": settings.threat,
             **threats,
-        )
+        }
+
+    def _pools(self, indices: Iterable[int]) -> list[dict[str, int]]:
+        """Return the arguments of the pools of some environments; none without a pool."""
+        found: list[dict[str, int]] = []
         for _, arguments in self.configuration.ppo.wrappers():
-            sequence = np.random.SeedSequence((settings.seed, self.index))
-            own_seed = {"seed": int(sequence.generate_state(1)[0])}
-            env = ThreatPool(env, **(own_seed | arguments))
-        return Monitor(env)
+            for index in indices:
+                sequence = np.random.SeedSequence((self.configuration.settings.seed, index))
+                found.append({"seed": int(sequence.generate_state(1)[0]), **arguments})
+        return found
 
 
 def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
     """Return the parallel environments, each in a separate process if there are several.
 
-    Within `on_cluster` they are in this process, and their blasts run on the cluster.
+    They are a batch in this process where the engine computes many blasts at once, and within
+    `on_cluster`, whose workers run their blasts.
     """
     count = configuration.ppo.n_envs
-    if workers_told() > 1:
-        shared = BlastStore(size=_LOADS * count)
-        actors = [EnvironmentMaker(configuration, source, index, shared) for index in range(count)]
-        return SharedBlastsVecEnv(actors, configuration.settings.blast_engine, shared)
+    engine = configuration.settings.blast_engine
+    if workers_told() > 1 or (count > 1 and engine.at_once > 1):
+        return EnvironmentMaker(configuration, source, 0).batch()
     makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]
     if count == 1:
         return DummyVecEnv([*makers])

@@ -37,7 +37,7 @@ from blast_env.design.search.moves import Moves, legal_part
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.evaluation import Case, Evaluators
-from blast_env.evaluation.evaluator import BlastAsked
+from blast_env.evaluation.evaluator import run_together
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import Placement
@@ -221,12 +221,12 @@ class Judge:
             threats: Slice of the threats of each case.
         """
         blasts = [
-            BlastAsked(case.scenario, layout, threat)
+            (self.evaluators.of(case.scenario), layout, threat)
             for case, layout in asked
             for threat in case.threats[threats]
         ]
         self.asked += len(blasts)
-        self.evaluators.run_ahead(blasts, self.processes)
+        run_together(blasts, self.processes)
         of_pairs = []
         for case, layout in asked:
             evaluator = self.evaluators.of(case.scenario)

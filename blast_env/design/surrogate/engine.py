@@ -8,10 +8,9 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
-from blast_env.design.surrogate.network import Surrogate, load_surrogate, packaged_surrogate
+from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
-from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
+from blast_env.evaluation.engines import BlastLoads, Engine, EngineBlast, StructureLoad, find_engine
 from blast_env.geometry import Element
 from blast_env.layout.build_scene import charge_against
 from blast_env.site import AnyCharge, Scenario
@@ -42,6 +41,7 @@ class SurrogateEngine(Engine):
     """
 
     has_peaks: ClassVar[bool] = True
+    at_once: ClassVar[int] = 256
     title: ClassVar[str] = "Surrogate"
     caveat: ClassVar[str] = (
         "These are predictions of a surrogate, not blasts: judge with engine 'gas'."
@@ -65,7 +65,7 @@ class SurrogateEngine(Engine):
         scenario: Scenario,
         layout: Sequence[Element],
         charge: AnyCharge,
-        seed: int = 0,  # noqa: ARG002
+        seed: int = 0,
     ) -> BlastLoads:
         """Return the predicted loads of one charge and layout.
 
@@ -82,24 +82,22 @@ class SurrogateEngine(Engine):
         Raises:
             BlastEnvError: If no structure is protected.
         """
-        site = self._site(scenario)
-        guess = self.surrogate.guess(site, [layout], [charge_against(scenario, layout, charge)])
-        names = [each.name for each in site.protected]
+        return self.loads_at_once([EngineBlast(scenario, layout, charge, seed)])[0]
 
-        def of_all(on_protected: FloatArray) -> list[float]:
-            known = dict(zip(names, on_protected.tolist(), strict=True))
-            return [known.get(each.name, 0.0) for each in scenario.structures]
-
-        impulse_pa_s = of_all(guess.impulse_pa_s[0])
-        nothing = [None] * len(impulse_pa_s)
-        peak_pa = nothing if guess.peak_pa is None else of_all(guess.peak_pa[0])
-        structures = tuple(
-            StructureLoad.on(*told, notes=("a prediction of the surrogate, not a blast",))
-            for told in zip(scenario.structures, impulse_pa_s, peak_pa, strict=True)
-        )
-        modules = [each.modules for each in scenario.structures]
-        bays = guess.bays(site, 0) if scenario.objective.is_response else ()
-        return BlastLoads(structures, np.repeat(impulse_pa_s, modules), bays)
+    def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
+        """Return the same for several blasts, by one pass of the networks per site."""
+        found: list[BlastLoads | None] = [None] * len(blasts)
+        of_sites: dict[str, list[int]] = {}
+        for number, each in enumerate(blasts):
+            of_sites.setdefault(each.scenario.content_hash, []).append(number)
+        for numbers in of_sites.values():
+            own = [blasts[number] for number in numbers]
+            site = self._site(own[0].scenario)
+            charges = [charge_against(*each[:3]) for each in own]
+            guess = self.surrogate.guess(site, [each.layout for each in own], charges)
+            for index, number in enumerate(numbers):
+                found[number] = _loads(site, guess, index)
+        return [each for each in found if each is not None]
 
     def _site(self, scenario: Scenario) -> SurrogateSite:
         key = scenario.content_hash
@@ -109,6 +107,27 @@ class SurrogateEngine(Engine):
                 self._sites.popitem(last=False)
         self._sites.move_to_end(key)
         return self._sites[key]
+
+
+def _loads(site: SurrogateSite, guess: Guess, index: int) -> BlastLoads:
+    """Return the loads of one layout of a prediction."""
+    structures = site.scenario.structures
+    impulse_pa_s = dict.fromkeys([each.name for each in structures], 0.0)
+    peak_pa: dict[str, float | None] = dict.fromkeys(
+        impulse_pa_s, None if guess.peak_pa is None else 0.0
+    )
+    names = [each.name for each in site.protected]
+    impulse_pa_s.update(zip(names, guess.impulse_pa_s[index].tolist(), strict=True))
+    if guess.peak_pa is not None:
+        peak_pa.update(zip(names, guess.peak_pa[index].tolist(), strict=True))
+    notes = ("a prediction of the surrogate, not a blast",)
+    loads = tuple(
+        StructureLoad.on(each, impulse_pa_s[each.name], peak_pa[each.name], notes=notes)
+        for each in structures
+    )
+    on_modules = np.repeat([*impulse_pa_s.values()], [each.modules for each in structures])
+    bays = guess.bays(site, index) if site.scenario.objective.is_response else ()
+    return BlastLoads(loads, on_modules, bays)
 
 
 def is_surrogate(name: str) -> bool:

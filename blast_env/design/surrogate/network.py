@@ -4,7 +4,7 @@ Each solid sends a message to each point, computed from their relations. The pre
 is a function of the features of the point and the sum of all messages.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
@@ -307,7 +307,7 @@ class Surrogate:
         )
 
         def of(networks: Networks, known: Sequence[FloatArray], power: float) -> list[FloatArray]:
-            heard = [self._heard(networks, *each, site) for each in pairs]
+            heard = self._heard(networks, pairs, site)
             differs = networks(scaled, np.concatenate(heard, axis=1))
             logs = log_loads(differs, np.concatenate(known), area_m2, starts, power)
             return [each.reshape(len(pairs), -1) for each in _mean_and_spread(logs)]
@@ -336,24 +336,40 @@ class Surrogate:
         return path
 
     def _heard(
-        self, networks: Networks, approach: Approach, barrier: FloatArray, site: SurrogateSite
-    ) -> SingleArray:
-        """Return the sum of messages to each point (members, points, MESSAGE).
+        self,
+        networks: Networks,
+        pairs: Sequence[tuple[Approach, FloatArray]],
+        site: SurrogateSite,
+    ) -> list[SingleArray]:
+        """Return the sum of messages to each point of each pair (members, points, MESSAGE).
 
         Layouts have many pieces in common, so the messages of each piece are cached.
         """
+        related: dict[Hashable, Callable[[], FloatArray]] = {}
+        keys: list[list[Hashable]] = []
+        for approach, barrier in pairs:
+            related[networks, approach] = partial(getattr, approach, "solids")
+            keys.append([(networks, approach)])
+            for piece in barrier:
+                keys[-1].append((networks, approach, piece.tobytes()))
+                related[keys[-1][-1]] = partial(approach.relations, piece[np.newaxis])
+        known = site.memory.of_all(related, lambda missing: self._sent(networks, missing))
+        return [_sum([known[key] for key in of_pair]) for of_pair in keys]
 
-        def sent(related: FloatArray) -> SingleArray:
-            solids, points, _ = related.shape
-            told = networks.messages(self.related(related.reshape(-1, RELATIONS)))
-            summed: SingleArray = told.reshape(-1, solids, points, MESSAGE).sum(axis=1)
-            return summed
+    def _sent(self, networks: Networks, related: Sequence[FloatArray]) -> list[SingleArray]:
+        """Return the sum of the messages of solids to each point (members, points, MESSAGE).
 
-        heard = site.memory.of((networks, approach), lambda: sent(approach.solids)).copy()
-        for piece in barrier:
-            key = (networks, approach, piece.tobytes())
-            heard += site.memory.of(key, partial(_of_piece, sent, approach, piece))
-        return heard
+        Args:
+            networks: The networks.
+            related: Relations of each group of solids (solids, points, RELATIONS).
+        """
+        rows = np.concatenate([each.reshape(-1, RELATIONS) for each in related])
+        told = networks.messages(self.related(rows))
+        ends = np.cumsum([each.shape[0] * each.shape[1] for each in related])
+        return [
+            own.reshape(len(own), *each.shape[:2], MESSAGE).sum(axis=1)
+            for own, each in zip(np.split(told, ends[:-1], axis=1), related, strict=True)
+        ]
 
     def scaled(self, features: FloatArray) -> FloatArray:
         """Return the scaled and bounded features of points (points, FEATURES)."""
@@ -364,10 +380,12 @@ class Surrogate:
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
 
 
-def _of_piece(
-    sent: Callable[[FloatArray], SingleArray], approach: Approach, piece: FloatArray
-) -> SingleArray:
-    return sent(approach.relations(piece[np.newaxis]))
+def _sum(messages: Sequence[SingleArray]) -> SingleArray:
+    """Return the sum of arrays, always in their order."""
+    total = messages[0].copy()
+    for each in messages[1:]:
+        total += each
+    return total
 
 
 def bounded(numbers: FloatArray, mean: FloatArray, scale: FloatArray) -> FloatArray:

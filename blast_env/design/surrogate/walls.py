@@ -1,6 +1,6 @@
 """Sites as the surrogate represents them: points on protected walls, and obstacles to the blast."""
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -190,16 +190,28 @@ class Memory:
         self._most_bytes, self._bytes = most_bytes, 0
         self._kept: dict[Hashable, SingleArray] = {}
 
-    def of(self, key: Hashable, make: Callable[[], SingleArray]) -> SingleArray:
-        """Return the array of a key, and create it if necessary; it must not be modified."""
-        found = self._kept.get(key)
-        if found is None:
-            found = make()
-            if self._bytes + found.nbytes > self._most_bytes:
+    def of_all(
+        self,
+        wanted: Mapping[Hashable, Callable[[], FloatArray]],
+        make: Callable[[Sequence[FloatArray]], Sequence[SingleArray]],
+    ) -> dict[Hashable, SingleArray]:
+        """Return the arrays of keys, which must not be modified.
+
+        Args:
+            wanted: The keys, each with a function that gives the data of its array.
+            make: Makes the missing arrays from their data.
+        """
+        found = {key: self._kept[key] for key in wanted if key in self._kept}
+        missing = [key for key in wanted if key not in found]
+        if missing:
+            made = make([wanted[key]() for key in missing])
+            found.update(zip(missing, made, strict=True))
+        for key in missing:
+            if self._bytes + found[key].nbytes > self._most_bytes:
                 self._kept.clear()
                 self._bytes = 0
-            self._kept[key] = found
-            self._bytes += found.nbytes
+            self._kept[key] = found[key]
+            self._bytes += found[key].nbytes
         return found
 
 
@@ -239,6 +251,7 @@ class SurrogateSite:
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
         self._approaches: dict[Charge, Approach] = {}
+        self._boxes: dict[Element, tuple[float, ...]] = {}
         self._triangular = {
             each.name: TriangularLoads(
                 [bay for bay in self.alternatives if bay.structure == each.name]
@@ -291,19 +304,25 @@ class SurrogateSite:
         Raises:
             LayoutError: If the catalogue has no such piece.
         """
-        zone, air_m = self.scenario.zone, self.scenario.air_height_m
-        terraces = [each for each in self.scenario.structures if each.carries]
-        boxes = [
-            (zone.element_rectangle_m(each), zone.catalogue.variant(each).height_m)
-            for each in standing(layout)
-        ]
-        if not zone.items:
-            boxes = [(each, zone.height_m) for each in _in_lines([box for box, _ in boxes])]
+        zone = self.scenario.zone
         rows = []
-        for rectangle_m, own_m in boxes:
-            top_m = ground_below_m(terraces, rectangle_m) + own_m if own_m else air_m
-            rows.append([*rectangle_m, top_m])
+        if zone.items:
+            for each in standing(layout):
+                if each not in self._boxes:
+                    height_m = zone.catalogue.variant(each).height_m
+                    self._boxes[each] = self._box(zone.element_rectangle_m(each), height_m)
+                rows.append(self._boxes[each])
+        else:
+            boxes = [zone.element_rectangle_m(each) for each in standing(layout)]
+            rows = [self._box(each, zone.height_m) for each in _in_lines(boxes)]
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+    def _box(self, rectangle_m: Rectangle, own_m: float | None) -> tuple[float, ...]:
+        """Return the rectangle and the top of a piece of a height, on its ground."""
+        if not own_m:
+            return (*rectangle_m, self.scenario.air_height_m)
+        terraces = [each for each in self.scenario.structures if each.carries]
+        return (*rectangle_m, ground_below_m(terraces, rectangle_m) + own_m)
 
     def _approach_of(self, charge: Charge) -> Approach:
         points = self._points

@@ -14,10 +14,11 @@ from abc import ABC
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,9 +152,13 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
     for load in loads:
         parts.setdefault(load.building, []).append(load)
     return tuple(
-        replace(own[0], name=name) if len(own) == 1 else _on_building(name, own)
+        _named(own[0], name) if len(own) == 1 else _on_building(name, own)
         for name, own in parts.items()
     )
+
+
+def _named(load: StructureLoad, name: str) -> StructureLoad:
+    return load if load.name == name else replace(load, name=name)
 
 
 def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
@@ -246,15 +251,20 @@ class BlastLoads:
             for each in self.bays
         )
 
-    @property
+    @cached_property
     def protected(self) -> tuple[StructureLoad, ...]:
         """The loads on the protected structures."""
         return tuple(load for load in self.structures if load.protected)
 
+    @cached_property
+    def _buildings(self) -> tuple[StructureLoad, ...]:
+        """The loads on the protected buildings."""
+        return on_buildings(self.protected)
+
     @property
     def protected_impulse_pa_s(self) -> float:
         """Weighted sum of the impulses of the protected buildings, Pa*s."""
-        return sum(each.weight * each.impulse_pa_s for each in on_buildings(self.protected))
+        return sum(each.weight * each.impulse_pa_s for each in self._buildings)
 
     @property
     def protected_impulse_sim(self) -> float | None:
@@ -277,7 +287,7 @@ class BlastLoads:
         Args:
             objective: Selects the load: impulse, peak or response.
         """
-        impulse_pa_s = {each.name: each.impulse_pa_s for each in on_buildings(self.protected)}
+        impulse_pa_s = {each.name: each.impulse_pa_s for each in self._buildings}
         return sum(
             objective.load(
                 impulse_pa_s[load.building],
@@ -359,6 +369,15 @@ class RunnableBlast(Protocol):
         """
 
 
+class EngineBlast(NamedTuple):
+    """The arguments of `Engine.loads`."""
+
+    scenario: Scenario
+    layout: Sequence[Element]
+    charge: AnyCharge
+    seed: int
+
+
 class Engine(ABC):
     """Computes the loads of blasts on a site.
 
@@ -367,6 +386,7 @@ class Engine(ABC):
         version: Version of the code that does the physics.
         has_noise: Whether one charge has several realisations, selected by a seed.
         has_peaks: Whether it computes overpressures as well as impulses.
+        at_once: Largest number of blasts that take less time together than one by one.
         knows_heights: Whether blasts pass over structures and barriers.
         needs_calibration: Whether a calibration of the scenario converts its impulses to Pa s.
         title: Its kind, for display.
@@ -379,6 +399,7 @@ class Engine(ABC):
 
     has_noise: ClassVar[bool] = False
     has_peaks: ClassVar[bool] = False
+    at_once: ClassVar[int] = 1
     knows_heights: ClassVar[bool] = True
     needs_calibration: ClassVar[bool] = False
     title: ClassVar[str] = "Own engine"
@@ -402,6 +423,10 @@ class Engine(ABC):
             seed: Seed of the noise; engines without noise ignore it.
         """
         return self.blast(scenario, layout, seed, charge).run().loads()
+
+    def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
+        """Return the loads of several blasts, by default one after the other."""
+        return [self.loads(*each) for each in blasts]
 
     def blast(
         self,

@@ -1,0 +1,81 @@
+"""Environments in one batch: the same episodes as single ones, to the last bit."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from blast_env.design.surrogate.engine import SurrogateEngine
+from blast_env.envs.vector_env import BlastBarrierVectorEnv
+from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
+
+COUNTS = ("blasts", "cache_hits", "cache_hit_rate")
+"""Of all environments together in a batch, of each one otherwise."""
+
+ENVS, STEPS = 3, 14
+
+
+def uncounted(info: dict[str, Any]) -> dict[str, Any]:
+    left = {key: each for key, each in info.items() if key.removeprefix("_") not in COUNTS}
+    return left | {"final_info": uncounted(left["final_info"])} if "final_info" in left else left
+
+
+def rollout(mode: str, how: str, name: str = "BlastBarrier-v0", **chosen: Any) -> list[Any]:
+    """Return what environments gave in some steps of random actions, some of them illegal."""
+    in_mode: dict[str, Any] = {"autoreset_mode": how}
+    if mode == "sync":
+        in_mode = {"vector_kwargs": in_mode}
+    envs = gym.make_vec(name, ENVS, vectorization_mode=mode, **in_mode, **chosen)
+    assert envs.metadata["autoreset_mode"] == AutoresetMode(how)
+    assert (mode == "vector_entry_point") == isinstance(envs, BlastBarrierVectorEnv)
+    observation, info = envs.reset(seed=5)
+    steps: list[Any] = [(observation, info)]
+    rng = np.random.default_rng(1)
+    for _ in range(STEPS):
+        actions = [
+            rng.choice(np.flatnonzero(mask)) if rng.random() < 0.7 else rng.integers(len(mask))
+            for mask in info["action_mask"]
+        ]
+        observation, reward, ended, cut, info = envs.step(np.array(actions))
+        assert observation in envs.observation_space
+        steps.append((observation, reward, ended, cut, uncounted(info)))
+        if how == "Disabled" and (ended | cut).any():
+            observation, info = envs.reset(seed=9, options={"reset_mask": ended | cut})
+            steps.append((observation, info["action_mask"][ended | cut]))
+            info["action_mask"][~(ended | cut)] = 1
+    envs.close()
+    return steps
+
+
+def check_same(how: str = "NextStep", least: int = 2, **chosen: Any) -> None:
+    expected = rollout("sync", how, **chosen)
+    assert sum((each[2] | each[3]).sum() for each in expected if len(each) == 5) >= least
+    assert same(rollout("vector_entry_point", how, **chosen), expected)
+
+
+@pytest.mark.parametrize("observation", ["image", "grid", "features", "dict"])
+@pytest.mark.parametrize("scenario", [small_scenario(), restricted_scenario()])
+def test_episodes_are_those_of_single_environments(scenario: Any, observation: str) -> None:
+    check_same(scenario=scenario, observation=observation, engine=ThinEngine(), realisations=1)
+
+
+@pytest.mark.parametrize("how", [each.value for each in AutoresetMode])
+@pytest.mark.parametrize("limit", [{}, {"max_episode_steps": 2}])
+def test_every_autoreset_mode(how: str, limit: dict[str, int]) -> None:
+    check_same(how, scenario=small_scenario(), engine=ThinEngine(), realisations=1, **limit)
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        {"scenario": "control_room", "observation": "features"},
+        {"scenario": "control_room", "observation": "image", "action": "row"},
+        {"scenario": "control_room", "observation": "dict", "action": "item_then_block"},
+        {"scenario": "control_room", "threat": "hidden", "threats": 4, "reward": "relative"},
+        {"scenario": "control_room", "reward": "incremental", "invalid_action": "penalty"},
+    ],
+)
+def test_predictions_in_one_pass_are_those_one_by_one(chosen: dict[str, Any]) -> None:
+    check_same(engine=SurrogateEngine(), **chosen)
