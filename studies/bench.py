@@ -5,7 +5,7 @@ Processor times are medians on one core, which do not depend on other processes.
 
 import os
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.cli.output import print_line, print_table, progress_bar, user_errors
+from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import ENGINE_NAMES, find_engine, simulate
 from blast_env.evaluation.engines.gas import GasEngine
@@ -43,7 +44,8 @@ _BLAST_HEADERS: Final = (
     *("million cell updates per CPU s", "memory (MB)"),
 )
 _ENVIRONMENT_HEADERS: Final = (
-    *("scenario", "engine", "steps", "episode (ms)", "placing (ms)", "blast and reward (ms)"),
+    *("scenario", "engine", "observation", "steps", "episode (ms)", "placing (ms)"),
+    *("steps per CPU s", "in a batch", "memory of the batch (MB)"),
 )
 _SITE_HEADERS: Final = (
     *("site", "cells", "smallest", "steps estimated", "steps", "CPU estimated (s)", "CPU (s)"),
@@ -238,19 +240,21 @@ def _site_cost(scenario: Scenario, engine: GasEngine) -> SiteCost:
 
 @dataclass(frozen=True)
 class EnvironmentCost:
-    """The cost of an episode of random legal placements; medians of processor times.
+    """The cost of episodes of random legal placements; medians of processor times.
 
     Attributes:
-        engine: Name of the engine.
-        episode_s: Time of the whole episode.
+        episode_s: Time of an episode of one environment.
         blast_s: Time of its last step, with the blasts and the reward.
         steps: Number of steps per episode.
+        batch_steps_per_s: Steps per CPU second of environments in one batch.
+        batch_mb: Peak memory of a fresh process with such a batch; None if not measured.
     """
 
-    engine: str
     episode_s: float
     blast_s: float
     steps: int
+    batch_steps_per_s: float
+    batch_mb: float | None = None
 
     @property
     def placing_s(self) -> float:
@@ -258,24 +262,57 @@ class EnvironmentCost:
         return self.episode_s - self.blast_s
 
 
-def environment_cost(scenario: Scenario, engine: str, episodes: int) -> EnvironmentCost:
-    """Time the environment.
+def environment_cost(
+    chosen: Mapping[str, Any], episodes: int, environments: int, *, memory: bool = True
+) -> EnvironmentCost:
+    """Time one environment, and several in one batch.
 
     Args:
-        scenario: The scenario; it needs a build zone, and a calibration where the engine does.
-        engine: Name of the engine.
+        chosen: Arguments of `gymnasium.make`. The scenario needs a build zone, and a calibration
+            where the engine does.
         episodes: Number of timed episodes, after one to warm up.
+        environments: Number of environments in the batch.
+        memory: Whether to measure the memory of the batch, too, in a separate process.
 
     Raises:
         BlastEnvError: If the environment cannot be made of the scenario.
     """
-    env = gym.make(ENV_ID, scenario=scenario, engine=engine)
+    env = gym.make(ENV_ID, **chosen)
     rng = np.random.default_rng(0)
     _episode(env, rng, 0)
     played = [_episode(env, rng, seed) for seed in range(1, episodes + 1)]
     env.close()
     whole_s, blast_s, steps = zip(*played, strict=True)
-    return EnvironmentCost(engine, median(whole_s), median(blast_s), round(median(steps)))
+    rate = _batch_rate(chosen, environments, episodes)
+    batch_mb = None
+    if memory:
+        with get_context("spawn").Pool(1) as pool:
+            batch_mb = pool.apply(_batch_memory_mb, (chosen, environments))
+    return EnvironmentCost(median(whole_s), median(blast_s), round(median(steps)), rate, batch_mb)
+
+
+def _batch_rate(chosen: Mapping[str, Any], environments: int, episodes: int) -> float:
+    """Return the median over some episodes of steps per CPU second; the first ones warm up."""
+    envs = BlastBarrierVectorEnv(environments, **chosen)
+    rng, rates = np.random.default_rng(0), []
+    _, info = envs.reset(seed=0)
+    over = np.zeros(environments, dtype=bool)
+    for _ in range(episodes + 1):
+        ended, steps, began = 0, 0, process_time()
+        while ended < environments:
+            steps += int(np.count_nonzero(~over))  # others begin: no step
+            masks = info["action_mask"]
+            free = masks[:, :-1] * rng.random((environments, masks.shape[1] - 1), np.float32)
+            actions = np.where(free.any(axis=1), free.argmax(axis=1), masks.shape[1] - 1)
+            _, _, over, _, info = envs.step(actions)
+            ended += int(np.count_nonzero(over))
+        rates.append(steps / (process_time() - began))
+    return median(rates[1:])
+
+
+def _batch_memory_mb(chosen: Mapping[str, Any], environments: int) -> float:
+    _batch_rate(chosen, environments, 1)
+    return own_memory_mb()
 
 
 def _episode(
@@ -329,22 +366,34 @@ def _print_blasts(costs: Sequence[BlastCost], repeats: int) -> None:
         )
         for each in costs
     ]
-    print_table(f"a blast: medians of {repeats} seeds", _BLAST_HEADERS, rows, 2)
+    if rows:
+        print_table(f"a blast: medians of {repeats} seeds", _BLAST_HEADERS, rows, 2)
 
 
-def _print_environments(pairs: Sequence[tuple[Scenario, str]], repeats: int) -> None:
+def _print_environments(
+    pairs: Sequence[tuple[Scenario, str]], repeats: int, environments: int, *, memory: bool
+) -> None:
     rows, left_out = [], []
     for scenario, engine in pairs:
-        try:
-            cost = environment_cost(scenario, engine, repeats)
-        except BlastEnvError as error:
-            left_out.append(f"{scenario.name}, {engine}: no environment: {error}")
-            continue
-        times_s = (cost.episode_s, cost.placing_s, cost.blast_s)
-        milliseconds = (f"{MS_PER_S * each:.1f}" for each in times_s)
-        rows.append((scenario.name, engine, str(cost.steps), *milliseconds))
-    title = f"{ENV_ID}: random placements, medians of {repeats} episodes"
-    print_table(title, _ENVIRONMENT_HEADERS, rows, 2)
+        for observation in ("features", "image"):
+            chosen = {"scenario": scenario, "engine": engine, "observation": observation}
+            try:
+                cost = environment_cost(chosen, repeats, environments, memory=memory)
+            except BlastEnvError as error:
+                left_out.append(f"{scenario.name}, {engine}: no environment: {error}")
+                break
+            milliseconds = (f"{MS_PER_S * each:.1f}" for each in (cost.episode_s, cost.placing_s))
+            rows.append(
+                (
+                    *(scenario.name, engine, observation, str(cost.steps), *milliseconds),
+                    f"{cost.steps / cost.episode_s:,.0f}",
+                    f"{cost.batch_steps_per_s:,.0f}",
+                    "-" if cost.batch_mb is None else f"{cost.batch_mb:.0f}",
+                )
+            )
+    if rows:
+        title = f"{ENV_ID}: medians of {repeats} episodes; a batch has {environments} environments"
+        print_table(title, _ENVIRONMENT_HEADERS, rows, 3)
     for line in left_out:
         print_line(line)
 
@@ -401,6 +450,9 @@ def main(
     repeats: Annotated[int, typer.Option(help="Blasts or episodes of each.", min=1)] = 5,
     memory: Annotated[bool, typer.Option(help="Measure the memory of a process, too.")] = True,
     environment: Annotated[bool, typer.Option(help=f"Time {ENV_ID}, too.")] = True,
+    environments: Annotated[
+        int, typer.Option(help="Environments in a batch, which steps them together.", min=1)
+    ] = 256,
     site: Annotated[
         list[str] | None,
         typer.Option(
@@ -434,12 +486,12 @@ def main(
         pairs = [(each, name) for each in scenarios for name in engines]
         costs: list[BlastCost] = []
         with progress_bar("blasts") as progress:
-            for each, name in pairs:
+            for each, name in (pair for pair in pairs if find_engine(pair[1]).medium):
                 costs.append(blast_cost(each, name, repeats, memory=memory))
                 progress(len(costs) / len(pairs))
         _print_blasts(costs, repeats)
         if environment:
-            _print_environments(pairs, repeats)
+            _print_environments(pairs, repeats, environments, memory=memory)
 
 
 if __name__ == "__main__":

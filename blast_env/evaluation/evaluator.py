@@ -7,7 +7,8 @@ from typing import Final
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase
-from blast_env.evaluation.engines import BlastLoads, Engine, EngineBlast, find_engine
+from blast_env.evaluation.engines import BlastLoads, Engine, find_engine
+from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
@@ -15,7 +16,7 @@ from blast_env.layout.placement import met_by_blasts
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site import AnyCharge, AnyScenario, find_scenario
 from blast_env.site.scene import Charge
 
 

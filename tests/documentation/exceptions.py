@@ -219,6 +219,9 @@ SMALLER: Final[dict[str, str]] = {
         "--engine event --repeats 1 --no-memory --no-environment"
     ),
     "python -m studies.bench --site large": "--length 20",
+    "python -m studies.bench --engine surrogate --scenario control_room": (
+        "--repeats 1 --no-memory --environments 2"
+    ),
     "blast-env calibrate --name ballistic_kb_100kg --reference reflected_impulse"
     " --distances 8,10,12.5,16,20,25,32,40 --seeds 32": "--seeds 2 --distances 8,16,32",
     "blast-env calibrate --name collisional_kb --preset collisional --reference reflected_impulse"
@@ -265,7 +268,7 @@ CODE_SHORTENED: Final = {
 """Parts of blocks of Python that are replaced to take less time, by page and number."""
 
 CODE_NOT_RUN: Final = {
-    ("docs/researchers/libraries.md", 6): (
+    ("docs/researchers/libraries.md", 7): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
 }

@@ -7,7 +7,7 @@ import pytest
 from typer import Typer
 from typer.testing import CliRunner, Result
 
-from blast_env import Scenario, load_scenario, simulate
+from blast_env import Scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.layout.build_scene import draw_charge
@@ -20,7 +20,7 @@ from studies.bench import (
     site_cost,
     street,
 )
-from tests.envs.small import small_document
+from tests.envs.small import ThinEngine, small_document
 from tests.gas_sites import hut
 
 
@@ -54,10 +54,12 @@ def test_memory_is_that_of_a_process_of_its_own() -> None:
 
 
 def test_an_episode_is_its_placements_and_its_blast() -> None:
-    cost = environment_cost(small(), "event", episodes=1)
+    chosen = {"scenario": small(), "engine": ThinEngine()}
+    cost = environment_cost(chosen, episodes=1, environments=3, memory=False)
     assert cost.steps == 3  # the stock
     assert 0.0 < cost.placing_s < cost.episode_s
     assert cost.blast_s + cost.placing_s == pytest.approx(cost.episode_s)
+    assert cost.batch_steps_per_s > 0.0
 
 
 def test_random_actions_are_legal_and_finish_when_nothing_is_free() -> None:
@@ -69,7 +71,7 @@ def test_random_actions_are_legal_and_finish_when_nothing_is_free() -> None:
 
 def test_a_scenario_without_a_build_zone_has_no_environment() -> None:
     with pytest.raises(BlastEnvError, match="build zone"):
-        environment_cost(load_scenario("free_field"), "event", 1)
+        environment_cost({"scenario": "free_field", "engine": "event"}, 1, 3)
 
 
 def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,11 +6,13 @@ from blast_agents.training.agent import (
     load_archive,
     newest_weights,
 )
+from blast_agents.training.environments import BatchVecEnv
 from blast_agents.training.hyperparameters import Hyperparameters, load_hyperparameters
 from blast_agents.training.run_folder import TrainingSettings
 from blast_agents.training.train import resume, train
 
 __all__ = [
+    "BatchVecEnv",
     "Hyperparameters",
     "TrainedAgent",
     "TrainingSettings",

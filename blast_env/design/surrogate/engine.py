@@ -10,7 +10,8 @@ import numpy as np
 
 from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
-from blast_env.evaluation.engines import BlastLoads, Engine, EngineBlast, StructureLoad, find_engine
+from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
+from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.geometry import Element
 from blast_env.layout.build_scene import charge_against
 from blast_env.site import AnyCharge, Scenario
