@@ -33,7 +33,7 @@ from blast_env.design.surrogate import SurrogateEngine, SurrogateSite, site_of
 from blast_env.design.surrogate.correction import Correction
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ReductionReward, Transition
-from blast_env.evaluation import Case, Comparison, Evaluators, SeedRange, compare, draw_threats
+from blast_env.evaluation import Case, Evaluation, Evaluators, SeedRange, compare, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
@@ -252,17 +252,17 @@ class AgentComparison:
     """The trained agent against the other methods, on the same charges.
 
     Attributes:
-        results: Comparison of each method's layouts with no barrier, by name.
+        results: Evaluation of each method's layouts with no barrier, by name.
         rules: Names of the rules among them.
         engine: Name of the judging engine, with its cells.
     """
 
-    results: Mapping[str, Comparison]
+    results: Mapping[str, Evaluation]
     rules: tuple[str, ...]
     engine: str
 
     @property
-    def agent(self) -> Comparison:
+    def agent(self) -> Evaluation:
         """The layouts of the trained agent."""
         return self.results[AGENT]
 
@@ -272,7 +272,7 @@ class AgentComparison:
         return max(self.rules, key=lambda name: self.results[name].reduction.value)
 
     @property
-    def best_rule_each(self) -> Comparison:
+    def best_rule_each(self) -> Evaluation:
         """The best rule for each charge, which only blasts with all rules can determine."""
         rules = [self.results[name] for name in self.rules]
         chosen = np.argmin([rule.loads.mean(axis=1) for rule in rules], axis=0).tolist()
@@ -314,7 +314,7 @@ class AgentComparison:
         others |= {"best rule for each case": self.best_rule_each, AGENT: self.agent}
         return [self._row(name, each) for name, each in others.items()]
 
-    def _row(self, name: str, result: Comparison) -> tuple[str, ...]:
+    def _row(self, name: str, result: Evaluation) -> tuple[str, ...]:
         ahead = self.agent.difference(result)
         return (
             name,

@@ -160,7 +160,7 @@ def test_a_killed_worker_changes_nothing(two: Dask, tmp_path: Path) -> None:
 
 
 def _bits(loads: BlastLoads) -> tuple[object, bytes]:
-    return loads.structures, loads.module_impulse_sim.tobytes()
+    return loads.structures, loads.module_impulse.tobytes()
 
 
 def test_work_that_kills_its_workers_is_given_up() -> None:

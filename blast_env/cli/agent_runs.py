@@ -39,7 +39,7 @@ from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_s
 from blast_env.evaluation import (
     BlastEvaluator,
     Case,
-    Comparison,
+    Evaluation,
     Evaluators,
     SeedRange,
     compare,
@@ -195,7 +195,7 @@ def _fixed(case: Case, options: EvaluateOptions) -> Case:
 
 
 def _export(
-    comparison: Comparison,
+    comparison: Evaluation,
     settings: TrainingSettings,
     provenance: dict[str, Any],
     options: EvaluateOptions,
@@ -207,7 +207,7 @@ def _export(
     return exported + _write_sites(settings, plans, options.export)
 
 
-def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
+def _print_cases(comparison: Evaluation, engine: Engine, title: str) -> None:
     cases, objective = case_table(comparison), comparison.cases[0].scenario.objective
     rows = [
         (
@@ -231,7 +231,7 @@ def _print_cases(comparison: Comparison, engine: Engine, title: str) -> None:
         print_line(f"calibration {', '.join(calibrations)}")
 
 
-def _write(comparison: Comparison, record: dict[str, Any], out: Path) -> list[Path]:
+def _write(comparison: Evaluation, record: dict[str, Any], out: Path) -> list[Path]:
     path = out / "evaluation.json"
     with write_atomically(path) as temporary:
         text = json.dumps(record, indent=2, allow_nan=False)
@@ -240,7 +240,7 @@ def _write(comparison: Comparison, record: dict[str, Any], out: Path) -> list[Pa
     return [path, table, save_figure(comparison_figure(comparison), out / "evaluation.png")]
 
 
-def _plans(comparison: Comparison, provenance: dict[str, Any]) -> dict[str, LayoutPlan]:
+def _plans(comparison: Evaluation, provenance: dict[str, Any]) -> dict[str, LayoutPlan]:
     """Return the layouts by the names of their files, numbered in the order of the table."""
     digits = len(str(len(comparison.cases)))
     pairs = zip(comparison.cases, comparison.layouts, strict=True)

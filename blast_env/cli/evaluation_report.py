@@ -30,7 +30,7 @@ from blast_env.evaluation import (
     evaluate_against,
 )
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
-from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.engines.contract import BlastLoads
 from blast_env.evaluation.grid_error import GridError, final_engine, points, with_errors, worse
@@ -321,8 +321,7 @@ def _of_cells(error: str) -> str:
 def _print_totals(evaluation: LayoutEvaluation) -> None:
     """Print the loads on the protected structures together, and the worst threat."""
     worst, objective = evaluation.worst, evaluation.scenario.objective
-    comparison = evaluation.comparison
-    print_means(comparison, objective, "threats" if evaluation.engine.has_noise else "charges")
+    print_means(evaluation, objective, "threats" if evaluation.engine.has_noise else "charges")
     if objective != ObjectiveSection():
         print_line(
             f"objective ({_objective_text(objective)}): "
@@ -348,7 +347,7 @@ def _objective_text(objective: ObjectiveSection) -> str:
 
 
 def print_means(
-    comparison: Comparison, objective: ObjectiveSection, sampled: str = "charges"
+    comparison: Evaluation, objective: ObjectiveSection, sampled: str = "charges"
 ) -> None:
     """Print the reduction, and the mean loads without and with barrier.
 

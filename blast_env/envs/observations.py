@@ -80,7 +80,7 @@ class SimulatedModuleLoads:
         """Return the mean load on each module, simulation units (modules,)."""
         threats = draw_threats(scenario.model_copy(update={"charge": sources}), range(blasts))
         loads = self.evaluators.of(scenario).loads_of_many([((), threat) for threat in threats])
-        return np.asarray(np.mean([each.module_impulse_sim for each in loads], axis=0))
+        return np.asarray(np.mean([each.module_impulse for each in loads], axis=0))
 
 
 @dataclass(frozen=True, eq=False)

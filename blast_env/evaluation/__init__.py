@@ -3,7 +3,7 @@
 from blast_env.evaluation.cases import Case, LoadCase, SeedRange, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,
-    Comparison,
+    Evaluation,
     compare,
 )
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad, StructureLoad
@@ -34,9 +34,9 @@ __all__ = [
     "BlastStore",
     "BudgetError",
     "Case",
-    "Comparison",
     "DesignProblem",
     "Estimate",
+    "Evaluation",
     "Evaluators",
     "GridError",
     "LayoutEvaluation",

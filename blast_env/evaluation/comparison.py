@@ -91,7 +91,7 @@ class Assessment:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Evaluation:
     """Layouts, one per case, compared with no barrier on the same threats.
 
     The reduction of a case is 1 - load with the barrier / load without it, each combined over the
@@ -106,7 +106,7 @@ class Comparison:
         loads: Loads on the protected structures with the layouts, in the unit of the objective
             (cases, threats); see `BlastLoads.load`.
         unprotected: The same without a barrier (cases, threats).
-        in_range: Whether each blast is in the range of the calibration (cases, threats).
+        within: Whether each blast is in the range of the calibration (cases, threats).
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
         grid_error: Error of the cells, from the threat with the largest load behind a layout;
             `None` without one.
@@ -119,7 +119,7 @@ class Comparison:
     layouts: tuple[Layout, ...]
     loads: FloatArray
     unprotected: FloatArray
-    in_range: BoolArray
+    within: BoolArray
     cvar_level: float = CVAR_LEVEL
     grid_error: GridError | None = None
 
@@ -131,6 +131,11 @@ class Comparison:
     def has_one_case(self) -> bool:
         """Whether there is a single case, so that intervals and the worst are over its threats."""
         return len(self.cases) == 1
+
+    @property
+    def in_range(self) -> bool:
+        """Whether all blasts are in the range of the calibration."""
+        return bool(self.within.all())
 
     @property
     def _is_mean(self) -> bool:
@@ -153,7 +158,7 @@ class Comparison:
         value, low, high = mean_estimate(self.case_reductions)
         return Estimate(value, low, min(high, 1.0))  # no reduction is above 1
 
-    def difference(self, other: "Comparison") -> Estimate:
+    def difference(self, other: "Evaluation") -> Estimate:
         """Return the difference in mean reduction from another, with its paired interval.
 
         Args:
@@ -245,7 +250,7 @@ def compare(
     coarser: Evaluators | None = None,
     cvar_level: float = CVAR_LEVEL,
     progress: Callable[[float], None] | None = None,
-) -> Comparison:
+) -> Evaluation:
     """Compare layouts with no barrier, each on the threats of its case.
 
     Args:
@@ -280,12 +285,12 @@ def compare(
         fine = walled[worst], bare[worst]
         threat, there = case.threats[worst], coarser.of(case.scenario)
         error = grid_error(there, case, cells[number], threat, fine, processes)
-    return Comparison(
+    return Evaluation(
         cases=tuple(cases),
         layouts=tuple(cells),
         loads=loads,
         unprotected=_counted(cases, [bare for _, bare in blasts]),
-        in_range=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
+        within=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
         cvar_level=cvar_level,
         grid_error=error,
     )
@@ -392,7 +397,7 @@ def charge_values(charge: Charge) -> dict[str, object]:
     return {column.name: value for column, value in zip(CHARGE_COLUMNS, values, strict=True)}
 
 
-def case_table(comparison: Comparison) -> "pd.DataFrame":
+def case_table(comparison: Evaluation) -> "pd.DataFrame":
     """Return one row per case; see `CASE_COLUMNS`."""
     rows = []
     for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
@@ -407,13 +412,13 @@ def case_table(comparison: Comparison) -> "pd.DataFrame":
                 "unprotected_load": case.counted(comparison.unprotected[index]),
                 "unit": case.scenario.objective.unit,
                 "reduction": float(comparison.case_reductions[index]),
-                "in_range": bool(comparison.in_range[index].all()),
+                "in_range": bool(comparison.within[index].all()),
             }
         )
     return table_of(rows, CASE_COLUMNS)
 
 
-def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
+def comparison_record(comparison: Evaluation, engine: Engine) -> dict[str, Any]:
     """Return a comparison as JSON-compatible data; NaN becomes `None`."""
     cases = [
         {
@@ -443,7 +448,7 @@ def comparison_record(comparison: Comparison, engine: Engine) -> dict[str, Any]:
     }
 
 
-def grid_error_record(comparison: Comparison, engine: Engine) -> dict[str, Any] | None:
+def grid_error_record(comparison: Evaluation, engine: Engine) -> dict[str, Any] | None:
     """Return the errors of the cells as JSON-compatible data; `None` without any."""
     error = comparison.grid_error
     if error is None:

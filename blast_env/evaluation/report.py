@@ -13,7 +13,7 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.cases import Case, LoadCase, draw_threats, in_turn
 from blast_env.evaluation.comparison import (
     CHARGE_COLUMNS,
-    Comparison,
+    Evaluation,
     charge_values,
     estimate_record,
     grid_error_record,
@@ -81,15 +81,21 @@ STRUCTURE_COLUMNS: Final = (
 _OF_PARTICLES: Final = (*SIM_NAMES, *(f"unprotected_{name}" for name in SIM_NAMES))
 """Columns that only particle engines have."""
 
-MODULE_COLUMNS: Final = (
-    Column("module_id", "", "name of the module, made from its centre in metres"),
-    Column("structure", "", "structure that the module is part of"),
-    Column("x_m", "m", "centre, from the left border"),
-    Column("y_m", "m", "centre, from the lower border"),
-    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
-    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
-    Column("reduction", "", "of the sum of m |v|"),
-)
+
+def module_columns(has_particles: bool) -> tuple[Column, ...]:
+    """Return the columns of `LayoutEvaluation.module_table`, which end with loads and reduction."""
+    unit, words = ("sim", "sum of m |v|") if has_particles else ("n_s", "momentum on its walls")
+    shown = "sim" if has_particles else "N s"
+    return (
+        Column("module_id", "", "name of the module, made from its centre in metres"),
+        Column("structure", "", "structure that the module is part of"),
+        Column("x_m", "m", "centre, from the left border"),
+        Column("y_m", "m", "centre, from the lower border"),
+        Column(f"impulse_{unit}", shown, f"{words} with the barrier"),
+        Column(f"unprotected_impulse_{unit}", shown, f"{words} without it"),
+        Column("reduction", "", f"of the {words}"),
+    )
+
 
 THREAT_COLUMNS: Final = (
     Column("seed", "", "seed of fan and air"),
@@ -169,7 +175,7 @@ def _result(evaluation: "LayoutEvaluation") -> dict[str, Any]:
             "unprotected_load": evaluation.unprotected_load,
         },
         "worst": _worst(evaluation.worst),
-        "grid_error": grid_error_record(evaluation.comparison, evaluation.engine),
+        "grid_error": grid_error_record(evaluation, evaluation.engine),
         "in_range": evaluation.in_range,
     }
 
@@ -225,9 +231,9 @@ class ThreatOutcome:
         return reductions(self.load, self.unprotected_load).item()
 
 
-@dataclass(frozen=True, eq=False)
-class LayoutEvaluation:
-    """A layout compared with no barrier on the threats of one case.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LayoutEvaluation(Evaluation):
+    """A layout compared with no barrier on the threats of one case, with all loads.
 
     Impulses are those of `BlastLoads.protected_impulse_pa_s`, weighted sums of impulses per area of
     the protected buildings. Reductions are of the load in the scenario's objective, by default
@@ -235,30 +241,29 @@ class LayoutEvaluation:
     scenario; they do not include the error of the model.
 
     Attributes:
-        case: The scenario and the threats.
-        layout: The layout's cells, sorted.
-        loads: Loads with the layout, one per threat.
-        unprotected: Loads without any barrier, one per threat.
+        blasts: Loads with the layout, whose cells are sorted, one per threat.
+        unprotected_blasts: Loads without any barrier, one per threat.
         calibration: Name of the calibration; `"none"` for gas dynamics.
         engine: The engine.
-        cvar_level: Level of the CVaR: 0.8 is the mean of the worst 20 %.
-        grid_error: Error of the cells, from the worst threat; `None` without one.
 
     Raises:
         BlastEnvError: If no load reaches the protected structures without a barrier.
     """
 
-    case: Case
-    layout: Layout
-    loads: tuple[BlastLoads, ...]
-    unprotected: tuple[BlastLoads, ...]
+    blasts: tuple[BlastLoads, ...]
+    unprotected_blasts: tuple[BlastLoads, ...]
     calibration: str
     engine: Engine
-    cvar_level: float
-    grid_error: GridError | None = None
 
-    def __post_init__(self) -> None:
-        self.comparison  # noqa: B018
+    @property
+    def case(self) -> Case:
+        """The scenario and the threats."""
+        return self.cases[0]
+
+    @property
+    def layout(self) -> Layout:
+        """The layout's cells, sorted."""
+        return self.layouts[0]
 
     @property
     def scenario(self) -> Scenario:
@@ -271,23 +276,9 @@ class LayoutEvaluation:
         return self.case.threats
 
     @cached_property
-    def comparison(self) -> Comparison:
-        """The comparison of the loads in the unit of the objective."""
-        counts = self.scenario.objective
-        return Comparison(
-            cases=(self.case,),
-            layouts=(self.layout,),
-            loads=np.array([[load.load(counts) for load in self.loads]]),
-            unprotected=np.array([[load.load(counts) for load in self.unprotected]]),
-            in_range=np.array([[load.in_range for load in self.loads]]),
-            cvar_level=self.cvar_level,
-            grid_error=self.grid_error,
-        )
-
-    @cached_property
     def outcomes(self) -> tuple[ThreatOutcome, ...]:
         """The loads under each threat."""
-        return tuple(map(self._outcome, self.threats, self.loads, self.unprotected))
+        return tuple(map(self._outcome, self.threats, self.blasts, self.unprotected_blasts))
 
     def _outcome(self, threat: LoadCase, load: BlastLoads, bare: BlastLoads) -> ThreatOutcome:
         scenario = self.scenario
@@ -309,29 +300,19 @@ class LayoutEvaluation:
         )
 
     @property
-    def reduction(self) -> Estimate:
-        """1 - load with the barrier / load without it; see `Comparison`, `reduction_estimate`."""
-        return self.comparison.reduction
-
-    @property
     def load(self) -> float:
         """The objective value over all threats with the barrier, in the objective's unit."""
-        return self.case.counted(self.comparison.loads[0], self.comparison.layouts[0])
+        return self.case.counted(self.loads[0], self.layout)
 
     @property
     def unprotected_load(self) -> float:
         """The same without the barrier."""
-        return self.case.counted(self.comparison.unprotected[0])
+        return self.case.counted(self.unprotected[0])
 
     @property
     def mean_reduction(self) -> float:
         """The value of `reduction`: 0 for an unchanged load, 1 for none."""
         return self.reduction.value
-
-    @property
-    def reduction_error(self) -> float:
-        """Error of the cells of `mean_reduction`, an absolute share; NaN without one."""
-        return self.comparison.reduction_error
 
     @property
     def ci95(self) -> tuple[float, float]:
@@ -341,12 +322,12 @@ class LayoutEvaluation:
     @property
     def impulse_pa_s(self) -> Estimate:
         """Mean impulse with the barrier, Pa*s, for any objective."""
-        return mean_estimate(_impulses_pa_s(self.loads))
+        return mean_estimate(_impulses_pa_s(self.blasts))
 
     @property
     def unprotected_impulse_pa_s(self) -> Estimate:
         """Mean impulse without the barrier, Pa*s."""
-        return mean_estimate(_impulses_pa_s(self.unprotected))
+        return mean_estimate(_impulses_pa_s(self.unprotected_blasts))
 
     @cached_property
     def worst(self) -> ThreatOutcome:
@@ -356,12 +337,12 @@ class LayoutEvaluation:
     @property
     def cvar_pa_s(self) -> float:
         """Mean impulse of the worst threats with the barrier, Pa*s; see `cvar_level`."""
-        return conditional_value_at_risk(_impulses_pa_s(self.loads), self.cvar_level)
+        return conditional_value_at_risk(_impulses_pa_s(self.blasts), self.cvar_level)
 
     @property
     def unprotected_cvar_pa_s(self) -> float:
         """Mean impulse of the worst threats without the barrier, Pa*s."""
-        return conditional_value_at_risk(_impulses_pa_s(self.unprotected), self.cvar_level)
+        return conditional_value_at_risk(_impulses_pa_s(self.unprotected_blasts), self.cvar_level)
 
     @cached_property
     def table(self) -> "pd.DataFrame":
@@ -380,7 +361,8 @@ class LayoutEvaluation:
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
         """Return one row per load in the result of `loads_of`."""
         loads, bare = (
-            zip(*map(loads_of, blasts), strict=True) for blasts in (self.loads, self.unprotected)
+            zip(*map(loads_of, blasts), strict=True)
+            for blasts in (self.blasts, self.unprotected_blasts)
         )
 
         def impulse_of(blast: BlastLoads, number: int) -> float:
@@ -390,24 +372,23 @@ class LayoutEvaluation:
             _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
             for number, both in enumerate(zip(loads, bare, strict=True))
         ]
-        absent = () if isinstance(self.loads[0].structures[0], ParticleLoad) else _OF_PARTICLES
+        absent = () if self.blasts[0].has_particles else _OF_PARTICLES
         return table_of(rows, [each for each in STRUCTURE_COLUMNS if each.name not in absent])
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":
-        """One row per module of the structures, in the scene's order; see `MODULE_COLUMNS`."""
+        """One row per module of the structures, in the scene's order; see `module_columns`."""
         from blast_env.particles.tables import module_table
 
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)
         impulse, bare = (
-            np.mean([load.module_impulse_sim for load in loads], axis=0)
-            for loads in (self.loads, self.unprotected)
+            np.mean([load.module_impulse for load in loads], axis=0)
+            for loads in (self.blasts, self.unprotected_blasts)
         )
-        table = module_table(scene.obstacles()).assign(
-            impulse_sim=impulse, unprotected_impulse_sim=bare, reduction=reductions(impulse, bare)
-        )
-        return table[[column.name for column in MODULE_COLUMNS]]
+        names = [column.name for column in module_columns(self.blasts[0].has_particles)]
+        values = dict(zip(names[-3:], (impulse, bare, reductions(impulse, bare)), strict=True))
+        return module_table(scene.obstacles()).assign(**values)[names]
 
     @cached_property
     def threat_table(self) -> "pd.DataFrame":
@@ -419,11 +400,6 @@ class LayoutEvaluation:
         ]
         return table_of(rows, THREAT_COLUMNS)
 
-    @property
-    def in_range(self) -> bool:
-        """Whether all threats to protected structures are in the range of the calibration."""
-        return all(outcome.in_range for outcome in self.outcomes)
-
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
@@ -432,7 +408,7 @@ class LayoutEvaluation:
         checked = self.engine.validated_range
         if self.engine.needs_calibration:
             checked = f"the range of calibration {self.calibration!r}"
-        for of_structure in zip(*(load.structures for load in self.loads), strict=True):
+        for of_structure in zip(*(load.structures for load in self.blasts), strict=True):
             outside = [load for load in of_structure if not load.in_range]
             if outside:
                 notes.append(
@@ -575,14 +551,18 @@ def evaluate_against(
     cells = tuple(sorted(check_layout(scenario, layout)))
     case = Case(scenario, tuple(threats))
     loads, unprotected = loads_of_both(evaluator, case, cells, processes, progress)
+    counts = scenario.objective
     evaluation = LayoutEvaluation(
-        case=case,
-        layout=cells,
-        loads=loads,
-        unprotected=unprotected,
+        cases=(case,),
+        layouts=(cells,),
+        loads=np.array([[load.load(counts) for load in loads]]),
+        unprotected=np.array([[load.load(counts) for load in unprotected]]),
+        within=np.array([[load.in_range for load in loads]]),
+        cvar_level=cvar_level,
+        blasts=loads,
+        unprotected_blasts=unprotected,
         calibration=evaluator.calibration_name,
         engine=evaluator.engine,
-        cvar_level=cvar_level,
     )
     worst = evaluation.outcomes.index(evaluation.worst)
     fine = loads[worst], unprotected[worst]

@@ -132,7 +132,7 @@ class BlastStore:
 
     def remember(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast in memory only."""
-        loads.module_impulse_sim.flags.writeable = False  # shared by several callers
+        loads.module_impulse.flags.writeable = False  # shared by several callers
         self._loads[key] = loads
         self._loads.move_to_end(key)
         if len(self._loads) > self.size:
@@ -175,12 +175,13 @@ _KEY: Final = TypeAdapter(BlastKey)
 
 def _encoded(loads: BlastLoads) -> bytes:
     """Encode loads as a line of JSON, followed by the impulses on the modules."""
-    has_particles = any(isinstance(load, ParticleLoad) for load in loads.structures)
     header = {
-        "particles" if has_particles else "structures": [asdict(load) for load in loads.structures],
+        "particles" if loads.has_particles else "structures": [
+            asdict(load) for load in loads.structures
+        ],
         "bays": [asdict(bay) for bay in loads.bays],
     }
-    return json.dumps(header).encode() + b"\n" + loads.module_impulse_sim.astype("<f8").tobytes()
+    return json.dumps(header).encode() + b"\n" + loads.module_impulse.astype("<f8").tobytes()
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.evaluation.cases import Case
-from blast_env.evaluation.comparison import Comparison
+from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.grid_error import points
 from blast_env.evaluation.report import LayoutEvaluation
 from blast_env.geometry import Layout, layout_counts
@@ -221,11 +221,11 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
     place = np.arange(1, len(outcomes) + 1)
     bare = np.array([outcome.unprotected_load for outcome in outcomes])
     load = np.array([outcome.load for outcome in outcomes])
-    objective, comparison = evaluation.scenario.objective, evaluation.comparison
+    objective = evaluation.scenario.objective
     axes.vlines(place, load, bare, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
     for values, estimate, colour, words in (
-        (bare, comparison.unprotected_mean, _WITHOUT, "without"),
-        (load, comparison.mean, _WITH, "with"),
+        (bare, evaluation.unprotected_mean, _WITHOUT, "without"),
+        (load, evaluation.mean, _WITH, "with"),
     ):
         label = f"{words} barrier, mean {_load_text(evaluation, estimate.value)}"
         axes.plot(place, values, "o", color=colour, markersize=5.5, label=label, zorder=3)
@@ -233,8 +233,8 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
         if not np.isnan(estimate.low):
             axes.axhspan(estimate.low, estimate.high, color=colour, alpha=0.15, linewidth=0.0)
     worst = _percent(1.0 - evaluation.cvar_level)
-    label = f"mean of the worst {worst} with barrier, {_load_text(evaluation, comparison.cvar)}"
-    axes.axhline(comparison.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
+    label = f"mean of the worst {worst} with barrier, {_load_text(evaluation, evaluation.cvar)}"
+    axes.axhline(evaluation.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
     axes.set_xlim(0.3, len(outcomes) + 0.7)
     axes.set_ylim(0.0, 1.32 * max(bare.max(), load.max()))  # room for the legend
     unit = f" ({objective.unit.replace(' ', '·')})" if objective.unit else ""
@@ -258,7 +258,7 @@ def _load_text(evaluation: LayoutEvaluation, load: float) -> str:
 def _load_name(evaluation: LayoutEvaluation) -> str:
     """Return the name of the loads: that of one structure, or a weighted sum."""
     noun = evaluation.scenario.objective.noun
-    protected = evaluation.loads[0].protected
+    protected = evaluation.blasts[0].protected
     weighted = len(protected) > 1 or protected[0].weight != 1.0
     return f"weighted sum of the {noun} on the" if weighted else f"{noun} on the"
 
@@ -294,7 +294,8 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     modules = evaluation.module_table
     own = modules[modules.structure.isin(parts.index)]
     outlines = [each for each in scene.structures if each.name in parts.index]
-    columns = ("unprotected_impulse_sim", "impulse_sim")
+    *_, walled, bare, _ = modules.columns
+    columns = (bare, walled)
     highest = float(own[list(columns)].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
     for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
@@ -304,7 +305,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
         draw_enlarged(axes, obstacles, scale, 0.4)
-        pa_s = building[column.replace("_sim", "_pa_s")]
+        pa_s = building["impulse_pa_s" if column == walled else "unprotected_impulse_pa_s"]
         axes.set_title(
             f"{evaluation.scenario.title_of(name)} {words} barrier\n{pa_s:,.0f} Pa·s",
             fontsize=11,
@@ -359,7 +360,7 @@ class _Panel:
         return [*_shown(self.case.scenario, self.layout), charge]
 
 
-def comparison_figure(comparison: Comparison) -> Figure:
+def comparison_figure(comparison: Evaluation) -> Figure:
     """Return a picture of layouts with their reductions, four in a row.
 
     The first `MOST_SHOWN` cases are drawn, numbered from 1; a note mentions further ones.
@@ -373,7 +374,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
             comparison.cases,
             comparison.layouts,
             comparison.case_reductions,
-            comparison.in_range,
+            comparison.within,
             strict=True,
         )
     ]
@@ -444,7 +445,7 @@ def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
     )
 
 
-def _headline(comparison: Comparison) -> str:
+def _headline(comparison: Evaluation) -> str:
     reduction, error = comparison.reduction, comparison.reduction_error
     if comparison.has_one_case:
         return f"reduction {_with_error(reduction.value, error)}"

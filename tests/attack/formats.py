@@ -181,7 +181,7 @@ def _loads(folder: Path) -> Format:
     def read(_: Path) -> Any:
         with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
             loads = BlastStore(folder).get(key)
-        return None if loads is None else (loads.structures, loads.module_impulse_sim.tobytes())
+        return None if loads is None else (loads.structures, loads.module_impulse.tobytes())
 
     return Format((path.read_bytes(),), _from_file(path, read), True)
 

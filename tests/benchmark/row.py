@@ -28,4 +28,4 @@ class RowEngine(ShadeEngine):
         structures = tuple(
             replace(each, impulse_pa_s=left * each.impulse_pa_s) for each in bare.structures
         )
-        return BlastLoads(structures, left * bare.module_impulse_sim)
+        return BlastLoads(structures, left * bare.module_impulse)

@@ -44,7 +44,7 @@ def test_what_was_asked_for_stays() -> None:
     cache = filled(3, 3)
     first = cache.get(key(0))
     assert first is not None
-    assert first.module_impulse_sim.tolist() == [0.0]
+    assert first.module_impulse.tolist() == [0.0]
     cache.add(key(3), first)
     assert kept(cache, 4) == [0, 2, 3]
 

@@ -109,7 +109,7 @@ def test_final_statements_have_it_beside_each_number() -> None:
     assert found["reduction"] == pytest.approx(convergence_index(*gone))
     assert found["load"] == pytest.approx(convergence_index(*walled))
     assert found["unprotected_load"] == pytest.approx(convergence_index(*bare))
-    assert evaluation.comparison.objective_error == pytest.approx(found["load"])
+    assert evaluation.objective_error == pytest.approx(found["load"])
     assert 0.001 < found["reduction"] < 0.05
 
 

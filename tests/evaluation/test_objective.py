@@ -94,8 +94,8 @@ def test_several_charges_become_one_as_the_objective_says(
 def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
     evaluator = BlastEvaluator(site(charges="worst"), "gas")
     evaluation = evaluate_against(evaluator, WALL, [NEAR, FAR])
-    loads = [each.protected_impulse_pa_s for each in evaluation.loads]
-    bare = [each.protected_impulse_pa_s for each in evaluation.unprotected]
+    loads = [each.protected_impulse_pa_s for each in evaluation.blasts]
+    bare = [each.protected_impulse_pa_s for each in evaluation.unprotected_blasts]
     assert evaluation.load == max(loads)
     assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(bare))
     assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met
@@ -143,7 +143,7 @@ def test_totals_are_printed_with_the_unit_of_what_counts(
 ) -> None:
     evaluator = BlastEvaluator(site(quantity="peak"), "gas")
     evaluation = evaluate_against(evaluator, WALL, draw_threats(evaluator.scenario, [0]))
-    print_means(evaluation.comparison, evaluator.scenario.objective)
+    print_means(evaluation, evaluator.scenario.objective)
     printed = capsys.readouterr().out
     assert f"without barrier: mean {evaluation.unprotected_load:,.0f} Pa," in printed
     assert "psi s" not in printed
@@ -167,7 +167,7 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     assert walled > 0.0
     evaluation = evaluate_against(BlastEvaluator(own, "gas"), WALL, [NEAR])
     assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((bare, walled))
-    print_means(evaluation.comparison, own.objective)
+    print_means(evaluation, own.objective)
     assert f"with barrier: mean {walled:.0f} Pa s of cracking" in capsys.readouterr().out
     env = BlastBarrierEnv(scenario=own, engine="gas")
     env.reset(seed=0, options={"charge_position_m": (2.0, 4.0), "layout": WALL})

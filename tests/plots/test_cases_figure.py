@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import Case, Comparison, LoadCase
+from blast_env.evaluation import Case, Evaluation, LoadCase
 from blast_env.plots.evaluation_figures import MOST_SHOWN, comparison_figure
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import Kinds
@@ -25,18 +25,18 @@ def comparison(
     *reductions: float,
     scenarios: Sequence[Scenario] = (COURTYARD,),
     in_range: Sequence[bool] = (),
-) -> Comparison:
+) -> Evaluation:
     """Return a comparison: case k has k + 1 modules, its charge on the road of the courtyard."""
     cases = []
     for number in range(len(reductions)):
         threat = LoadCase(Charge((5.0, 8.0 + number), 100.0), number)
         cases.append(Case(scenarios[number % len(scenarios)], (threat,)))
-    return Comparison(
+    return Evaluation(
         cases=tuple(cases),
         layouts=tuple(tuple((row, 0) for row in range(index + 1)) for index in range(len(cases))),
         loads=600.0 * (1.0 - np.array([reductions]).T),
         unprotected=np.full((len(cases), 1), 600.0),
-        in_range=np.array([list(in_range) or [True] * len(cases)]).T,
+        within=np.array([list(in_range) or [True] * len(cases)]).T,
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.design.surrogate import site_of
-from blast_env.evaluation import Case, Comparison, LoadCase, SeedRange
+from blast_env.evaluation import Case, Evaluation, LoadCase, SeedRange
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import Placement
 from blast_env.site import Scenario, save_scenario
@@ -90,9 +90,9 @@ def comparison_of(
     cases = tuple(Case(SITE, (LoadCase(CHARGE, seed),)) for seed in range(len(agent)))
     bare = np.full((len(agent), 1), 10.0)
 
-    def of(loads: list[float]) -> Comparison:
+    def of(loads: list[float]) -> Evaluation:
         layouts = ((),) * len(agent)
-        return Comparison(cases, layouts, np.array(loads)[:, None], bare, np.ones_like(bare, bool))
+        return Evaluation(cases, layouts, np.array(loads)[:, None], bare, np.ones_like(bare, bool))
 
     rules = {"wall near the charge": rule or random, "wall near the building": other or random}
     methods = {NOTHING: [10.0] * len(agent), RANDOM: random, **rules, AGENT: agent}

@@ -188,14 +188,14 @@ class BlastLoads:
 
     Attributes:
         structures: One load per structure, in the order of the scene.
-        module_impulse_sim: Sum of m |v| on each module of the structures, in the order of the
-            scene, simulation units (modules,); for gas dynamics the momentum on its walls, N s.
+        module_impulse: Load on each module of the structures, in the order of the scene (modules,):
+            of particles the sum of m |v|, simulation units; of gas the momentum on its walls, N s.
         bays: Damage of the bays of facades with each of their possible components; empty unless
             the objective is a response.
     """
 
     structures: tuple[StructureLoad, ...]
-    module_impulse_sim: NDArray[np.float64]
+    module_impulse: NDArray[np.float64]
     bays: tuple[BayDamage, ...] = ()
 
     def with_facades(
@@ -220,6 +220,11 @@ class BlastLoads:
         return replace(self, structures=tuple(responded))
 
     @property
+    def has_particles(self) -> bool:
+        """Whether these are loads by a particle engine."""
+        return any(isinstance(load, ParticleLoad) for load in self.structures)
+
+    @property
     def level(self) -> LevelOfProtection:
         """The level of protection of the facades of the protected structures."""
         return level_of(worst(load.worst_damage or 0.0 for load in self.protected))
@@ -235,8 +240,8 @@ class BlastLoads:
         impulses = np.array([load.impulse_pa_s for load in self.structures])
         return (
             [load.name for load in self.structures] == names
-            and self.module_impulse_sim.shape == (modules,)
-            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse_sim).all())
+            and self.module_impulse.shape == (modules,)
+            and bool(np.isfinite(impulses).all() and np.isfinite(self.module_impulse).all())
             and self._has_bays_of(found)
         )
 

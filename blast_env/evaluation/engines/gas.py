@@ -434,7 +434,7 @@ class GasResult:
 
     @property
     def structure_loads(self) -> tuple[StructureLoad, ...]:
-        """The loads on all structures; values in simulation units are NaN."""
+        """The loads on all structures."""
         named = {each.name: each for each in self.blast.scenario.structures}
         return tuple(
             StructureLoad.on(
