@@ -4,7 +4,6 @@ import inspect
 import os
 import re
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -13,7 +12,6 @@ import typer
 from docutils import nodes
 from rich.text import Text
 
-from blast_env.option_fields import TEXT
 from blast_env.provenance import package_version
 
 project = "blast-env"
@@ -132,15 +130,9 @@ def _fill_in(_app: Any, _page: str, source: list[str]) -> None:
 
 
 def _to_restructured_text(
-    _app: Any, _what: str, _name: str, value: Any, _options: object, lines: list[str]
+    _app: Any, _what: str, _name: str, _value: Any, _options: object, lines: list[str]
 ) -> None:
-    """Let docstrings say m|v|, and leave chapters in Markdown to the pages that show them.
-
-    Fields that are options of the command line carry their own help texts.
-    """
-    if is_dataclass(value):
-        told = {each.name: each.metadata.get(TEXT) for each in fields(value)}
-        lines += [f":ivar {name}: {text.help}" for name, text in told.items() if text]
+    """Let docstrings say m|v|, and leave chapters in Markdown to the pages that show them."""
     chapters = [number for number, line in enumerate(lines) if line.startswith("## ")]
     if chapters:
         del lines[chapters[0] :]

@@ -32,7 +32,6 @@ class _Commands(LazyGroup):
             "search."
         ),
     }
-    functions = ("draw", "search", "assess", "evaluate", "simulate", "calibrate", "app", "train")
     modules = {"import": "import_map", "app": "page"}  # noqa: RUF012
 
 

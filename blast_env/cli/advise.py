@@ -1,23 +1,38 @@
 """`blast-env advise`: the protection for a budget by kind of measure, and the cost to pass."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from blast_env.cli.command import argument, option
+import typer
+
+from blast_env.cli.command import writes
 from blast_env.cli.evaluation_report import impulse_text
 from blast_env.cli.options import (
-    CELL_HELP,
-    CELLS_HELP,
     FINAL_CELLS,
-    MASS_ERROR_HELP,
-    SCENARIO_HELP,
     TARGET_HELP,
-    ChargeOptions,
+    CellOption,
+    CellsOption,
+    ChargeOption,
+    DrawsOption,
+    GivenCharge,
+    MassErrorOption,
+    ProcessesOption,
+    ScenarioArgument,
+    TntOption,
     wanted_level,
 )
-from blast_env.cli.output import ResultTable, print_cost, print_line, progress_bar, result_console
+from blast_env.cli.output import (
+    print_cost,
+    print_line,
+    print_table,
+    print_written,
+    progress_bar,
+    save_figures,
+)
 from blast_env.cli.targets import PICTURES
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import (
@@ -48,25 +63,57 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.models import SCHEMA_VERSION
 
-_BARELY: Final = Verdict.PASSES_BARELY
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _PROBABLE_MARGIN: Final = 0.3
 """Margin in damage levels after a layout failed before a judge who wants a probability."""
 
 _HEADERS: Final = (
-    "kind",
-    "layout",
-    "cost",
-    "blasts",
-    "level",
-    "passes",
-    "judged",
-    "sharp peaks",
+    *("kind", "layout", "cost", "blasts", "level", "passes", "judged", "sharp peaks"),
     "probability",
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class AdviseCommand(ChargeOptions):
+def advise(
+    scenario: ScenarioArgument,
+    budget_cost: float | None = typer.Option(
+        None, help="Most that may be spent; else the zone's budget."
+    ),
+    target: str | None = typer.Option(None, help=TARGET_HELP.format("medium")),
+    target_probability: float | None = typer.Option(
+        None,
+        help="Least probability of the level; else the scenario's, else none.",
+        min=0.5,
+        max=0.999,
+    ),
+    mass_error: MassErrorOption = 0.1,
+    charges: DrawsOption = 16,
+    budget: int = typer.Option(60, help="Most blasts of a search.", min=1),
+    rounds: int = typer.Option(3, help="Most searches for each kind.", min=1),
+    seed: int = typer.Option(0, help="Seed of the draws.", min=0),
+    cell_m: CellOption = None,
+    cells: CellsOption = None,
+    judge_cell_m: float | None = typer.Option(
+        None, "--judge-cell", help="Side of the cells for judging the layouts found, m; else 0.25."
+    ),
+    judge_cells: str | None = typer.Option(
+        None,
+        help="The same as --cells, for judging the layouts found.",
+        show_default=FINAL_CELLS,
+    ),
+    out: Path | None = typer.Option(
+        None, help="Layout file of the best layout of all: .json.", callback=writes(".json")
+    ),
+    picture: Path | None = typer.Option(
+        None,
+        help="Picture of cost against level of protection: .png, .svg, .pdf.",
+        callback=writes(*PICTURES),
+    ),
+    charge: ChargeOption = None,
+    tnt_kg: TntOption = None,
+    processes: ProcessesOption = 1,
+) -> None:
     """Compare the protection for a budget: stand-off, shielding, hardening, and all combined.
 
     For each kind the command searches for the cheapest layout that reaches the target, by gas
@@ -75,206 +122,180 @@ class AdviseCommand(ChargeOptions):
     those of 0.5 m halve them. If a layout fails there, the search is repeated with a margin to the
     target. Hardening needs no further blasts.
     """
-
-    scenario: str = argument(SCENARIO_HELP)
-    budget_cost: float | None = option(None, "Most that may be spent; else the zone's budget.")
-    target: str | None = option(None, TARGET_HELP.format("medium"))
-    target_probability: float | None = option(
-        None, "Least probability of the level; else the scenario's, else none.", min=0.5, max=0.999
+    site = _asked(load_scenario(scenario), target, target_probability, budget_cost)
+    given = GivenCharge.of(charge, tnt_kg)
+    drawn = draw_threats(site, range(charges))
+    threats = one_of_each_charge(
+        [replace(each, charge=given.fixed(site, each.charge)) for each in drawn]
     )
-    mass_error: float = option(0.1, MASS_ERROR_HELP, min=0.0, max=0.3)
-    charges: int = option(16, "Draws of the charge; each place counts once.", min=1)
-    budget: int = option(60, "Most blasts of a search.", min=1)
-    rounds: int = option(3, "Most searches for each kind.", min=1)
-    seed: int = option(0, "Seed of the draws.", min=0)
-    processes: int = option(1, "Worker processes.", min=1)
-    cell_m: float | None = option(None, CELL_HELP)
-    cells: str | None = option(None, CELLS_HELP, show_default="uniform")
-    judge_cell_m: float | None = option(
-        None, "Side of the cells for judging the layouts found, m; else 0.25."
-    )
-    judge_cells: str | None = option(
-        None, "The same as --cells, for judging the layouts found.", show_default=FINAL_CELLS
-    )
-    out: Path | None = option(
-        None, "Layout file of the best layout of all: .json.", writes=(".json",)
-    )
-    picture: Path | None = option(
-        None, "Picture of cost against level of protection: .png, .svg, .pdf.", writes=PICTURES
-    )
-
-    def __call__(self) -> None:
-        """Search for each kind, judge, and print the verdict."""
-        scenario = self._asked(load_scenario(self.scenario))
-        target = scenario.objective.level
-        assert target is not None
-        drawn = draw_threats(scenario, range(self.charges))
-        fixed = [replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn]
-        threats = one_of_each_charge(fixed)
-        engine = find_engine(JUDGE, self.cell_m, cells=self.cells)
-        judge = final_engine(JUDGE, [scenario], self.judge_cell_m, cells=self.judge_cells)
-        problem = DesignProblem(
-            BlastEvaluator(scenario, engine), Case(scenario, threats), self.processes
+    if budget < len(threats):
+        raise BlastEnvError(
+            f"budget is {budget} blasts, must be at least {len(threats)}: one per charge"
         )
-        if self.budget < len(threats):
-            raise BlastEnvError(
-                f"budget is {self.budget} blasts, must be at least {len(threats)}: one per charge"
+    engine = find_engine(JUDGE, cell_m, cells=cells)
+    judge = final_engine(JUDGE, [site], judge_cell_m, cells=judge_cells)
+    problem = DesignProblem(BlastEvaluator(site, engine), Case(site, threats), processes)
+    kinds = kinds_for(site)
+    asked = [(engine, each.charge) for each in islice(cycle(threats), len(kinds) * rounds * budget)]
+    asked += [(judge, each.charge) for each in threats] * (len(kinds) * rounds)
+    print_line(
+        f"{len(kinds)} kinds, at most {rounds} searches of {budget} blasts each, {engine.words}; "
+        f"each result is judged with {len(threats)}, {judge.words}"
+    )
+    print_cost((each, site, charge) for each, charge in asked)
+    judged = _Judge(problem, judge, mass_error)
+    found: list[Advice] = []
+    for kind in kinds:
+        first = tuple(each.layout for each in found) if kind is MeasureKind.TOGETHER else ()
+        margin = MARGIN if site.objective.target_probability is None else _PROBABLE_MARGIN
+        with progress_bar(f"{kind}") as progress:
+            found.append(
+                advise_until(
+                    *(judged.verdict, problem, kind, budget, seed, first, progress),
+                    rounds=rounds,
+                    margin=margin,
+                )
             )
-        kinds = kinds_for(scenario)
-        searched = islice(cycle(threats), len(kinds) * self.rounds * self.budget)
-        asked = [(engine, each.charge) for each in searched]
-        asked += [(judge, each.charge) for each in threats] * (len(kinds) * self.rounds)
-        print_line(
-            f"{len(kinds)} kinds, at most {self.rounds} searches of {self.budget} blasts each, "
-            f"{engine.words}; each result is judged with {len(threats)}, {judge.words}"
-        )
-        print_cost((each, scenario, charge) for each, charge in asked)
-        charges = [threat.charge for threat in threats]
-        judged: dict[Layout, Consequences] = {}
-        shares: dict[Layout, float] = {}
-        wanted = scenario.objective.target_probability
+    best = best_of(found, judged.verdict)
+    print_line(_answer(judged, best, found))
+    _print(judged, best, found)
+    if out is not None:
+        made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
+        print_written([write_layout(out, site, best.layout, made)])
+    save_figures((picture, partial(_draw, judged, found)))
 
-        def verdict(layout: Layout) -> Verdict:
-            if layout not in judged:
-                judged[layout] = consequences(scenario, layout, charges, judge)
-                likely = level_probability(judged[layout], Uncertainty(mass=self.mass_error))
-                shares[layout] = likely.of(target)
-            found = judged[layout].verdict(target)
-            return found if shares[layout] >= (wanted or 0.0) else min(found, _BARELY)
 
-        found: list[Advice] = []
-        for kind in kinds:
-            first = tuple(each.layout for each in found) if kind is MeasureKind.TOGETHER else ()
-            arguments = (verdict, problem, kind, self.budget, self.seed, first)
-            with progress_bar(f"{kind}") as progress:
-                margin = MARGIN if wanted is None else _PROBABLE_MARGIN
-                rounds = self.rounds
-                found.append(advise_until(*arguments, progress, rounds=rounds, margin=margin))
-        best = best_of(found, verdict)
-        error = _error(problem, best.layout, judged, judge)
-        passes = verdict(best.layout) is Verdict.PASSES
-        print_line(_answer(scenario, target, best, found, judged, shares[best.layout], passes))
-        self._print(scenario, target, best, found, judged, shares, judge, error)
-        if self.out is not None:
-            made = {"method": "advise", "seed": self.seed, "versions": versions(engine.version)}
-            print_line(f"wrote {write_layout(self.out, scenario, best.layout, made)}")
-        if self.picture is not None:
-            self._draw(self.picture, scenario, target, found, judged, engine, judge)
+def _asked(
+    scenario: Scenario,
+    target: str | None,
+    target_probability: float | None,
+    budget_cost: float | None,
+) -> Scenario:
+    """Return the scenario with the requested target and budget."""
+    kept = scenario.objective.model_dump(
+        include={"charges", "cvar_level", "measure", "target_probability"}, exclude_none=True
+    )
+    if target_probability is not None:
+        kept["target_probability"] = target_probability
+    level = wanted_level(target, scenario, LevelOfProtection.MEDIUM)
+    document = scenario.model_dump() | {
+        "schema_version": SCHEMA_VERSION,
+        "objective": {**kept, "kind": "response", "target": level.label},
+    }
+    if budget_cost is not None:
+        document["build_zone"] = {**scenario.zone.model_dump(), "budget": budget_cost}
+    return Scenario.from_document(document, scenario.name)
 
-    def _draw(
-        self,
-        path: Path,
-        scenario: Scenario,
-        target: LevelOfProtection,
-        found: list[Advice],
-        judged: dict[Layout, Consequences],
-        engine: Engine,
-        judge: Engine,
-    ) -> None:
-        # Here, because pictures need the extra `render`.
-        from blast_env.plots.cost_level import PricedDamage, cost_level_figure
-        from blast_env.plots.figures import save_figure
 
-        tried = {
-            str(each.kind): [PricedDamage(x.cost, x.damage) for x in each.tried] for each in found
-        }
-        searched = {x.layout: PricedDamage(x.cost, x.damage) for each in found for x in each.tried}
-        pairs = [
-            (point, point._replace(damage=seen.worst_damage(scenario)))
-            for layout, seen in judged.items()
-            for point in [searched[layout]]
-        ]
-        charges = len(next(iter(judged.values())).barriers)
-        title = f"{scenario.name}: cost of each higher level, worst of {charges} charges"
-        figure = cost_level_figure(tried, pairs, target, title, (engine.words, judge.words))
-        print_line(f"wrote {save_figure(figure, path)}")
+class _Judge:
+    """The verdicts on layouts by finer cells.
 
-    def _asked(self, scenario: Scenario) -> Scenario:
-        """Return the scenario with the requested target and budget."""
-        target = wanted_level(self.target, scenario, LevelOfProtection.MEDIUM).label
-        kept = scenario.objective.model_dump(
-            include={"charges", "cvar_level", "measure", "target_probability"}, exclude_none=True
-        )
-        if self.target_probability is not None:
-            kept["target_probability"] = self.target_probability
-        document = scenario.model_dump() | {
-            "schema_version": SCHEMA_VERSION,
-            "objective": {**kept, "kind": "response", "target": target},
-        }
-        if self.budget_cost is not None:
-            document["build_zone"] = {**scenario.zone.model_dump(), "budget": self.budget_cost}
-        return Scenario.from_document(document, scenario.name)
+    Args:
+        problem: The problem of the search.
+        engine: Gas dynamics with the finer cells.
+        mass_error: Uncertainty of the masses; see `Uncertainty`.
 
-    def _print(
-        self,
-        scenario: Scenario,
-        target: LevelOfProtection,
-        best: Advice,
-        found: list[Advice],
-        judged: dict[Layout, Consequences],
-        shares: dict[Layout, float],
-        judge: Engine,
-        error: GridError | None,
-    ) -> None:
-        for note in judged[best.layout].notes:
-            print_line(f"flag: {note}")
-        if error is not None:
-            print_line(impulse_text(error))
-            print_line(error.words)
-        title = f"{scenario.name}: budget {scenario.zone.budget:g}, required level {target.label!r}"
-        table = ResultTable(title, _HEADERS, text_columns=2)
-        for each in found:
-            seen = judged[each.layout]
-            levels = [seen.level(building) for building in seen.buildings]
-            table.add_row(
+    Attributes:
+        judged: The consequences with each layout that was judged.
+        shares: The probability of the required level with each of them.
+    """
+
+    def __init__(self, problem: DesignProblem, engine: Engine, mass_error: float) -> None:
+        self.problem, self.engine, self._mass_error = problem, engine, mass_error
+        self.scenario = problem.scenario
+        self.judged: dict[Layout, Consequences] = {}
+        self.shares: dict[Layout, float] = {}
+
+    @property
+    def target(self) -> LevelOfProtection:
+        """The required level."""
+        target = self.scenario.objective.level
+        assert target is not None
+        return target
+
+    def verdict(self, layout: Layout) -> Verdict:
+        """Return the verdict on a layout; it takes a blast per charge, once."""
+        if layout not in self.judged:
+            charges = [each.charge for each in self.problem.threats]
+            self.judged[layout] = consequences(self.scenario, layout, charges, self.engine)
+            likely = level_probability(self.judged[layout], Uncertainty(mass=self._mass_error))
+            self.shares[layout] = likely.of(self.target)
+        found = self.judged[layout].verdict(self.target)
+        wanted = self.scenario.objective.target_probability or 0.0
+        return found if self.shares[layout] >= wanted else min(found, Verdict.PASSES_BARELY)
+
+    def error(self, layout: Layout) -> GridError | None:
+        """Return the error of the cells for a judged layout.
+
+        The search's blasts serve it if their cells are twice as large as the judge's.
+        """
+        fine, bare = self.judged[layout], self.judged[()]
+        threat = self.problem.threats[fine.worst_number]
+        of_both = fine.loads[fine.worst_number], bare.loads[fine.worst_number]
+        coarser: BlastEvaluator | None = self.problem.evaluator
+        if self.engine.coarser != self.problem.evaluator.engine:
+            coarser = BlastEvaluator(self.scenario, self.engine).coarser()
+        return grid_error(coarser, self.problem.case, met_by_blasts(layout), threat, of_both)
+
+
+def _draw(judge: _Judge, found: Sequence[Advice]) -> "Figure":
+    # Here, because pictures need the extra `render`.
+    from blast_env.plots.cost_level import PricedDamage, cost_level_figure
+
+    scenario = judge.scenario
+    tried = {str(each.kind): [PricedDamage(x.cost, x.damage) for x in each.tried] for each in found}
+    searched = {x.layout: PricedDamage(x.cost, x.damage) for each in found for x in each.tried}
+    pairs = [
+        (searched[layout], searched[layout]._replace(damage=seen.worst_damage(scenario)))
+        for layout, seen in judge.judged.items()
+    ]
+    count = len(judge.problem.threats)
+    title = f"{scenario.name}: cost of each higher level, worst of {count} charges"
+    engines = judge.problem.evaluator.engine.words, judge.engine.words
+    return cost_level_figure(tried, pairs, judge.target, title, engines)
+
+
+def _print(judge: _Judge, best: Advice, found: Sequence[Advice]) -> None:
+    scenario, target = judge.scenario, judge.target
+    for note in judge.judged[best.layout].notes:
+        print_line(f"flag: {note}")
+    error = judge.error(best.layout)
+    if error is not None:
+        print_line(impulse_text(error))
+        print_line(error.words)
+    rows = []
+    for each in found:
+        seen = judge.judged[each.layout]
+        rows.append(
+            (
                 each.kind,
                 layout_words(each.layout),
                 f"{Placement(scenario, each.layout).cost:g}",
                 str(each.blasts),
-                min(levels).label,
+                min(seen.level(building) for building in seen.buildings).label,
                 "yes" if each.passes else "no",
                 Verdict.of(seen.passes_on_cells(target)).word(seen.is_flagged).lower(),
                 seen.verdict_word(target).lower(),
-                probability_text(shares[each.layout], DRAWS),
+                probability_text(judge.shares[each.layout], DRAWS),
             )
-        result_console().print(table)
-        print_line(
-            f"passes: by the search; judged: {judge.words}; level, sharp peaks: the same impulses "
-            "with peaks that cells do not clip as well; probability: of the required level."
         )
+    title = f"{scenario.name}: budget {scenario.zone.budget:g}, required level {target.label!r}"
+    print_table(title, _HEADERS, rows, text_columns=2)
+    print_line(
+        f"passes: by the search; judged: {judge.engine.words}; level, sharp peaks: the same "
+        "impulses with peaks that cells do not clip as well; probability: of the required level."
+    )
 
 
-def _error(
-    problem: DesignProblem, layout: Layout, judged: dict[Layout, Consequences], judge: Engine
-) -> GridError | None:
-    """Return the error of the cells for a judged layout; the search's blasts serve it if they can.
-
-    They do if the cells of the search are twice those of the judge.
-    """
-    fine, bare = judged[layout], judged[()]
-    threat = problem.threats[fine.worst_number]
-    of_both = fine.loads[fine.worst_number], bare.loads[fine.worst_number]
-    coarser: BlastEvaluator | None = problem.evaluator
-    if judge.coarser != problem.evaluator.engine:
-        coarser = BlastEvaluator(problem.scenario, judge).coarser()
-    return grid_error(coarser, problem.case, met_by_blasts(layout), threat, of_both)
-
-
-def _answer(
-    scenario: Scenario,
-    target: LevelOfProtection,
-    best: Advice,
-    found: list[Advice],
-    judged: dict[Layout, Consequences],
-    share: float,
-    passes: bool,
-) -> str:
+def _answer(judge: _Judge, best: Advice, found: Sequence[Advice]) -> str:
     """Return the answer in a line or two: the cost to pass, and whether walls help."""
+    scenario, target = judge.scenario, judge.target
     by_kind = {each.kind: each for each in found}
     cost = Placement(scenario, best.layout).cost
-    flagged = " (flagged)" if judged[best.layout].is_flagged else ""
-    wanted, likely = scenario.objective.target_probability, probability_text(share, DRAWS)
-    if not passes:
+    flagged = " (flagged)" if judge.judged[best.layout].is_flagged else ""
+    wanted = scenario.objective.target_probability
+    likely = probability_text(judge.shares[best.layout], DRAWS)
+    if judge.verdict(best.layout) is not Verdict.PASSES:
         least = (
             "" if wanted is None else f" with a probability of {wanted:g}; the best has {likely}"
         )
@@ -286,7 +307,7 @@ def _answer(
         level = f"{target.label!r} with {likely}"
         answer = f"{scenario.name}: {level} costs {scenario.zone.priced(cost)}{flagged}: {words}."
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
-    if shield is None or judged[shield.layout].passes(target):
+    if shield is None or judge.judged[shield.layout].passes(target):
         return answer
     barrier = set(met_by_blasts(best.layout))
     gain = 1.0 - (shield.worth - 1.0) / (nothing.worth - 1.0) if nothing.worth > 1.0 else 0.0

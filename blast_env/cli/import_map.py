@@ -2,17 +2,19 @@
 
 import json
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from blast_env.cli.command import Command, argument, option
+import typer
+
+from blast_env.cli.command import writes
+from blast_env.cli.options import numbers
 from blast_env.cli.output import (
-    ResultTable,
     print_json,
     print_line,
+    print_table,
     print_written,
-    result_console,
     save_pictures,
     titled,
 )
@@ -24,47 +26,149 @@ from blast_env.site import save_scenario
 if TYPE_CHECKING:
     from blast_env.io.importing import FittedBuilding, ImportedSite
 
-_HEADERS = (
+_PLACE: Final = (
+    "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
+)
+_HEADERS: Final = (
     *("building", "protected", "parts", "height (m)", "area (m2)", "modules (m2)"),
     *("area off (%)", "outline off (m)"),
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class ImportCommand(ImportOptions, Command):
+def import_map(
+    context: typer.Context,
+    file: Path = typer.Argument(help=".geojson, .osm, .osm.pbf, .dxf or .ifc."),
+    out: Path = typer.Option(help="Scenario file to write: .toml.", callback=writes(".toml")),
+    picture: Path | None = typer.Option(
+        None,
+        help="Write a plan, outlines over modules: .png, .svg, .pdf.",
+        callback=writes(*PICTURES),
+    ),
+    ledger: Path | None = typer.Option(
+        None,
+        help="Write the ledger, all that was read, merged, closed, guessed and left out: .txt, "
+        ".json.",
+        callback=writes(".txt", ".json"),
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print the report as JSON."),
+    name: str | None = typer.Option(None, help="Name of the scenario."),
+    origin: str | None = typer.Option(
+        None, help=f"The site's lower left corner. {_PLACE}", metavar="X,Y"
+    ),
+    centre: str | None = typer.Option(
+        None, help="The site's middle, instead of --origin.", metavar="X,Y"
+    ),
+    size_m: str | None = typer.Option(
+        None,
+        "--size",
+        help="The site's extents, m.",
+        metavar="WIDTH,HEIGHT",
+        show_default="as much as everything in the file needs",
+    ),
+    margin_m: float = typer.Option(
+        10.0, "--margin", help="Ground around everything without --size, m."
+    ),
+    rotation_deg: float | None = typer.Option(
+        None,
+        "--rotation",
+        help="Direction of the site's x axis, degrees from east, counterclockwise.",
+        show_default="that of most walls",
+    ),
+    crs: str | None = typer.Option(
+        None,
+        help="Reference system of the coordinates: EPSG:25832, or local for plain metres.",
+        show_default="that of the GeoJSON file, else EPSG:4326; none for DXF",
+    ),
+    units: str | None = typer.Option(None, help="Unit of a drawing: m, mm, cm, dm, km, in, ft."),
+    buildings_from: list[str] = typer.Option(
+        [], help="Features that are buildings: KEY, KEY=VALUE, or a layer of a drawing."
+    ),
+    charges_from: list[str] = typer.Option(
+        [],
+        help="Where charges may be, named in the same way.",
+        show_default="streets, car parks",
+    ),
+    zone_from: list[str] = typer.Option(
+        [], help="Where barriers may stand, named in the same way."
+    ),
+    keep_outs_from: list[str] = typer.Option(
+        [], help="Areas to be kept empty, named in the same way."
+    ),
+    protect: list[str] = typer.Option([], help="Name of a building whose load counts."),
+    protect_near: str | None = typer.Option(
+        None, help="Protect the building nearest to this.", metavar="X,Y"
+    ),
+    tnt_kg: float = typer.Option(
+        100.0, "--tnt-kg", help="Mass of the charges, kg TNT.", metavar="KG"
+    ),
+    charge_at: list[str] = typer.Option([], help="A further place of a charge.", metavar="X,Y"),
+    zone_m: str | None = typer.Option(
+        None, "--zone", help="The build zone, site metres.", metavar="LEFT,BOTTOM,WIDTH,HEIGHT"
+    ),
+    zone_around_m: float | None = typer.Option(
+        None, "--zone-around", help="Width of a zone around the protected buildings, m."
+    ),
+    stock: int = typer.Option(20, help="Modules that there are to place.", min=1),
+    wall_height_m: float = typer.Option(3.0, "--wall-height", help="Height of the modules, m."),
+    clearance_m: float = typer.Option(
+        1.0, "--clearance", help="Least distance of modules from structures, m.", min=0.0
+    ),
+    preset: str = typer.Option("collisional", help="Parameters of the particle model."),
+    height_from: str | None = typer.Option(None, help="Property with the height."),
+    default_height_m: float | None = typer.Option(
+        None,
+        "--default-height",
+        help="Height of buildings without one, m.",
+        show_default="guessed from neighbours and kind",
+    ),
+    low_heights: bool = typer.Option(
+        False,
+        "--low-heights",
+        help="Take the low guess of heights that the file does not have.",
+    ),
+    level_height_m: float = typer.Option(3.0, "--level-height", help="Height of a storey, m."),
+    least_area_m2: float = typer.Option(
+        4.0, "--least-area", help="Leave out smaller buildings, m2."
+    ),
+    repair: bool = typer.Option(
+        False, "--repair", help="Put outlines right that cross themselves."
+    ),
+    strict: bool = typer.Option(
+        False, "--strict", help="Refuse a file where anything was guessed or left out."
+    ),
+) -> None:
     """Make a scenario from a map or drawing: GeoJSON, OpenStreetMap, DXF.
 
     The site is turned to the direction of most walls, and buildings are polygons; the table gives
     the deviation of the modules of each building from its outline.
     """
+    # Here, because maps need the extra `maps`.
+    from blast_env.io.importing import import_site
 
-    file: Path = argument(".geojson, .osm, .osm.pbf, .dxf or .ifc.")
-    out: Path = option(..., "Scenario file to write: .toml.", writes=(".toml",))
-    picture: Path | None = option(
-        None, "Write a plan, outlines over modules: .png, .svg, .pdf.", writes=PICTURES
-    )
-    ledger: Path | None = option(
-        None,
-        "Write the ledger, all that was read, merged, closed, guessed and left out: .txt, .json.",
-        writes=(".txt", ".json"),
-    )
-    as_json: bool = option(False, "Print the report as JSON.", flag="--json")
+    imported = import_site(file, _options(context))
+    save_scenario(imported.scenario, out)
+    written = [out, *save_pictures(lambda: _pictures(imported, picture))]
+    if ledger is not None:
+        _write_ledger(imported, ledger)
+        written.append(ledger)
+    if as_json:
+        print_json(_record(imported, written))
+    else:
+        _print(imported, written)
 
-    def __call__(self) -> None:
-        """Convert the file, write the scenario and print its deviations from the file."""
-        # Here, because maps need the extra `maps`.
-        from blast_env.io.importing import import_site
 
-        imported = import_site(self.file, self)
-        save_scenario(imported.scenario, self.out)
-        written = [self.out, *save_pictures(lambda: _pictures(imported, self.picture))]
-        if self.ledger is not None:
-            _write_ledger(imported, self.ledger)
-            written.append(self.ledger)
-        if self.as_json:
-            print_json(_record(imported, written))
-        else:
-            _print(imported, written)
+def _options(context: typer.Context) -> ImportOptions:
+    """Return the options of the command line, with the numbers of those that have commas."""
+    values = dict(context.params)
+    for each in context.command.params:
+        name, form = each.name or "", getattr(each, "metavar", None) or ""
+        given = values.get(name)
+        if isinstance(given, str) and "," in form:
+            values[name] = numbers(each.opts[0], given, form)
+        elif isinstance(given, list | tuple):
+            texts = [str(text) for text in given]
+            values[name] = tuple(numbers(each.opts[0], x, form) if form else x for x in texts)
+    return ImportOptions(**{each.name: values[each.name] for each in fields(ImportOptions)})
 
 
 def _pictures(imported: "ImportedSite", path: Path | None) -> list[Path]:
@@ -85,14 +189,9 @@ def _write_ledger(imported: "ImportedSite", path: Path) -> None:
 
 def _print(imported: "ImportedSite", written: list[Path]) -> None:
     width_m, height_m = imported.site.size_m
-    table = ResultTable(
-        f"{imported.scenario.name}: {width_m:g} x {height_m:g} m, turned by "
-        f"{imported.site.rotation_deg:.2f} degrees",
-        _HEADERS,
-    )
-    for each in imported.buildings:
-        table.add_row(
-            _words(each),
+    rows = [
+        (
+            titled(each.name, each.title) + (" (cut)" if each.is_cut else ""),
             "yes" if each.protected else "no",
             f"{len(each.polygons)}",
             "air" if each.height_m is None else f"{each.height_m:g}",
@@ -101,7 +200,11 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
             f"{100.0 * each.deviation.area_share:.1f}",
             f"{each.deviation.outline_m:.2f}",
         )
-    result_console().print(table)
+        for each in imported.buildings
+    ]
+    size, turned = f"{width_m:g} x {height_m:g} m", imported.site.rotation_deg
+    title = f"{imported.scenario.name}: {size}, turned by {turned:.2f} degrees"
+    print_table(title, _HEADERS, rows)
     print_line(
         f"places of charges: {len(imported.scenario.charge)}; particle engines use the preset "
         f"{imported.scenario.simulation.preset}"
@@ -111,11 +214,6 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
     for note in imported.notes:
         print_line(f"note: {note}")
     print_written(written)
-
-
-def _words(building: "FittedBuilding") -> str:
-    """Return the name of a building, with its name on the map if that is another."""
-    return titled(building.name, building.title) + (" (cut)" if building.is_cut else "")
 
 
 def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:

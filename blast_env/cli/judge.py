@@ -4,8 +4,11 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import count
 from pathlib import Path
 from typing import Any, Final
+
+import typer
 
 from blast_env.benchmark import (
     BUDGETS,
@@ -17,10 +20,8 @@ from blast_env.benchmark import (
     Definition,
     JudgedSubmission,
     Method,
-    Run,
     ScoreReference,
     Submission,
-    judge,
     make,
     play,
     secret_sites,
@@ -30,11 +31,12 @@ from blast_env.benchmark import (
     standings_tables,
     stored_references,
 )
+from blast_env.benchmark import judge as judge_submission
 from blast_env.benchmark.references import cell_key
 from blast_env.benchmark.submissions import read_runs
-from blast_env.cli.command import FOLDER, argument, option
-from blast_env.cli.options import CacheOptions, ProcessOptions
-from blast_env.cli.output import print_line, print_table, progress_bar
+from blast_env.cli.command import writes
+from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
+from blast_env.cli.output import print_line, print_table, print_written, progress_bar, resumable
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
@@ -42,132 +44,177 @@ from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_atomically
 
-_OWN_SITES: Final = 8
 _KEPT: Final = 4096
 RULES: Final = "rules"
 """In the place of the names of all rules that suit the sites."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class JudgeCommand(ProcessOptions, CacheOptions):
+def judge(
+    submissions: list[Path] = typer.Argument(
+        default=[], help="Files of submissions, judged ones too."
+    ),
+    method: list[str] = typer.Option(
+        [],
+        help="Run this method first; may be given again: the name of a search or rule, `rules` for "
+        "all that suit, or your own as module:object.",
+    ),
+    run: list[Path] = typer.Option(
+        [], help="Run folder of a trained agent, as a further method; may be given again."
+    ),
+    problem: list[str] = typer.Option(
+        [], help="Problem for the methods; may be given again; else the small set, `all` for all."
+    ),
+    scenario: list[str] = typer.Option(
+        [],
+        help="Your own site in the place of problems: a file or bundled name; may be given again.",
+    ),
+    threat: str = typer.Option(
+        "visible",
+        help="Of --scenario. visible: a problem for each charge. hidden: one for all charges.",
+    ),
+    cases: int = typer.Option(16, help="Most visible charges of a --scenario.", min=1),
+    budget: list[int] = typer.Option(
+        [],
+        help="Blasts of a method; may be given again; else 50, and 0 for those that need none.",
+    ),
+    seeds: int = typer.Option(
+        1, help="Runs of a method for each problem and budget above 0.", min=1
+    ),
+    secret: str | None = typer.Option(
+        None, help="Judge the methods on generated sites that only this text can draw."
+    ),
+    sites: int = typer.Option(8, help="How many sites --secret draws.", min=1),
+    search_cell_m: float = typer.Option(
+        0.5, "--search-cell", help="Side of the cells for the methods, m."
+    ),
+    cell_m: float = typer.Option(JUDGE_CELL_M, "--cell", help="Side of the judge's cells, m."),
+    out: Path | None = typer.Option(
+        None,
+        help="Folder for the submissions of methods and for the judged ones.",
+        callback=writes(),
+    ),
+    page: Path | None = typer.Option(
+        None, help="Write the standings as a page: .md.", callback=writes(".md")
+    ),
+    processes: ProcessesOption = 1,
+    cache: CacheOption = None,
+) -> None:
     """Run submissions to the benchmark again by gas dynamics, and show the standings.
 
     A submission is a file of layouts. Without one, the command shows the standings that come with
     the package. With --method or --run, it first runs methods and writes their submissions, with
     --scenario on your own sites.
     """
-
-    submissions: tuple[Path, ...] = argument("Files of submissions, judged ones too.", default=())
-    method: tuple[str, ...] = option(
-        (),
-        "Run this method first; may be given again: the name of a search or rule, `rules` for all "
-        "that suit, or your own as module:object.",
-    )
-    run: tuple[Path, ...] = option(
-        (), "Run folder of a trained agent, as a further method; may be given again."
-    )
-    problem: tuple[str, ...] = option(
-        (), "Problem for the methods; may be given again; else the small set, `all` for all."
-    )
-    scenario: tuple[str, ...] = option(
-        (), "Your own site in the place of problems: a file or bundled name; may be given again."
-    )
-    threat: str = option(
-        "visible",
-        "Of --scenario. visible: a problem for each charge. hidden: one for all charges.",
-    )
-    cases: int = option(16, "Most visible charges of a --scenario.", min=1)
-    budget: tuple[int, ...] = option(
-        (), "Blasts of a method; may be given again; else 50, and 0 for those that need none."
-    )
-    seeds: int = option(1, "Runs of a method for each problem and budget above 0.", min=1)
-    secret: str | None = option(
-        None, "Judge the methods on generated sites that only this text can draw."
-    )
-    sites: int = option(_OWN_SITES, "How many sites --secret draws.", min=1)
-    search_cell_m: float = option(0.5, "Side of the cells for the methods, m.")
-    cell_m: float = option(JUDGE_CELL_M, "Side of the judge's cells, m.")
-    out: Path | None = option(
-        None, "Folder for the submissions of methods and for the judged ones.", writes=FOLDER
-    )
-
-    page: Path | None = option(None, "Write the standings as a page: .md.", writes=(".md",))
-
-    def how_to_resume(self) -> str:
-        """Return the way to resume after Ctrl-C: from the written runs, if there are any."""
-        kept = super().how_to_resume()
-        through = "the same command resumes after the completed runs"
-        return f"{through}; {kept}" if self.out is not None and self._plays else kept
-
-    @property
-    def _plays(self) -> bool:
-        return bool(self.method or self.run)
-
-    def __call__(self) -> None:
-        """Judge, and print the table."""
-        find_engine(JUDGE, self.cell_m)  # refuses unusable cells before methods run
-        if not self._plays and (self.secret is not None or self.scenario):
-            raise BlastEnvError("--secret and --scenario need a --method or a --run to judge")
-        if self.out is not None:
-            make_folder(self.out)
-        submitted = [_submission(path) for path in self.submissions]
-        judged = [self._judged(each, DEFINITIONS, stored_references()) for each in submitted]
-        if self._plays:
-            definitions = self._definitions()
+    find_engine(JUDGE, cell_m)  # refuses unusable cells before methods run
+    plays, resume = bool(method or run), resume_words(cache)
+    if not plays and (secret is not None or scenario):
+        raise BlastEnvError("--secret and --scenario need a --method or a --run to judge")
+    if plays and out is not None:
+        resume = f"the same command resumes after the completed runs; {resume}"
+    judging = _Judging(cell_m, search_cell_m, range(seeds), processes, cache, out)
+    with resumable(resume):
+        if out is not None:
+            make_folder(out)
+        submitted = [_submission(path) for path in submissions]
+        judged = [judging.judged(each, DEFINITIONS, stored_references()) for each in submitted]
+        if plays:
+            definitions = _definitions(problem, secret, sites, scenario, threat, cases)
             played = [
-                self._played(name, method, budgets, definitions)
-                for name, method, budgets in self._methods(definitions)
+                judging.played(*each, definitions)
+                for each in _methods(method, run, budget, definitions)
             ]
-            references = self._references(definitions, played)
-            judged += [self._judged(each, definitions, references) for each in played]
-        together = (*shipped_standings(), *judged)
-        _print_standings(together)
-        if self.page is not None:
-            with write_atomically(self.page) as temporary:
-                temporary.write_text(standings_page(together), "utf-8")
-            print_line(f"wrote {self.page}")
+            references = stored_references()
+            if secret is not None or scenario:
+                references = judging.references(definitions, played, secret is not None)
+            judged += [judging.judged(each, definitions, references) for each in played]
+    together = (*shipped_standings(), *judged)
+    for table in standings_tables(together):
+        print_table(table.title, table.headers, table.rows)
+    if not together:
+        print_line("no submissions come with the package")
+    if page is not None:
+        with write_atomically(page) as temporary:
+            temporary.write_text(standings_page(together), "utf-8")
+        print_written([page])
 
-    def _definitions(self) -> Mapping[str, Definition]:
-        asked = {"--problem": self.problem, "--secret": self.secret, "--scenario": self.scenario}
-        given = [name for name, each in asked.items() if each]
-        if len(given) > 1:
-            raise BlastEnvError(f"{' and '.join(given)} exclude each other")
-        if self.secret is not None:
-            return {each.name: each for each in secret_sites(self.secret, self.sites)}
-        if self.scenario:
-            check_names("threat", [self.threat], ["visible", "hidden"])
-            is_hidden = self.threat == "hidden"
-            own = [site_problems(each, self.cases, is_hidden=is_hidden) for each in self.scenario]
-            return {each.name: each for of_site in own for each in of_site}
-        names = DEFINITIONS if self.problem == ("all",) else self.problem or SMALL
-        return {name: make(name).definition for name in names}
 
-    def _methods(
-        self, definitions: Mapping[str, Definition]
-    ) -> Iterator[tuple[str, Method, tuple[int, ...]]]:
-        """Yield names, methods and their budgets."""
-        with import_extra("agents", "--method"):
-            from blast_env.benchmark.methods import budgets_of, find_method, method_of
-        here = str(Path.cwd())
-        if self.method and here not in sys.path:
-            sys.path.insert(0, here)  # for module:object
-        sites = [each.scenario for each in definitions.values()]
-        for name in self.method:
-            for each in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
-                budgets = budgets_of(each, self.budget)
-                if not budgets:
-                    raise BlastEnvError(f"--budget is 0: {each} needs blasts")
-                yield each, find_method(each), budgets
-        if self.run:
-            with import_extra("agents", "trained agents"):
-                from blast_agents.training import load_agent
+def _definitions(
+    problems: Sequence[str],
+    secret: str | None,
+    count: int,
+    scenarios: Sequence[str],
+    threat: str,
+    cases: int,
+) -> Mapping[str, Definition]:
+    """Return the problems of the methods by name: those named, secret ones, or of your own sites.
 
-                from blast_env.design.surrogate import LearntSearch
-        for run in self.run:
-            agent = LearntSearch(agent=load_agent(run))
-            yield f"agent {run.resolve().name}", method_of(agent), self.budget or BUDGETS[:2]
+    Raises:
+        BlastEnvError: If several kinds of them are given.
+    """
+    asked = {"--problem": problems, "--secret": secret, "--scenario": scenarios}
+    given = [name for name, each in asked.items() if each]
+    if len(given) > 1:
+        raise BlastEnvError(f"{' and '.join(given)} exclude each other")
+    if secret is not None:
+        return {each.name: each for each in secret_sites(secret, count)}
+    if scenarios:
+        check_names("threat", [threat], ["visible", "hidden"])
+        own = [site_problems(each, cases, is_hidden=threat == "hidden") for each in scenarios]
+        return {each.name: each for of_site in own for each in of_site}
+    names = DEFINITIONS if problems == ["all"] else problems or SMALL
+    return {name: make(name).definition for name in names}
 
-    def _played(
+
+def _methods(
+    names: Sequence[str],
+    runs: Sequence[Path],
+    asked: Sequence[int],
+    definitions: Mapping[str, Definition],
+) -> Iterator[tuple[str, Method, Sequence[int]]]:
+    """Yield names, methods and their budgets."""
+    with import_extra("agents", "--method"):
+        from blast_env.benchmark.methods import budgets_of, find_method, method_of
+    here = str(Path.cwd())
+    if names and here not in sys.path:
+        sys.path.insert(0, here)  # for module:object
+    sites = [each.scenario for each in definitions.values()]
+    for name in names:
+        for each in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
+            budgets = budgets_of(each, asked)
+            if not budgets:
+                raise BlastEnvError(f"--budget is 0: {each} needs blasts")
+            yield each, find_method(each), budgets
+    if runs:
+        with import_extra("agents", "trained agents"):
+            from blast_agents.training import load_agent
+
+            from blast_env.design.surrogate import LearntSearch
+    for run in runs:
+        agent = LearntSearch(agent=load_agent(run))
+        yield f"agent {run.resolve().name}", method_of(agent), asked or BUDGETS[:2]
+
+
+@dataclass(frozen=True)
+class _Judging:
+    """Runs methods, and judges their submissions.
+
+    Attributes:
+        cell_m: Side of the judge's cells, m.
+        search_cell_m: Side of the cells for the methods, m.
+        seeds: Seeds of the runs.
+        processes: Number of worker processes.
+        cache: Folder of blasts.
+        out: Folder of the submissions, and of the judged ones.
+    """
+
+    cell_m: float
+    search_cell_m: float
+    seeds: range
+    processes: int
+    cache: Path | None
+    out: Path | None
+
+    def played(
         self,
         name: str,
         method: Method,
@@ -175,39 +222,29 @@ class JudgeCommand(ProcessOptions, CacheOptions):
         definitions: Mapping[str, Definition],
     ) -> Submission:
         """Run a method; its submission is written before it is judged."""
-        made = [
-            partial(_made, definition=each, cell_m=self.search_cell_m, cache=self.cache)
-            for each in definitions.values()
-        ]
-        asked = tuple(Asked(made, budgets, range(self.seeds)))
-        store = None if self.out is None else self.out / self._store(name)
+        made = [partial(self._made, each) for each in definitions.values()]
+        asked = tuple(Asked(made, budgets, self.seeds))
+        store = None
+        if self.out is not None:  # the runs that a call may resume: same method, same cells
+            store = self.out / f"runs_{_file_name(name)}_{self.search_cell_m:g}.sqlite"
         with progress_bar(f"{len(asked)} runs of {name}") as progress:
-            done: list[Run] = []
-
-            def show(run: Run) -> None:
-                done.append(run)
-                progress(len(done) / len(asked))
-
-            runs = play(method, asked, store, show)
+            done = count(1)
+            runs = play(method, asked, store, lambda _: progress(next(done) / len(asked)))
         submission = Submission(name[-60:], runs, f"blast-env judge: {name}")
         if self.out is not None:
-            print_line(f"wrote {submission.save(self.out / f'{_file_name(name)}.json')}")
+            print_written([submission.save(self.out / f"{_file_name(name)}.json")])
         return submission
 
-    def _store(self, method: str) -> str:
-        """Return the file name of the runs that a call may resume: same method, same cells."""
-        return f"runs_{_file_name(method)}_{self.search_cell_m:g}.sqlite"
-
-    def _references(
-        self, definitions: Mapping[str, Definition], played: Sequence[Submission]
+    def references(
+        self,
+        definitions: Mapping[str, Definition],
+        played: Sequence[Submission],
+        with_surrogate: bool,
     ) -> Mapping[str, ScoreReference]:
-        """Return the stored references; for other sites, those of the rules and all layouts."""
-        if self.secret is None and not self.scenario:
-            return stored_references()
+        """Return the references of sites without stored ones, from the rules and all layouts."""
         from blast_env.benchmark.methods import find_method, reference_of
 
-        found = {}
-        engine = find_engine(JUDGE, self.cell_m)
+        found, engine = {}, find_engine(JUDGE, self.cell_m)
         for name, definition in definitions.items():
             more = {
                 f"{each.method}, {run.budget} blasts, seed {run.seed}": run.layout
@@ -215,26 +252,22 @@ class JudgeCommand(ProcessOptions, CacheOptions):
                 for run in each.runs
                 if run.problem == name
             }
-            if self.secret is not None:
-                problem = _made(BUDGETS[1], definition, self.search_cell_m, self.cache)
+            if with_surrogate:
+                problem = self._made(definition, BUDGETS[1])
                 more["surrogate, 50 blasts"] = find_method("surrogate")(problem, 0)
             evaluator = BlastEvaluator(definition.scenario, engine, cache=self._shared)
             found[name] = reference_of(definition, evaluator, more, cell_key(self.cell_m))
         return found
 
-    @cached_property
-    def _shared(self) -> BlastStore:
-        """The store of the judge's blasts: references and submissions need the same ones."""
-        return BlastStore(self.cache, _KEPT)
-
-    def _judged(
+    def judged(
         self,
         submission: Submission,
         definitions: Mapping[str, Definition],
         references: Mapping[str, ScoreReference],
     ) -> JudgedSubmission:
+        """Judge a submission."""
         with progress_bar(f"judging {submission.method}") as progress:
-            judged = judge(
+            judged = judge_submission(
                 submission,
                 self.cell_m,
                 self.processes,
@@ -244,16 +277,17 @@ class JudgeCommand(ProcessOptions, CacheOptions):
                 progress=progress,
             )
         if self.out is not None:
-            print_line(
-                f"wrote {judged.save(self.out / f'judged_{_file_name(judged.method)}.json')}"
-            )
+            name = f"judged_{_file_name(judged.method)}.json"
+            print_written([judged.save(self.out / name)])
         return judged
 
+    def _made(self, definition: Definition, budget: int) -> BenchmarkProblem:
+        return make(definition, budget, self.search_cell_m, cache=self.cache)
 
-def _made(
-    budget: int, definition: Definition, cell_m: float, cache: Path | None
-) -> BenchmarkProblem:
-    return make(definition, budget, cell_m, cache=cache)
+    @cached_property
+    def _shared(self) -> BlastStore:
+        """The store of the judge's blasts: references and submissions need the same ones."""
+        return BlastStore(self.cache, _KEPT)
 
 
 def _file_name(method: str) -> str:
@@ -270,11 +304,3 @@ def _submission(path: Path) -> Submission:
     except BlastEnvError as error:
         raise BlastEnvError(f"{path}: {error}") from error
     return submission
-
-
-def _print_standings(judged: Sequence[JudgedSubmission]) -> None:
-    """Print one row per submission, the best first, in one table per set of problems."""
-    for each in standings_tables(judged):
-        print_table(each.title, each.headers, each.rows)
-    if not judged:
-        print_line("no submissions come with the package")

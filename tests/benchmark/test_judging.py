@@ -25,7 +25,7 @@ from blast_env.benchmark import (
 )
 from blast_env.benchmark.judging import BUDGET_WEIGHTS, JudgedRun
 from blast_env.cli import app
-from blast_env.cli.judge import JudgeCommand, _submission
+from blast_env.cli.judge import _Judging, _submission
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from tests.benchmark.row import RowEngine
@@ -167,9 +167,9 @@ def far(_problem: BenchmarkProblem, _seed: int) -> Layout:
 
 def test_a_folder_goes_on_with_runs_of_the_same_method_only(tmp_path: Path) -> None:
     """Else a second method would enter the standings with the layouts of the first."""
-    command = JudgeCommand(out=tmp_path)
+    judging = _Judging(0.5, 0.5, range(1), 1, None, tmp_path)
     found = [
-        command._played(method.__name__, method, (0,), {NAME: DEFINITIONS[NAME]}).runs[0].layout
+        judging.played(method.__name__, method, (0,), {NAME: DEFINITIONS[NAME]}).runs[0].layout
         for method in (near, far, near)
     ]
     assert found == [wall(16), wall(12), wall(16)]
@@ -219,13 +219,6 @@ def test_cells_that_the_judge_does_not_have_are_refused_before_a_method_runs(
     assert result.exit_code == 2
     assert "cell_m is 1, must be 0.5 m, the side of a module, divided by" in result.output
     assert not (tmp_path / "entry").exists()
-
-
-def test_after_ctrl_c_it_is_said_what_goes_on(tmp_path: Path) -> None:
-    entry = JudgeCommand(method=("random",), out=tmp_path)
-    assert entry.how_to_resume().startswith("the same command resumes after the completed runs")
-    assert "--cache" in replace(entry, out=None).how_to_resume()
-    assert "runs" not in replace(entry, out=None).how_to_resume()
 
 
 def never_asked(problem: BenchmarkProblem, seed: int) -> Layout:

@@ -6,14 +6,9 @@ from types import MappingProxyType
 from typing import Final
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.option_fields import option
 from blast_env.units import MODULE_SIDE_M
 
 PlaceXY = tuple[float, float]
-
-_PLACE: Final = (
-    "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
-)
 
 CALIBRATIONS: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -46,64 +41,72 @@ _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
 class ImportOptions:
     """The options of an import; places are in the coordinates of the file.
 
+    Attributes:
+        name: Name of the scenario.
+        origin: The site's lower left corner.
+        centre: The site's middle, instead of `origin`.
+        size_m: The site's extents; by default as much as everything in the file needs.
+        margin_m: Ground around everything without `size_m`.
+        rotation_deg: Direction of the site's x axis from east, counterclockwise; by default that of
+            most walls.
+        crs: Reference system of the coordinates: EPSG:25832, or local for plain metres; by default
+            that of the GeoJSON file, else EPSG:4326; none for DXF.
+        units: Unit of a drawing: m, mm, cm, dm, km, in, ft.
+        buildings_from: Features that are buildings: KEY, KEY=VALUE, or a layer of a drawing.
+        charges_from: Where charges may be, named in the same way; by default streets, car parks.
+        zone_from: Where barriers may stand, named in the same way.
+        keep_outs_from: Areas to be kept empty, named in the same way.
+        protect: Names of buildings whose loads count.
+        protect_near: Protect the building nearest to this.
+        tnt_kg: Mass of the charges, kg TNT.
+        charge_at: Further places of a charge.
+        zone_m: The build zone, site metres: left, bottom, width, height.
+        zone_around_m: Width of a zone around the protected buildings.
+        stock: Modules that there are to place.
+        wall_height_m: Height of the modules.
+        clearance_m: Least distance of modules from structures.
+        preset: Parameters of the particle model.
+        height_from: Property with the height.
+        default_height_m: Height of buildings without one; guessed from neighbours and kind.
+        low_heights: Take the low guess of heights that the file does not have.
+        level_height_m: Height of a storey.
+        least_area_m2: Leave out smaller buildings.
+        repair: Put outlines right that cross themselves.
+        strict: Refuse a file where anything was guessed or left out.
+
     Raises:
         BlastEnvError: If a value is out of bounds, or two options exclude each other.
     """
 
-    name: str | None = option(None, "Name of the scenario.")
-    origin: PlaceXY | None = option(None, f"The site's lower left corner. {_PLACE}", metavar="X,Y")
-    centre: PlaceXY | None = option(None, "The site's middle, instead of --origin.", metavar="X,Y")
-    size_m: PlaceXY | None = option(
-        None,
-        "The site's extents, m.",
-        metavar="WIDTH,HEIGHT",
-        show_default="as much as everything in the file needs",
-    )
-    margin_m: float = option(10.0, "Ground around everything without --size, m.")
-    rotation_deg: float | None = option(
-        None,
-        "Direction of the site's x axis, degrees from east, counterclockwise.",
-        show_default="that of most walls",
-    )
-    crs: str | None = option(
-        None,
-        "Reference system of the coordinates: EPSG:25832, or local for plain metres.",
-        show_default="that of the GeoJSON file, else EPSG:4326; none for DXF",
-    )
-    units: str | None = option(None, "Unit of a drawing: m, mm, cm, dm, km, in, ft.")
-    buildings_from: tuple[str, ...] = option(
-        (), "Features that are buildings: KEY, KEY=VALUE, or a layer of a drawing."
-    )
-    charges_from: tuple[str, ...] = option(
-        (), "Where charges may be, named in the same way.", show_default="streets, car parks"
-    )
-    zone_from: tuple[str, ...] = option((), "Where barriers may stand, named in the same way.")
-    keep_outs_from: tuple[str, ...] = option((), "Areas to be kept empty, named in the same way.")
-    protect: tuple[str, ...] = option((), "Name of a building whose load counts.")
-    protect_near: PlaceXY | None = option(
-        None, "Protect the building nearest to this.", metavar="X,Y"
-    )
-    tnt_kg: float = option(100.0, "Mass of the charges, kg TNT.", metavar="KG")
-    charge_at: tuple[PlaceXY, ...] = option((), "A further place of a charge.", metavar="X,Y")
-    zone_m: tuple[float, float, float, float] | None = option(
-        None, "The build zone, site metres.", metavar="LEFT,BOTTOM,WIDTH,HEIGHT"
-    )
-    zone_around_m: float | None = option(None, "Width of a zone around the protected buildings, m.")
-    stock: int = option(20, "Modules that there are to place.", min=1)
-    wall_height_m: float = option(3.0, "Height of the modules, m.")
-    clearance_m: float = option(1.0, "Least distance of modules from structures, m.", min=0.0)
-    preset: str = option("collisional", "Parameters of the particle model.")
-    height_from: str | None = option(None, "Property with the height.")
-    default_height_m: float | None = option(
-        None,
-        "Height of buildings without one, m.",
-        show_default="guessed from neighbours and kind",
-    )
-    low_heights: bool = option(False, "Take the low guess of heights that the file does not have.")
-    level_height_m: float = option(3.0, "Height of a storey, m.")
-    least_area_m2: float = option(4.0, "Leave out smaller buildings, m2.")
-    repair: bool = option(False, "Put outlines right that cross themselves.")
-    strict: bool = option(False, "Refuse a file where anything was guessed or left out.")
+    name: str | None = None
+    origin: PlaceXY | None = None
+    centre: PlaceXY | None = None
+    size_m: PlaceXY | None = None
+    margin_m: float = 10.0
+    rotation_deg: float | None = None
+    crs: str | None = None
+    units: str | None = None
+    buildings_from: tuple[str, ...] = ()
+    charges_from: tuple[str, ...] = ()
+    zone_from: tuple[str, ...] = ()
+    keep_outs_from: tuple[str, ...] = ()
+    protect: tuple[str, ...] = ()
+    protect_near: PlaceXY | None = None
+    tnt_kg: float = 100.0
+    charge_at: tuple[PlaceXY, ...] = ()
+    zone_m: tuple[float, float, float, float] | None = None
+    zone_around_m: float | None = None
+    stock: int = 20
+    wall_height_m: float = 3.0
+    clearance_m: float = 1.0
+    preset: str = "collisional"
+    height_from: str | None = None
+    default_height_m: float | None = None
+    low_heights: bool = False
+    level_height_m: float = 3.0
+    least_area_m2: float = 4.0
+    repair: bool = False
+    strict: bool = False
 
     def __post_init__(self) -> None:
         """Check the options; see the class for the errors."""
