@@ -12,7 +12,7 @@ from blast_env.cli.output import (
     print_line,
     print_written,
     result_console,
-    save_pictures,
+    save_figures,
     user_errors,
 )
 from blast_env.files import make_folder
@@ -25,6 +25,7 @@ from blast_env.particles.paper import (
     deviations,
     metrics_row,
 )
+from blast_env.plots.calibration_figures import figure_5
 from blast_env.tables import write_csv
 
 
@@ -57,15 +58,7 @@ def main(
         written.append(write_csv(table, out / "table_4.csv", "%.10g"))
         console.print(coefficient_table())
         print_line(f"{CONTRADICTIONS}\n")
-        print_written(written + save_pictures(lambda: [_save_figure(out / "figure_5.png")]))
-
-
-def _save_figure(path: Path) -> Path:
-    # Here, because pictures need the extra `render`.
-    from blast_env.plots.calibration_figures import figure_5
-    from blast_env.plots.figures import save_figure
-
-    return save_figure(figure_5(), path)
+        print_written(written + save_figures((out / "figure_5.png", figure_5)))
 
 
 def rich_table(

@@ -102,14 +102,8 @@ def advise(
         help="The same as --cells, for judging the layouts found.",
         show_default=FINAL_CELLS,
     ),
-    out: Path | None = typer.Option(
-        None, help="Layout file of the best layout of all: .json.", callback=writes(".json")
-    ),
-    picture: Path | None = typer.Option(
-        None,
-        help="Picture of cost against level of protection: .png, .svg, .pdf.",
-        callback=writes(*PICTURES),
-    ),
+    out: Path | None = writes("Layout file of the best layout of all", ".json"),
+    picture: Path | None = writes("Picture of cost against level of protection", *PICTURES),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
@@ -162,7 +156,7 @@ def advise(
     if out is not None:
         made = {"method": "advise", "seed": seed, "versions": versions(engine.version)}
         print_written([write_layout(out, site, best.layout, made)])
-    save_figures((picture, partial(_draw, judged, found)))
+    print_written(save_figures((picture, partial(_draw, judged, found))))
 
 
 def _asked(

@@ -80,25 +80,16 @@ def assess(
     wall: str | None = typer.Option(
         None, help="Walls of protected structures that have no facade, a component."
     ),
-    picture: Path | None = typer.Option(
-        None,
-        help="Picture of the facades under the worst charge; of the stand-offs as rings "
-        "(--screen); of the probability over the mass (--capacity): .png, .svg, .pdf.",
-        callback=writes(*PICTURES),
+    picture: Path | None = writes(
+        "Picture of the facades under the worst charge; of the stand-offs as rings (--screen); of "
+        "the probability over the mass (--capacity)",
+        *PICTURES,
     ),
-    view: Path | None = typer.Option(
-        None,
-        help="Picture of the site in three dimensions, bays by their damage.",
-        callback=writes(*PICTURES),
+    view: Path | None = writes(
+        "Picture of the site in three dimensions, bays by their damage", *PICTURES
     ),
-    diagram: Path | None = typer.Option(
-        None, help="Pressure-impulse diagram with every bay on it.", callback=writes(*PICTURES)
-    ),
-    table: Path | None = typer.Option(
-        None,
-        help="Table of every bay under every charge: .csv, .xlsx.",
-        callback=writes(".csv", ".xlsx"),
-    ),
+    diagram: Path | None = writes("Pressure-impulse diagram with every bay on it", *PICTURES),
+    table: Path | None = writes("Table of every bay under every charge", ".csv", ".xlsx"),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     mass: list[str] = typer.Option(

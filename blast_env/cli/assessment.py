@@ -158,7 +158,7 @@ class Assessed:
             words = f"{self.scenario.name}: {_charge_text(worst.charge)}, the worst"
             return damage_view(self.scenario, views, words)
 
-        save_figures((picture, facades), (diagram, pressure_impulse), (view, site))
+        print_written(save_figures((picture, facades), (diagram, pressure_impulse), (view, site)))
 
 
 def print_assessment(

@@ -1,5 +1,6 @@
 """`blast-env calibrate`: a free-field study, its three laws, and a stored calibration."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -8,11 +9,10 @@ import typer
 from blast_env.cli.command import writes
 from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, running_on
 from blast_env.cli.output import (
-    ResultTable,
     print_line,
+    print_table,
     print_written,
     progress_bar,
-    result_console,
     resumable,
     save_pictures,
 )
@@ -31,6 +31,8 @@ from blast_env.tables import write_csv
 from blast_env.values import plain_number
 
 if TYPE_CHECKING:  # takes a third of a second to import
+    from matplotlib.figure import Figure
+
     from blast_env.evaluation.free_field import CalibrationReport, FreeFieldStudy, Reference
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
@@ -69,9 +71,7 @@ def calibrate(
     tnt_range: str | None = typer.Option(
         None, help="LOW,HIGH: masses, kg, for which the law shall hold by scaling."
     ),
-    out: Path = typer.Option(
-        Path("out/calibration"), help="Folder for all files.", callback=writes()
-    ),
+    out: Path = writes("Folder for all files", default=Path("out/calibration")),
     processes: ProcessesOption = 1,
     cluster: ClusterAddress = None,
 ) -> None:
@@ -143,26 +143,19 @@ def _write(report: "CalibrationReport", stored: Calibration, stem: str) -> list[
     record, picture = Path(f"{stem}.json"), Path(f"{stem}.png")
     save_calibration(stored, record)
     table = write_csv(report.table(), f"{stem}.csv")
-    return [record, table, *save_pictures(lambda: _save_figure(report, stored, picture))]
+    return [record, table, *save_pictures((picture, partial(_figure, report, stored)))]
 
 
-def _save_figure(report: "CalibrationReport", stored: Calibration, path: Path) -> list[Path]:
+def _figure(report: "CalibrationReport", stored: Calibration) -> "Figure":
     # Here, because pictures need the extra `render`.
     from blast_env.plots.calibration_figures import calibration_figure
-    from blast_env.plots.figures import save_figure
 
-    return [save_figure(calibration_figure(report, stored.name), path)]
+    return calibration_figure(report, stored.name)
 
 
 def _print(report: "CalibrationReport", stored: Calibration) -> None:
-    table = ResultTable(
-        f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
-        f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}",
-        ("R (m)", "i_sim", "95 % +-", "reference (psi s)", *report.laws, "error of stored law"),
-        text_columns=0,
-    )
-    for row in report.table().to_dict("records"):
-        table.add_row(
+    rows = [
+        (
             f"{row['distance_m']:g}",
             f"{row['i_sim']:,.0f}",
             f"{row['ci95']:,.0f}",
@@ -170,7 +163,21 @@ def _print(report: "CalibrationReport", stored: Calibration) -> None:
             *(f"{row[f'{name}_psi_s']:.4f}" for name in report.laws),
             f"{row[f'{stored.law}_error_percent']:+.1f} %",
         )
-    result_console().print(table)
+        for row in report.table().to_dict("records")
+    ]
+    title = (
+        f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
+        f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}"
+    )
+    headers = (
+        "R (m)",
+        "i_sim",
+        "95 % +-",
+        "reference (psi s)",
+        *report.laws,
+        "error of stored law",
+    )
+    print_table(title, headers, rows, text_columns=0)
     for name, metrics in report.metrics.items():
         coefficients = ", ".join(
             f"{k} = {v:.5g}" for k, v in report.laws[name].coefficients.items()

@@ -4,7 +4,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from blast_env.cli.output import print_cost, print_line, print_table, progress_bar, save_figures
+from blast_env.cli.output import (
+    print_cost,
+    print_line,
+    print_table,
+    print_written,
+    progress_bar,
+    save_figures,
+)
 from blast_env.evaluation.capacity import RUNGS, Edge, Ladder
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.probability import Uncertainty
@@ -88,7 +95,7 @@ def print_capacity(
         title = f"{scenario.name}: charge at ({_place(least)}) m"
         return capacity_figure(shown, target.label, least.charge.tnt_kg, title)
 
-    save_figures((picture, curves))
+    print_written(save_figures((picture, curves)))
 
 
 def _place(ladder: Ladder) -> str:

@@ -1,6 +1,6 @@
 """Commands of Typer that are imported when they are called, and all end in one way.
 
-A command is a function with options of Typer, in a module of its name. `writes` marks the options
+A command is a function with options of Typer, in a module of its name. `writes` makes the options
 that name a file or folder to write: these are checked before the work, and tidied up after it.
 """
 
@@ -23,12 +23,22 @@ _TARGETS: Final = "blast_env.targets"
 """Key of the targets of a command in the metadata of its context."""
 
 
-def writes(*suffixes: str) -> Callable[..., Path | None]:
-    """Return the callback of an option that names a file or folder to write.
+def writes(words: str, *suffixes: str, default: Any = None, panel: str | None = None) -> Any:
+    """Return an option that names a file or folder to write.
 
     Args:
+        words: Its help, without the suffixes.
         suffixes: The allowed suffixes of a file; none for a folder.
+        default: Its default; `...` if it is required.
+        panel: Heading under which help shows it.
     """
+    shown = f"{words}: {', '.join(suffixes)}." if suffixes else f"{words}."
+    callback = checked_first(*suffixes)
+    return typer.Option(default, help=shown, callback=callback, rich_help_panel=panel)
+
+
+def checked_first(*suffixes: str) -> Callable[..., Path | None]:
+    """Return the callback of an option whose target is checked before the command runs."""
 
     def note(
         context: typer.Context, parameter: typer.CallbackParam, value: Path | None

@@ -16,12 +16,7 @@ from blast_env.site import find_problems, load_scenario
 def draw(
     scenarios: list[str] = typer.Argument(help="Bundled names, or scenario files."),
     layout: Path | None = typer.Option(None, help="Layout file; without it, the empty site."),
-    out: Path | None = typer.Option(
-        None,
-        help="Picture to write: .png, .svg, .pdf.",
-        show_default="the scenario's name, .png",
-        callback=writes(*PICTURES),
-    ),
+    out: Path | None = writes("Picture to write, else NAME.png of the scenario", *PICTURES),
     view: str = typer.Option("both", help="both, plan or oblique."),
     corner: str | None = typer.Option(
         None,

@@ -69,9 +69,7 @@ def evaluate(
         "with one of these suffixes.",
         callback=_note_export,
     ),
-    out: Path | None = typer.Option(
-        None, help="Folder for the JSON file, the tables and the figure.", callback=writes()
-    ),
+    out: Path | None = writes("Folder for the JSON file, the tables and the figure"),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,

@@ -2,14 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isnan, nan
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from blast_env.cli.options import GivenCharge
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
     building_words,
+    layout_picture,
     percent,
     print_cost,
     print_json,
@@ -17,7 +19,6 @@ from blast_env.cli.output import (
     print_table,
     print_written,
     progress_bar,
-    save_layout_picture,
     save_pictures,
 )
 from blast_env.evaluation import (
@@ -41,6 +42,9 @@ from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.statistics import Estimate, reductions
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,18 +255,17 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
         "threats.csv": evaluation.threat_table,
     }
     written += [write_csv(table, out / name) for name, table in tables.items()]
-    return written + save_pictures(lambda: _save_figures(evaluation, out))
+    return written + save_pictures(
+        (out / "evaluation.png", partial(_figure, evaluation)),
+        (out / LAYOUT_PICTURE, partial(layout_picture, evaluation.scenario, evaluation.layout)),
+    )
 
 
-def _save_figures(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+def _figure(evaluation: LayoutEvaluation) -> "Figure":
     # Here, because pictures need the extra `render`.
     from blast_env.plots.evaluation_figures import evaluation_figure
-    from blast_env.plots.figures import save_figure
 
-    return [
-        save_figure(evaluation_figure(evaluation), out / "evaluation.png"),
-        save_layout_picture(evaluation.scenario, evaluation.layout, out / LAYOUT_PICTURE),
-    ]
+    return evaluation_figure(evaluation)
 
 
 def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:

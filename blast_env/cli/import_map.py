@@ -3,6 +3,7 @@
 import json
 from collections import Counter
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,6 +25,8 @@ from blast_env.io.importing.options import ImportOptions
 from blast_env.site import save_scenario
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from blast_env.io.importing import FittedBuilding, ImportedSite
 
 _PLACE: Final = (
@@ -38,17 +41,10 @@ _HEADERS: Final = (
 def import_map(
     context: typer.Context,
     file: Path = typer.Argument(help=".geojson, .osm, .osm.pbf, .dxf or .ifc."),
-    out: Path = typer.Option(help="Scenario file to write: .toml.", callback=writes(".toml")),
-    picture: Path | None = typer.Option(
-        None,
-        help="Write a plan, outlines over modules: .png, .svg, .pdf.",
-        callback=writes(*PICTURES),
-    ),
-    ledger: Path | None = typer.Option(
-        None,
-        help="Write the ledger, all that was read, merged, closed, guessed and left out: .txt, "
-        ".json.",
-        callback=writes(".txt", ".json"),
+    out: Path = writes("Scenario file to write", ".toml", default=...),
+    picture: Path | None = writes("Write a plan, outlines over modules", *PICTURES),
+    ledger: Path | None = writes(
+        "Write the ledger, all that was read, merged, closed, guessed and left out", ".txt", ".json"
     ),
     as_json: bool = typer.Option(False, "--json", help="Print the report as JSON."),
     name: str | None = typer.Option(None, help="Name of the scenario."),
@@ -147,7 +143,7 @@ def import_map(
 
     imported = import_site(file, _options(context))
     save_scenario(imported.scenario, out)
-    written = [out, *save_pictures(lambda: _pictures(imported, picture))]
+    written = [out, *save_pictures((picture, partial(_plan, imported)))]
     if ledger is not None:
         _write_ledger(imported, ledger)
         written.append(ledger)
@@ -171,13 +167,10 @@ def _options(context: typer.Context) -> ImportOptions:
     return ImportOptions(**{each.name: values[each.name] for each in fields(ImportOptions)})
 
 
-def _pictures(imported: "ImportedSite", path: Path | None) -> list[Path]:
-    if path is None:
-        return []
+def _plan(imported: "ImportedSite") -> "Figure":
     from blast_env.io.imported_site import imported_plan
-    from blast_env.plots.figures import save_figure
 
-    return [save_figure(imported_plan(imported), path)]
+    return imported_plan(imported)
 
 
 def _write_ledger(imported: "ImportedSite", path: Path) -> None:

@@ -88,14 +88,8 @@ def judge(
         0.5, "--search-cell", help="Side of the cells for the methods, m."
     ),
     cell_m: float = typer.Option(JUDGE_CELL_M, "--cell", help="Side of the judge's cells, m."),
-    out: Path | None = typer.Option(
-        None,
-        help="Folder for the submissions of methods and for the judged ones.",
-        callback=writes(),
-    ),
-    page: Path | None = typer.Option(
-        None, help="Write the standings as a page: .md.", callback=writes(".md")
-    ),
+    out: Path | None = writes("Folder for the submissions of methods and for the judged ones"),
+    page: Path | None = writes("Write the standings as a page", ".md"),
     processes: ProcessesOption = 1,
     cache: CacheOption = None,
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from blast_env.cli.command import writes
+from blast_env.cli.command import checked_first
 from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
@@ -117,7 +117,7 @@ CacheOption = Annotated[
     typer.Option(
         "--cache",
         help="Folder in which blasts are kept for the next run.",
-        callback=writes(),
+        callback=checked_first(),
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary of the result as JSON.")]

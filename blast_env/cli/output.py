@@ -164,21 +164,8 @@ def print_json(content: Mapping[str, object]) -> None:
     print_line(json.dumps(content, indent=2, allow_nan=False))
 
 
-def save_pictures(save: Callable[[], list[Path]]) -> list[Path]:
-    """Save pictures, or print a note if the extra `render` is not installed.
-
-    Args:
-        save: Saves them, and returns their paths.
-    """
-    try:
-        return save()
-    except MissingExtraError as error:
-        message_console().print(printable(f"note: {error}"), style="yellow")
-        return []
-
-
 def save_figures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Path]:
-    """Draw, save and print the figures that have a path; return their files.
+    """Draw and save the figures that have a path; return their files.
 
     Args:
         asked: Path of each figure, and the function that draws it.
@@ -187,30 +174,34 @@ def save_figures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Pat
         MissingExtraError: If the extra `render` is not installed.
         BlastEnvError: If a file cannot be written.
     """
-    written = []
-    for path, draw in asked:
-        if path is not None:
-            figure = draw()
-            # Here, because pictures need the extra `render`.
-            from blast_env.plots.figures import save_figure
+    figures = [(path, draw()) for path, draw in asked if path is not None]
+    if not figures:
+        return []
+    # Here, because pictures need the extra `render`.
+    from blast_env.plots.figures import save_figure
 
-            written.append(save_figure(figure, path))
-            print_written(written[-1:])
-    return written
+    return [save_figure(figure, path) for path, figure in figures]
 
 
-def save_layout_picture(scenario: Scenario, layout: Sequence[Element], path: Path) -> Path:
-    """Draw the plan and the oblique view of a layout on its site; return the file.
+def save_pictures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Path]:
+    """Do as `save_figures`; print a note if the extra `render` is not installed."""
+    try:
+        return save_figures(*asked)
+    except MissingExtraError as error:
+        message_console().print(printable(f"note: {error}"), style="yellow")
+        return []
+
+
+def layout_picture(scenario: Scenario, layout: Sequence[Element]) -> "Figure":
+    """Draw the plan and the oblique view of a layout on its site.
 
     Raises:
         MissingExtraError: If the extra `render` is not installed.
-        BlastEnvError: If the file cannot be written.
     """
     # Here, because pictures need the extra `render`.
-    from blast_env.plots.figures import save_figure
     from blast_env.plots.site_picture import site_picture
 
-    return save_figure(site_picture(scenario, layout), path)
+    return site_picture(scenario, layout)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from math import nan
 from pathlib import Path
 from time import perf_counter
@@ -12,12 +13,12 @@ from blast_env.cli.options import GivenCharge
 from blast_env.cli.output import (
     LAYOUT_NAME,
     LAYOUT_PICTURE,
+    layout_picture,
     print_cost,
     print_line,
     print_table,
     print_written,
     progress_bar,
-    save_layout_picture,
     save_pictures,
 )
 from blast_env.design.proposal import PackageProposer, chosen_proposer, problem_of
@@ -99,10 +100,8 @@ def _write(scenario: Scenario, layout: Layout, source: Mapping[str, str], out: P
     make_folder(out)
     provenance = {**source, "command": command(), "versions": versions()}
     written = [write_layout(out / LAYOUT_NAME, scenario, layout, provenance)]
-    print_written(
-        written
-        + save_pictures(lambda: [save_layout_picture(scenario, layout, out / LAYOUT_PICTURE)])
-    )
+    picture = partial(layout_picture, scenario, layout)
+    print_written(written + save_pictures((out / LAYOUT_PICTURE, picture)))
 
 
 def verify_proposal(

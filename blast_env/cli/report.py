@@ -44,8 +44,8 @@ def report(
     context: typer.Context,
     scenario: ScenarioArgument,
     layout: Path = typer.Option(help="JSON file of the layout."),
-    out: Path = typer.Option(help="The page to write: .html.", callback=writes(".html", ".htm")),
-    pdf: Path | None = typer.Option(None, help="The same as PDF: .pdf.", callback=writes(".pdf")),
+    out: Path = writes("The page to write", ".html", ".htm", default=...),
+    pdf: Path | None = writes("The same as PDF", ".pdf"),
     charges: list[str] = typer.Option(
         [],
         "--charge",

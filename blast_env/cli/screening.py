@@ -4,7 +4,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blast_env.cli.output import print_cost, print_line, print_table, progress_bar, save_figures
+from blast_env.cli.output import (
+    print_cost,
+    print_line,
+    print_table,
+    print_written,
+    progress_bar,
+    save_figures,
+)
 from blast_env.evaluation.consequences import Consequences, consequences
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.screening import (
@@ -69,7 +76,7 @@ def print_screening(
 
         return screening_picture(scenario, layout, found)
 
-    save_figures((picture, rings))
+    print_written(save_figures((picture, rings)))
 
 
 def _by_gas(

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import typer
@@ -32,6 +33,7 @@ from blast_env.cli.output import (
     LAYOUT_NAME,
     LAYOUT_PICTURE,
     InterruptedCommandError,
+    layout_picture,
     message_console,
     percent,
     print_cost,
@@ -40,7 +42,6 @@ from blast_env.cli.output import (
     print_written,
     progress_bar,
     resumable,
-    save_layout_picture,
     save_pictures,
 )
 from blast_env.cli.proposal import PACKAGE, package_proposal, verify_proposal
@@ -73,6 +74,9 @@ from blast_env.provenance import command, versions
 from blast_env.site import Scenario, load_scenario
 from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
 from blast_env.tables import write_csv
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ThreatName = Literal["visible", "hidden"]
 
@@ -132,9 +136,7 @@ def search(
         "--verify",
         help="With --method package: compare it by gas dynamics with no barrier and the rules.",
     ),
-    out: Path | None = typer.Option(
-        None, help="Folder for layout, its plan, history, front and figure.", callback=writes()
-    ),
+    out: Path | None = writes("Folder for layout, its plan, history, front and figure"),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
@@ -333,22 +335,21 @@ def write_search(
     provenance = _provenance(run, options, checked)
     written = [write_layout(out / LAYOUT_NAME, scenario, result.layout, provenance)]
     written += save_pictures(
-        lambda: [save_layout_picture(scenario, result.layout, out / LAYOUT_PICTURE)]
+        (out / LAYOUT_PICTURE, partial(layout_picture, scenario, result.layout)),
+        (out / "search.png" if result.history else None, partial(_figure, run)),
     )
     if result.history:
         written.append(write_csv(result.history_table(), out / "history.csv"))
-        written += save_pictures(lambda: _save_figure(run, out))
     if result.front:
         written.append(write_csv(result.front_table(), out / "front.csv"))
     print_written(written)
 
 
-def _save_figure(run: SearchRun, out: Path) -> list[Path]:
+def _figure(run: SearchRun) -> "Figure":
     # Here, because pictures need the extra `render`.
     from blast_env.design.search.figure import search_figure
-    from blast_env.plots.figures import save_figure
 
-    return [save_figure(search_figure(run.result, run.problem), out / "search.png")]
+    return search_figure(run.result, run.problem)
 
 
 def _provenance(

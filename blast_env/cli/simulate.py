@@ -74,26 +74,14 @@ def simulate(
     stand_off_m: float | None = typer.Option(
         None, "--stand-off", help="Distance from charge to facade, m (free_field)."
     ),
-    film: Path | None = typer.Option(
-        None, help="Write a film: .mp4 or .gif.", callback=writes(".mp4", ".gif")
+    film: Path | None = writes("Write a film", ".mp4", ".gif"),
+    excel: Path | None = writes("Write a workbook", ".xlsx"),
+    parquet: Path | None = writes("Write the collisions, or the loads of all faces", ".parquet"),
+    heat_map: Path | None = writes(
+        "Write a picture of the load over the protected facades", *PICTURES
     ),
-    excel: Path | None = typer.Option(
-        None, help="Write a workbook: .xlsx.", callback=writes(".xlsx")
-    ),
-    parquet: Path | None = typer.Option(
-        None,
-        help="Write the collisions, or the loads of all faces: .parquet.",
-        callback=writes(".parquet"),
-    ),
-    heat_map: Path | None = typer.Option(
-        None,
-        help="Write a picture of the load over the protected facades: .png, .svg, .pdf.",
-        callback=writes(*PICTURES),
-    ),
-    history: Path | None = typer.Option(
-        None,
-        help="Write a picture of the load over time (gas: at --gauge).",
-        callback=writes(*PICTURES),
+    history: Path | None = writes(
+        "Write a picture of the load over time (gas: at --gauge)", *PICTURES
     ),
     side_by_side: bool = typer.Option(
         False, "--side-by-side", help="Show in all pictures the site without the barrier as well."
@@ -105,23 +93,14 @@ def simulate(
     until: str | None = typer.Option(
         None, help=UNTIL_HELP, rich_help_panel=_GAS, show_default="structures"
     ),
-    impulse_map: Path | None = typer.Option(
-        None,
-        help="Write a map of the impulse over the ground.",
-        callback=writes(*PICTURES),
-        rich_help_panel=_GAS,
+    impulse_map: Path | None = writes(
+        "Write a map of the impulse over the ground", *PICTURES, panel=_GAS
     ),
-    peak_map: Path | None = typer.Option(
-        None,
-        help="Write a map of the peak overpressure over the ground.",
-        callback=writes(*PICTURES),
-        rich_help_panel=_GAS,
+    peak_map: Path | None = writes(
+        "Write a map of the peak overpressure over the ground", *PICTURES, panel=_GAS
     ),
-    risk_map: Path | None = typer.Option(
-        None,
-        help="Write a map of where windows and eardrums are at risk.",
-        callback=writes(*PICTURES),
-        rich_help_panel=_GAS,
+    risk_map: Path | None = writes(
+        "Write a map of where windows and eardrums are at risk", *PICTURES, panel=_GAS
     ),
     quantity: str | None = typer.Option(
         None,
@@ -154,17 +133,11 @@ def simulate(
         help="Parameters of this name instead of the scenario's.",
         rich_help_panel=_PARTICLES,
     ),
-    scheme: Path | None = typer.Option(
-        None,
-        help="Write a picture of the initial state.",
-        callback=writes(*PICTURES),
-        rich_help_panel=_PARTICLES,
+    scheme: Path | None = writes(
+        "Write a picture of the initial state", *PICTURES, panel=_PARTICLES
     ),
-    velocities: Path | None = typer.Option(
-        None,
-        help="Write a picture of the fan's velocities.",
-        callback=writes(*PICTURES),
-        rich_help_panel=_PARTICLES,
+    velocities: Path | None = writes(
+        "Write a picture of the fan's velocities", *PICTURES, panel=_PARTICLES
     ),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,

@@ -20,11 +20,12 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
+    layout_picture,
     print_line,
     print_written,
     progress_bar,
     resumable,
-    save_layout_picture,
+    save_figures,
 )
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, import_extra
@@ -35,6 +36,7 @@ from blast_env.site.scene import Charge
 if TYPE_CHECKING:
     from blast_agents.training.run_folder import RunFolder
     from blast_agents.training.train import TrainingResult
+    from matplotlib.figure import Figure
 
 _DEFAULT_ALGORITHM: Final = "maskable_ppo"
 _POLICIES: Final = {"features": "MlpPolicy", "image": "CnnPolicy"}
@@ -67,9 +69,7 @@ def train(
         help="Parallel environments (self_labelling: worker processes); else as in the YAML file.",
         min=1,
     ),
-    run: Path | None = typer.Option(
-        None, help="Folder for the run; new or empty.", callback=writes()
-    ),
+    run: Path | None = writes("Folder for the run; new or empty"),
     threat: str | None = typer.Option(
         None,
         help="visible or hidden: whether the agent sees the charge.",
@@ -205,14 +205,15 @@ def _print_result(result: "TrainingResult") -> None:
                 f"{row.reduction:.1%} (95 % interval {row.low:.1%} to {row.high:.1%})"
             )
     print_written((folder.checkpoint, folder.evaluations, folder.learning_curve))
-    print_line(f"wrote {_draw_proposal(folder, scenario, settings.threat)}")
+    draw = partial(_proposal, folder, scenario, settings.threat)
+    print_written(save_figures((folder.path / LAYOUT_PICTURE, draw)))
 
 
-def _draw_proposal(folder: "RunFolder", scenario: Scenario, threat: str) -> Path:
-    """Draw the agent's proposal for the run's scenario, with a charge if known; return the file."""
+def _proposal(folder: "RunFolder", scenario: Scenario, threat: str) -> "Figure":
+    """Draw the agent's proposal for the run's scenario, with a charge if known."""
     from blast_agents.training import load_agent, newest_weights
 
     agent = load_agent(folder.path, newest_weights(folder.path))
     charge = None if threat == "hidden" else scenario.sample_charge(np.random.default_rng(0))
     shown = scenario.with_charge(charge) if isinstance(charge, Charge) else scenario
-    return save_layout_picture(shown, agent.propose(scenario, charge), folder.path / LAYOUT_PICTURE)
+    return layout_picture(shown, agent.propose(scenario, charge))
