@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
@@ -261,6 +261,22 @@ def _judged(
     rule, best = (shares[each.layout] for each in (reference.rule, reference.best))
     for run in runs:
         yield JudgedRun(**vars(run), share=shares[run.layout], rule=rule, best=best)
+
+
+def read_submission(path: Path) -> Submission:
+    """Read a submission, also one judged before.
+
+    Raises:
+        BlastEnvError: If it is damaged, or no submission to these problems.
+    """
+    kinds: tuple[type[Any], ...] = (Submission, JudgedSubmission)
+    found: Any = read_runs(path, *kinds)
+    submission: Submission = found.submission if isinstance(found, JudgedSubmission) else found
+    try:
+        submission.check()
+    except BlastEnvError as error:
+        raise BlastEnvError(f"{path}: {error}") from error
+    return submission
 
 
 def shipped_standings() -> tuple[JudgedSubmission, ...]:

@@ -1,8 +1,8 @@
 """The methods of the package on the problems of the benchmark."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from blast_env.benchmark import (
     BUDGETS,
@@ -11,20 +11,27 @@ from blast_env.benchmark import (
     KnownLayout,
     Method,
     ScoreReference,
+    Submission,
 )
 from blast_env.benchmark.problem import shares_of
-from blast_env.benchmark.references import engine_key
+from blast_env.benchmark.references import cell_key, engine_key
 from blast_env.design.search import (
     Proposer,
     ProposerKind,
     find_proposer,
     layouts_by_rule,
+    proposers,
 )
 from blast_env.design.search.registry import proposer_row
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, BlastStore
+from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.evaluation.engines.contract import load_plugin
 from blast_env.geometry import Layout
+from blast_env.site import Scenario
+
+RULES: Final = "rules"
+"""In the place of the names of all rules that suit the sites."""
 
 
 def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layout:
@@ -102,6 +109,61 @@ def budgets_of(name: str, asked: Sequence[int]) -> tuple[int, ...]:
         return tuple(asked)
     known = tuple(asked or BUDGETS[:2])
     return known if kind is ProposerKind.LEARNT else tuple(each for each in known if each)
+
+
+def entries(
+    names: Iterable[str], asked: Sequence[int], sites: Sequence[Scenario]
+) -> Iterator[tuple[str, Method, tuple[int, ...]]]:
+    """Yield names, methods and their budgets.
+
+    Args:
+        names: Names as for `find_method`, or `RULES`.
+        asked: The budgets that were asked for; see `budgets_of`.
+        sites: The sites of the problems.
+
+    Raises:
+        UnknownNameError: If a proposer is unknown.
+        BlastEnvError: If a method needs blasts, and the budget is 0.
+    """
+    for name in names:
+        for each in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
+            budgets = budgets_of(each, asked)
+            if not budgets:
+                raise BlastEnvError(f"--budget is 0: {each} needs blasts")
+            yield each, find_method(each), budgets
+
+
+def references_of(
+    definitions: Mapping[str, Definition],
+    played: Sequence[Submission],
+    cell_m: float,
+    cache: BlastStore,
+    guided: Callable[[Definition, int], BenchmarkProblem] | None = None,
+) -> Mapping[str, ScoreReference]:
+    """Return the references of problems without stored ones, from the rules and submissions.
+
+    Args:
+        definitions: The problems by name.
+        played: The submissions.
+        cell_m: Side of the cells, m.
+        cache: Store of the blasts.
+        guided: Makes a problem of a budget for the search by the surrogate, a further source.
+    """
+    found, engine = {}, find_engine(JUDGE, cell_m)
+    for name, definition in definitions.items():
+        more = {
+            f"{each.method}, {run.budget} blasts, seed {run.seed}": run.layout
+            for each in played
+            for run in each.runs
+            if run.problem == name
+        }
+        if guided is not None:
+            more["surrogate, 50 blasts"] = find_method("surrogate")(
+                guided(definition, BUDGETS[1]), 0
+            )
+        evaluator = BlastEvaluator(definition.scenario, engine, cache=cache)
+        found[name] = reference_of(definition, evaluator, more, cell_key(cell_m))
+    return found
 
 
 def reference_of(

@@ -1,11 +1,10 @@
 """`blast-env import`: a site from a map or drawing."""
 
-import json
 from collections import Counter
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import typer
 
@@ -20,14 +19,13 @@ from blast_env.cli.output import (
     titled,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.files import write_atomically
 from blast_env.io.importing.options import ImportOptions
 from blast_env.site import save_scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from blast_env.io.importing import FittedBuilding, ImportedSite
+    from blast_env.io.importing import ImportedSite
 
 _PLACE: Final = (
     "In the coordinates of the file: longitude and latitude, or as --crs or a drawing has them."
@@ -145,10 +143,9 @@ def import_map(
     save_scenario(imported.scenario, out)
     written = [out, *save_pictures((picture, partial(_plan, imported)))]
     if ledger is not None:
-        _write_ledger(imported, ledger)
-        written.append(ledger)
+        written.append(imported.ledger.save(ledger))
     if as_json:
-        print_json(_record(imported, written))
+        print_json({**imported.record, "files": [str(path) for path in written]})
     else:
         _print(imported, written)
 
@@ -171,13 +168,6 @@ def _plan(imported: "ImportedSite") -> "Figure":
     from blast_env.io.imported_site import imported_plan
 
     return imported_plan(imported)
-
-
-def _write_ledger(imported: "ImportedSite", path: Path) -> None:
-    is_json = path.suffix.lower() == ".json"
-    text = json.dumps(imported.ledger.record, indent=1) if is_json else imported.ledger.text
-    with write_atomically(path) as target:
-        target.write_text(text, encoding="utf-8")
 
 
 def _print(imported: "ImportedSite", written: list[Path]) -> None:
@@ -207,33 +197,3 @@ def _print(imported: "ImportedSite", written: list[Path]) -> None:
     for note in imported.notes:
         print_line(f"note: {note}")
     print_written(written)
-
-
-def _record(imported: "ImportedSite", written: list[Path]) -> dict[str, Any]:
-    georeference = imported.scenario.georeference
-    return {
-        "scenario": imported.scenario.name,
-        "scenario_hash": imported.scenario.content_hash,
-        "georeference": None if georeference is None else georeference.model_dump(),
-        "buildings": [_building(each) for each in imported.buildings],
-        "charges": len(imported.scenario.charge),
-        "notes": list(imported.notes),
-        "ledger": imported.ledger.record,
-        "files": [str(path) for path in written],
-    }
-
-
-def _building(building: "FittedBuilding") -> dict[str, Any]:
-    return {
-        "name": building.name,
-        "title": building.title,
-        "place": building.place,
-        "structures": list(building.part_names),
-        "protected": building.protected,
-        "height_m": building.height_m,
-        "area_m2": building.outline.area,
-        "modules_m2": building.area_m2,
-        "area_deviation": building.deviation.area_share,
-        "outline_deviation_m": building.deviation.outline_m,
-        "is_cut": building.is_cut,
-    }

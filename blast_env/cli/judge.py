@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import count
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import typer
 
@@ -32,21 +32,17 @@ from blast_env.benchmark import (
     stored_references,
 )
 from blast_env.benchmark import judge as judge_submission
-from blast_env.benchmark.references import cell_key
-from blast_env.benchmark.submissions import read_runs
+from blast_env.benchmark.judging import read_submission
 from blast_env.cli.command import writes
 from blast_env.cli.options import CacheOption, ProcessesOption, resume_words
 from blast_env.cli.output import print_line, print_table, print_written, progress_bar, resumable
-from blast_env.design.search import ProposerKind, proposers
 from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation import BlastEvaluator, BlastStore
+from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder, write_atomically
 
 _KEPT: Final = 4096
-RULES: Final = "rules"
-"""In the place of the names of all rules that suit the sites."""
 
 
 def judge(
@@ -109,7 +105,7 @@ def judge(
     with resumable(resume):
         if out is not None:
             make_folder(out)
-        submitted = [_submission(path) for path in submissions]
+        submitted = [read_submission(path) for path in submissions]
         judged = [judging.judged(each, DEFINITIONS, stored_references()) for each in submitted]
         if plays:
             definitions = _definitions(problem, secret, sites, scenario, threat, cases)
@@ -119,7 +115,10 @@ def judge(
             ]
             references = stored_references()
             if secret is not None or scenario:
-                references = judging.references(definitions, played, secret is not None)
+                from blast_env.benchmark.methods import references_of
+
+                guided = judging.made if secret is not None else None
+                references = references_of(definitions, played, cell_m, judging.shared, guided)
             judged += [judging.judged(each, definitions, references) for each in played]
     together = (*shipped_standings(), *judged)
     for table in standings_tables(together):
@@ -167,17 +166,11 @@ def _methods(
 ) -> Iterator[tuple[str, Method, Sequence[int]]]:
     """Yield names, methods and their budgets."""
     with import_extra("agents", "--method"):
-        from blast_env.benchmark.methods import budgets_of, find_method, method_of
+        from blast_env.benchmark.methods import entries, method_of
     here = str(Path.cwd())
     if names and here not in sys.path:
         sys.path.insert(0, here)  # for module:object
-    sites = [each.scenario for each in definitions.values()]
-    for name in names:
-        for each in proposers(ProposerKind.RULE, suiting=sites) if name == RULES else (name,):
-            budgets = budgets_of(each, asked)
-            if not budgets:
-                raise BlastEnvError(f"--budget is 0: {each} needs blasts")
-            yield each, find_method(each), budgets
+    yield from entries(names, asked, [each.scenario for each in definitions.values()])
     if runs:
         with import_extra("agents", "trained agents"):
             from blast_agents.training import load_agent
@@ -216,7 +209,7 @@ class _Judging:
         definitions: Mapping[str, Definition],
     ) -> Submission:
         """Run a method; its submission is written before it is judged."""
-        made = [partial(self._made, each) for each in definitions.values()]
+        made = [partial(self.made, each) for each in definitions.values()]
         asked = tuple(Asked(made, budgets, self.seeds))
         store = None
         if self.out is not None:  # the runs that a call may resume: same method, same cells
@@ -228,30 +221,6 @@ class _Judging:
         if self.out is not None:
             print_written([submission.save(self.out / f"{_file_name(name)}.json")])
         return submission
-
-    def references(
-        self,
-        definitions: Mapping[str, Definition],
-        played: Sequence[Submission],
-        with_surrogate: bool,
-    ) -> Mapping[str, ScoreReference]:
-        """Return the references of sites without stored ones, from the rules and all layouts."""
-        from blast_env.benchmark.methods import find_method, reference_of
-
-        found, engine = {}, find_engine(JUDGE, self.cell_m)
-        for name, definition in definitions.items():
-            more = {
-                f"{each.method}, {run.budget} blasts, seed {run.seed}": run.layout
-                for each in played
-                for run in each.runs
-                if run.problem == name
-            }
-            if with_surrogate:
-                problem = self._made(definition, BUDGETS[1])
-                more["surrogate, 50 blasts"] = find_method("surrogate")(problem, 0)
-            evaluator = BlastEvaluator(definition.scenario, engine, cache=self._shared)
-            found[name] = reference_of(definition, evaluator, more, cell_key(self.cell_m))
-        return found
 
     def judged(
         self,
@@ -265,7 +234,7 @@ class _Judging:
                 submission,
                 self.cell_m,
                 self.processes,
-                self._shared,
+                self.shared,
                 definitions=definitions,
                 references=references,
                 progress=progress,
@@ -275,26 +244,15 @@ class _Judging:
             print_written([judged.save(self.out / name)])
         return judged
 
-    def _made(self, definition: Definition, budget: int) -> BenchmarkProblem:
+    def made(self, definition: Definition, budget: int) -> BenchmarkProblem:
+        """Return a problem for a method."""
         return make(definition, budget, self.search_cell_m, cache=self.cache)
 
     @cached_property
-    def _shared(self) -> BlastStore:
+    def shared(self) -> BlastStore:
         """The store of the judge's blasts: references and submissions need the same ones."""
         return BlastStore(self.cache, _KEPT)
 
 
 def _file_name(method: str) -> str:
     return "".join(letter if letter.isalnum() else "_" for letter in method)
-
-
-def _submission(path: Path) -> Submission:
-    """Read a submission, also one judged before."""
-    kinds: tuple[type[Any], ...] = (Submission, JudgedSubmission)
-    found: Any = read_runs(path, *kinds)
-    submission: Submission = found.submission if isinstance(found, JudgedSubmission) else found
-    try:
-        submission.check()
-    except BlastEnvError as error:
-        raise BlastEnvError(f"{path}: {error}") from error
-    return submission

@@ -9,7 +9,7 @@ from blast_env.evaluation.engines import CALIBRATED_ENGINES, JUDGE
 from blast_env.particles.calibration.model import scenario_calibration
 from blast_env.site import AnyScenario, PointSource, Scenario, find_scenario
 
-_PLACING: Final = "search, train, evaluate, judge, play and BlastBarrier-v0"
+_PLACING: Final = "search, train, evaluate, judge and BlastBarrier-v0"
 _PRESETS_NOT_FOR_DESIGN: Final = {
     "ballistic": "its air is so thin that next to nothing gets round a wall "
     "(docs/engineers/validity.md)"

@@ -23,9 +23,9 @@ from blast_env.benchmark import (
     standings_tables,
     stored_references,
 )
-from blast_env.benchmark.judging import BUDGET_WEIGHTS, JudgedRun
+from blast_env.benchmark.judging import BUDGET_WEIGHTS, JudgedRun, read_submission
 from blast_env.cli import app
-from blast_env.cli.judge import _Judging, _submission
+from blast_env.cli.judge import _Judging
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from tests.benchmark.row import RowEngine
@@ -138,7 +138,7 @@ def test_tables_have_the_best_method_first_and_what_it_takes_off() -> None:
 def test_the_command_takes_both_kinds_of_files_and_writes_the_page(tmp_path: Path) -> None:
     own = judged(run(13), run(14, 50))
     for path in (own.save(tmp_path / "judged.json"), own.submission.save(tmp_path / "own.json")):
-        assert _submission(path) == own.submission
+        assert read_submission(path) == own.submission
     page = tmp_path / "page.md"
     result = CliRunner().invoke(app, ["judge", "--page", str(page)])
     assert result.exit_code == 0, result.output
@@ -243,12 +243,12 @@ def test_values_of_a_submission_are_not_converted(
     tmp_path: Path, key: str, value: object, words: str
 ) -> None:
     path = Submission("own", (run(16, 50),)).save(tmp_path / "own.json")
-    assert _submission(path) == Submission("own", (run(16, 50),))
+    assert read_submission(path) == Submission("own", (run(16, 50),))
     content = json.loads(path.read_text())
     content["runs"][0][key] = value
     path.write_text(json.dumps(content))
     with pytest.raises(BlastEnvError) as caught:
-        _submission(path)
+        read_submission(path)
     assert f"runs[0].{key}" in str(caught.value)
     assert words in str(caught.value)
 
@@ -259,7 +259,7 @@ def test_so_many_runs_and_no_more_before_any_is_looked_at(tmp_path: Path) -> Non
     with pytest.raises(
         BlastEnvError, match=r"many\.json: has 10,001 runs, must have at most 10,000"
     ):
-        _submission(path)
+        read_submission(path)
 
 
 def test_a_problem_has_no_budget_that_counts_for_no_score() -> None:

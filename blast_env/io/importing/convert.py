@@ -79,6 +79,20 @@ class ImportedSite:
         zone = "there is no build zone: say one with --zone, --zone-around or --zone-from"
         return (*self.ledger.notes, zone)
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """The site's buildings, notes and ledger as plain data."""
+        georeference = self.scenario.georeference
+        return {
+            "scenario": self.scenario.name,
+            "scenario_hash": self.scenario.content_hash,
+            "georeference": None if georeference is None else georeference.model_dump(),
+            "buildings": [each.record for each in self.buildings],
+            "charges": len(self.scenario.charge),
+            "notes": list(self.notes),
+            "ledger": self.ledger.record,
+        }
+
 
 def import_site(path: str | Path, options: ImportOptions | None = None) -> ImportedSite:
     """Return the site of a map or drawing.

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +79,23 @@ class FittedBuilding:
         return tuple(
             f"{self.name}{joint}{_letters(number)}" for number in range(len(self.polygons))
         )
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The building and its deviation from the outline as plain data."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "place": self.place,
+            "structures": list(self.part_names),
+            "protected": self.protected,
+            "height_m": self.height_m,
+            "area_m2": self.outline.area,
+            "modules_m2": self.area_m2,
+            "area_deviation": self.deviation.area_share,
+            "outline_deviation_m": self.deviation.outline_m,
+            "is_cut": self.is_cut,
+        }
 
     @property
     def group(self) -> str:

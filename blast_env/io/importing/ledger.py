@@ -1,11 +1,14 @@
 """The ledger of an import: what became of every object of a map or drawing."""
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Any, Final
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.files import write_atomically
 from blast_env.io.importing.site_map import MapFeature
 
 with import_extra("maps", "maps and drawings"):
@@ -88,6 +91,18 @@ class Ledger:
     def sums(self, *deeds: Deed) -> dict[tuple[Deed, str], int]:
         """Return the number of entries by deed and kind, in the order of the deeds."""
         return {key: len(entries) for key, entries in self._grouped(deeds or tuple(Deed)).items()}
+
+    def save(self, path: Path) -> Path:
+        """Write all entries as JSON, or as text for other suffixes; return the path.
+
+        Raises:
+            BlastEnvError: If the file cannot be written.
+        """
+        is_json = path.suffix.lower() == ".json"
+        text = json.dumps(self.record, indent=1) if is_json else self.text
+        with write_atomically(path) as target:
+            target.write_text(text, encoding="utf-8")
+        return path
 
     @property
     def notes(self) -> tuple[str, ...]:
