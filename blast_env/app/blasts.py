@@ -4,8 +4,7 @@ All colour scales of a site come from the blast without a barrier under the same
 earlier pictures stay comparable when a layout is added.
 """
 
-from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -24,8 +23,6 @@ from blast_env.app.records import (
     CoarseLoads,
     Film,
     Kept,
-    Load,
-    LoadJudge,
     Picture,
     Wave,
     blast_key,
@@ -36,10 +33,9 @@ from blast_env.app.records import (
 )
 from blast_env.app.verdicts import keep_histories
 from blast_env.app.work import BlastTask
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, StructureLoad
 from blast_env.evaluation.consequences import unchecked
 from blast_env.evaluation.engines import Blast
-from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
@@ -171,7 +167,6 @@ def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
     coarser = task.engine.coarser
     if coarser is None:
         return
-    judge = LoadJudge(scenario)
 
     def folder_of(threat: LoadCase, cells: Layout) -> Path:
         charge = charge_against(scenario, cells, threat.charge)
@@ -179,7 +174,7 @@ def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
 
     def load(threat: LoadCase) -> float:
         record = read_record(folder_of(threat, layout))
-        return nan if record is None else worst_first(judge, record)
+        return nan if record is None else worst_first(scenario.objective, record)
 
     worst = max(task.threats, key=load)
     evaluator = BlastEvaluator(scenario, coarser.gas, cache=task.cache)
@@ -187,32 +182,7 @@ def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
         path = folder_of(worst, cells) / COARSE
         if not path.is_file():
             found = evaluator.loads(cells, worst)
-            write_kept(_coarse_loads(scenario, found), path)
-
-
-def _coarse_loads(scenario: Scenario, found: BlastLoads) -> CoarseLoads:
-    together = Load(
-        structure="",
-        protected=True,
-        impulse_pa_s=found.protected_impulse_pa_s,
-        peak_kpa=found.protected_peak_pa / PA_PER_KPA,
-    )
-    sizes = Counter(each.building_name for each in scenario.structures)
-    buildings = (each for each in on_buildings(found.structures) if sizes[each.name] > 1)
-    return CoarseLoads(
-        loads=(together, *map(_load_of, found.structures)),
-        buildings=tuple(map(_load_of, buildings)),
-    )
-
-
-def _load_of(load: StructureLoad) -> Load:
-    return Load(
-        structure=load.name,
-        protected=load.protected,
-        impulse_pa_s=load.impulse_pa_s,
-        peak_kpa=nan if load.peak_pa is None else load.peak_pa / PA_PER_KPA,
-        area_m2=load.area_m2,
-    )
+            write_kept(CoarseLoads(loads=found.structures), path)
 
 
 # Particles.
@@ -246,7 +216,7 @@ def _particles(
         return kept | {"notes": (*notes, f"no loads: {error}")}
     notes += dict.fromkeys(note for each in loads for own in each.structures for note in own.notes)
     notes.append(f"particles overrate walls; mean over {len(SEEDS)} seeds, judge by gas")
-    return kept | {"loads": _mean_loads(loads), "notes": tuple(notes)}
+    return kept | _mean_loads(scenario, loads) | {"notes": tuple(notes)}
 
 
 def _particle_loads(
@@ -257,21 +227,16 @@ def _particle_loads(
     return evaluator.loads_of_many(pairs, progress=tell)
 
 
-def _mean_loads(loads: Sequence[BlastLoads]) -> tuple[Load, ...]:
-    def load(name: str, protected: bool, values: Sequence[float]) -> Load:
-        mean, low, high = mean_estimate(np.array(values))
-        return Load(
-            structure=name, protected=protected, impulse_pa_s=mean, low_pa_s=low, high_pa_s=high
-        )
-
-    together = load("", True, [each.protected_impulse_pa_s for each in loads])
-    return (
-        together,
-        *(
-            load(first.name, first.protected, [each.structures[k].impulse_pa_s for each in loads])
-            for k, first in enumerate(loads[0].structures)
-        ),
-    )
+def _mean_loads(scenario: Scenario, loads: Sequence[BlastLoads]) -> dict[str, Any]:
+    """Return the means over the seeds, and their intervals."""
+    together = mean_estimate(np.array([each.protected_impulse_pa_s for each in loads]))
+    means, intervals = [], {"": (together.low, together.high)}
+    for number, structure in enumerate(scenario.structures):
+        impulses_pa_s = [each.structures[number].impulse_pa_s for each in loads]
+        mean = mean_estimate(np.array(impulses_pa_s))
+        means.append(StructureLoad.on(structure, mean.value))
+        intervals[structure.name] = mean.low, mean.high
+    return {"loads": tuple(means), "intervals": intervals}
 
 
 # Gas.
@@ -300,8 +265,7 @@ def _gas(
     notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
     notes += [*result.stepped_notes, *result.gauge_notes]
     return {
-        "loads": gas_loads(result),
-        "buildings": tuple(building_loads(result)),
+        "loads": result.structure_loads,
         "notes": tuple(dict.fromkeys(notes)),
         "unchecked": (
             *unchecked(scenario, result),
@@ -357,37 +321,6 @@ def _pictures(result: GasResult, scale: Scale, folder: Path) -> Iterator[Picture
             full = scale.walls.get(building, {}).get(quantity)
             save_figure(facades(result, building, quantity, full=full), folder / name)
             yield Picture(file=name, label=f"{quantity} on the walls of {title}")
-
-
-def gas_loads(result: GasResult) -> tuple[Load, ...]:
-    """Return the load on the protected buildings together, then those on each structure."""
-    found = result.loads()
-    rows = result.structures.to_dict("records")
-    together = Load(
-        structure="",
-        protected=True,
-        impulse_pa_s=found.protected_impulse_pa_s,
-        peak_kpa=found.protected_peak_pa / PA_PER_KPA,
-    )
-    return (together, *(_load(str(row["structure"]), row) for row in rows))
-
-
-def _load(name: str, row: Mapping[Hashable, Any]) -> Load:
-    return Load(
-        structure=name,
-        protected=bool(row["protected"]),
-        impulse_pa_s=float(row["impulse_pa_s"]),
-        peak_kpa=float(row["peak_pa"]) / PA_PER_KPA,
-        area_m2=float(row["area_m2"]),
-    )
-
-
-def building_loads(result: GasResult) -> Iterator[Load]:
-    """Yield the loads on the buildings of several structures."""
-    sizes = Counter(each.building_name for each in result.blast.scenario.structures)
-    for row in result.buildings.to_dict("records"):
-        if sizes[row["building"]] > 1:
-            yield _load(str(row["building"]), row)
 
 
 def _waves(result: GasResult) -> Iterator[Wave]:

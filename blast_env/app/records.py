@@ -1,8 +1,9 @@
 """The record of a blast, and the table that compares layouts."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from math import nan
 from pathlib import Path
@@ -20,9 +21,10 @@ from blast_env.evaluation.engines.contract import (
     BlastLoads,
     StructureLoad,
     counted_parts,
+    on_buildings,
 )
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.grid_error import convergence_index, points
+from blast_env.evaluation.grid_error import CellErrors, points
 from blast_env.files import write_atomically
 from blast_env.gas.settings import UNIFORM
 from blast_env.geometry import Layout
@@ -108,28 +110,6 @@ class EngineRecord(Kept):
         return find_engine(self.name, self.cell_m) if self.is_first_look else self.gas
 
 
-class Load(Kept):
-    """The load on one structure.
-
-    Attributes:
-        structure: Its name; empty for all protected ones together, by weight.
-        protected: Whether its load counts.
-        impulse_pa_s: Impulse, Pa s: with particles the mean over the seeds.
-        low_pa_s: Lower end of its 95 % interval; NaN without noise.
-        high_pa_s: Upper end.
-        peak_kpa: Largest overpressure, kPa; NaN with particles.
-        area_m2: Area of the walls that count; `None` with particles.
-    """
-
-    structure: str
-    protected: bool
-    impulse_pa_s: float
-    low_pa_s: float = nan
-    high_pa_s: float = nan
-    peak_kpa: float = nan
-    area_m2: float | None = None
-
-
 class Wave(Kept):
     """The history of a gauge.
 
@@ -207,8 +187,9 @@ class BlastRecord(Kept):
         threat: Name of the threat.
         engine: The engine.
         layout: The layout.
-        loads: Loads on the structures; the first is that on all protected ones together.
-        buildings: Loads on the buildings of several structures, where their mean is known.
+        loads: Loads on the structures, with particles means over the seeds; none are not known.
+        intervals: Ends of the 95 % intervals of particles, Pa s, by structure; empty for all
+            protected ones together.
         notes: Notes on the blast.
         unchecked: Pairs of a building and a reason to distrust the verdict on it: loads by gas, or
             walls that stand in no bay.
@@ -222,8 +203,8 @@ class BlastRecord(Kept):
     threat: str
     engine: EngineRecord
     layout: tuple[tuple[Any, ...], ...]
-    loads: tuple[Load, ...]
-    buildings: tuple[Load, ...] = ()
+    loads: tuple[StructureLoad, ...]
+    intervals: dict[str, tuple[float, float]] = {}
     notes: tuple[str, ...] = ()
     unchecked: tuple[tuple[str, str], ...]
     pictures: tuple[Picture, ...] = ()
@@ -237,11 +218,28 @@ class CoarseLoads(Kept):
 
     Attributes:
         loads: Same as those of `BlastRecord`.
-        buildings: Same as those of `BlastRecord`.
     """
 
-    loads: tuple[Load, ...]
-    buildings: tuple[Load, ...] = ()
+    loads: tuple[StructureLoad, ...]
+
+
+def blast_loads(record: BlastRecord | CoarseLoads) -> BlastLoads:
+    """Return the loads of a blast on structures, without those on modules."""
+    return BlastLoads(record.loads, np.zeros(0))
+
+
+def only(loads: BlastLoads, names: Collection[str]) -> BlastLoads:
+    """Return the loads on some structures as if they alone counted.
+
+    Args:
+        loads: The loads of a blast.
+        names: Names of the structures, of which the protected ones count, or else all. Without any,
+            all protected structures of the site count.
+    """
+    if not names:
+        return loads
+    parts = counted_parts([each for each in loads.structures if each.name in names])
+    return replace(loads, structures=tuple(replace(each, protected=True) for each in parts))
 
 
 class Film(Kept):
@@ -360,98 +358,6 @@ class VerdictRow(Kept):
     flags: str
 
 
-@dataclass(frozen=True)
-class LoadJudge:
-    """Counts the loads on a site by its objective, as rewards, searches and reports do.
-
-    Attributes:
-        scenario: The site, with its objective and the weights of its structures.
-    """
-
-    scenario: Scenario
-
-    @property
-    def objective(self) -> ObjectiveSection:
-        """The objective of the site."""
-        return self.scenario.objective
-
-    def counted(self, record: BlastRecord, loads: Iterable[Load]) -> float:
-        """Return the load that counts of some structures together, in its unit.
-
-        NaN where a peak counts and the engine knows none.
-
-        Args:
-            record: The blast.
-            loads: Loads on structures: of them, the protected ones count, or else all; or the load
-                on all protected ones together.
-        """
-        chosen = {each.structure for each in loads}
-        every = {each.structure: each for each in record.loads}
-        parts = [
-            StructureLoad.on(
-                each,
-                load.impulse_pa_s,
-                PA_PER_KPA * load.peak_kpa if self.objective.needs_peaks else 0.0,
-                area_m2=load.area_m2,
-            )
-            for each in self.scenario.structures
-            if (each.name in chosen or "" in chosen) and (load := every.get(each.name)) is not None
-        ]
-        counted = [replace(each, protected=True) for each in counted_parts(parts)]
-        return BlastLoads(tuple(counted), np.zeros(0)).load(self.objective)
-
-    def together(self, record: BlastRecord) -> float:
-        """Return the load that counts of all protected structures."""
-        return self.counted(record, record.loads[:1])
-
-    def text(self, load: float) -> str:
-        """Return a counted load with its unit; a dash for NaN."""
-        return _DASH if load != load else self.objective.text(load)
-
-
-@dataclass(frozen=True)
-class CellErrors:
-    """The errors of the cells of a layout, from the blasts of its worst charge.
-
-    Attributes:
-        judge: Counts the loads.
-        walled: The blast with the layout, and its loads on the coarser cells.
-        bare: The same without a barrier, under the same charge.
-    """
-
-    judge: LoadJudge
-    walled: tuple[BlastRecord, CoarseLoads]
-    bare: tuple[BlastRecord, CoarseLoads]
-
-    def of_impulse(self, name: str) -> float:
-        """Return the error of the impulse on a structure or building, as a share of it."""
-        fine, coarse = (
-            next(
-                each.impulse_pa_s for each in (*own.buildings, *own.loads) if each.structure == name
-            )
-            for own in self.walled
-        )
-        return convergence_index(fine, coarse) / fine if fine > 0.0 else nan
-
-    def of_load(self, parts: Iterable[Load]) -> float:
-        """Return the error of the load that counts of some structures, as a share of it."""
-        fine, coarse = (self._counted(self.walled, parts)[index] for index in (0, 1))
-        return convergence_index(fine, coarse) / fine if fine > 0.0 else nan
-
-    def of_reduction(self, parts: Iterable[Load]) -> float:
-        """Return the error of its reduction, an absolute share."""
-        both = (self._counted(each, parts) for each in (self.walled, self.bare))
-        fine, coarse = (reductions(*pair).item() for pair in zip(*both, strict=True))
-        return convergence_index(fine, coarse)
-
-    def _counted(
-        self, blast: tuple[BlastRecord, CoarseLoads], parts: Iterable[Load]
-    ) -> tuple[float, float]:
-        record, coarse = blast
-        other = record.model_copy(update={"loads": coarse.loads})
-        return self.judge.counted(record, parts), self.judge.counted(other, parts)
-
-
 def comparison(
     records: Sequence[tuple[str, float, BlastRecord]],
     bare: Mapping[str, BlastRecord],
@@ -469,77 +375,103 @@ def comparison(
         scenario: The site.
         coarse: Loads on the coarser cells, by the key of the blast.
     """
-    judge = LoadJudge(scenario)
-    errors = _errors(records, bare, judge, coarse)
+    objective = scenario.objective
+    errors = _errors(records, bare, objective, coarse)
     rows = []
     for name, cost, record in records:
         unprotected, error = bare.get(record.threat), errors.get(name)
-        without = {each.structure: each for each in _loads_of(unprotected)}
-        for load, parts in _shown(record, scenario):
-            counted, share, off = judge.counted(record, parts), nan, nan
-            if unprotected is not None and without and record.layout:
-                bare_parts = [without[each.structure] for each in parts]
-                bare_load = judge.counted(unprotected, bare_parts)
-                share = reductions(counted, bare_load).item()
-                off = nan if error is None else error.of_reduction(parts)
-            impulse_off = nan if error is None else error.of_impulse(load.structure)
-            load_off = nan if error is None else error.of_load(parts)
+        for title, names in _shown(record):
+            load_of, impulse_of = partial(_load, objective, names), partial(_impulse, names)
+            loads = blast_loads(record)
+            load, impulse_pa_s, share, off = load_of(loads), impulse_of(loads), nan, nan
+            if unprotected is not None and unprotected.loads and record.layout:
+                share = reductions(load, load_of(blast_loads(unprotected))).item()
+                off = nan if error is None else error.of_reduction(load_of)
+            impulse_off = nan if error is None else error.of_load(impulse_of)
+            load_off = nan if error is None else error.of_load(load_of)
+            low_high = record.intervals.get(title)
             rows.append(
                 Row(
                     layout=name,
                     threat=record.threat,
-                    structure=scenario.title_of(load.structure) if load.structure else TOGETHER,
-                    impulse=_impulse_text(load) + _error(impulse_off * load.impulse_pa_s),
-                    peak=_number(load.peak_kpa),
-                    load=judge.text(counted) + _error(load_off * counted),
+                    structure=scenario.title_of(title) if title else TOGETHER,
+                    impulse=_number(impulse_pa_s)
+                    + _interval(low_high)
+                    + _error(impulse_off * impulse_pa_s),
+                    peak=_number(only(loads, names).protected_peak_pa / PA_PER_KPA),
+                    load=load_text(objective, load) + _error(load_off * load),
                     cost=f"{cost:g}",
                     reduction=_percent(share, off),
                     engine=record.engine.label,
                 )
             )
-    return rows + list(_all_threats(records, judge, errors))
+    return rows + list(_all_threats(records, objective, errors))
+
+
+def _load(objective: ObjectiveSection, names: tuple[str, ...], loads: BlastLoads) -> float:
+    return only(loads, names).load(objective)
+
+
+def _impulse(names: tuple[str, ...], loads: BlastLoads) -> float:
+    """Return the impulse on a building, Pa s; without names that of all protected ones."""
+    found = only(loads, names)
+    if not names:
+        return found.protected_impulse_pa_s
+    return on_buildings(found.structures)[0].impulse_pa_s
+
+
+def load_text(objective: ObjectiveSection, load: float) -> str:
+    """Return a load with its unit; a dash for NaN."""
+    return _DASH if load != load else objective.text(load)
 
 
 def _errors(
     records: Sequence[tuple[str, float, BlastRecord]],
     bare: Mapping[str, BlastRecord],
-    judge: LoadJudge,
+    objective: ObjectiveSection,
     coarse: Mapping[str, CoarseLoads],
 ) -> dict[str, CellErrors]:
     """Return the errors of the cells by the name of the layout, from its largest load."""
     found: dict[str, CellErrors] = {}
-    for name, _, record in sorted(records, key=lambda each: -worst_first(judge, each[2])):
+    for name, _, record in sorted(records, key=lambda each: -worst_first(objective, each[2])):
         unprotected = bare.get(record.threat)
         if unprotected is None or name in found:
             continue
         if record.key in coarse and unprotected.key in coarse:
-            pairs = ((each, coarse[each.key]) for each in (record, unprotected))
-            found[name] = CellErrors(judge, *pairs)
+            found[name] = CellErrors(
+                fine=(blast_loads(record), blast_loads(unprotected)),
+                coarse=(blast_loads(coarse[record.key]), blast_loads(coarse[unprotected.key])),
+            )
     return found
 
 
-def worst_first(judge: LoadJudge, record: BlastRecord) -> float:
+def worst_first(objective: ObjectiveSection, record: BlastRecord) -> float:
     """Return the load by which the worst charge of a layout is chosen."""
     if not record.loads:
         return nan
-    return record.loads[0].impulse_pa_s if judge.objective.is_response else judge.together(record)
+    loads = blast_loads(record)
+    return loads.protected_impulse_pa_s if objective.is_response else loads.load(objective)
 
 
-def _shown(record: BlastRecord, scenario: Scenario) -> Iterator[tuple[Load, tuple[Load, ...]]]:
-    """Yield each load that has a row, with those of its parts; a building has one row."""
-    known = {each.structure: each for each in record.buildings}
-    names = scenario.building_names
-    together: dict[str, list[Load]] = {}
-    for load in record.loads:
-        building = names.get(load.structure, load.structure)
-        together.setdefault(building if building in known else load.structure, []).append(load)
-    for name, parts in together.items():
-        yield known.get(name, parts[0]), tuple(parts)
+def _shown(record: BlastRecord) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the name of each row of a blast, and the structures whose loads it has.
+
+    The first is for all protected structures. A building has one row if the areas of its parts are
+    known.
+    """
+    if not record.loads:
+        return
+    yield "", ()
+    parts: dict[str, list[str]] = {}
+    for each in record.loads:
+        parts.setdefault(each.name if each.area_m2 is None else each.building, []).append(each.name)
+    for name, own in parts.items():
+        yield name if len(own) > 1 else own[0], tuple(own)
 
 
 def _all_threats(
     records: Sequence[tuple[str, float, BlastRecord]],
-    judge: LoadJudge,
+    objective: ObjectiveSection,
     errors: Mapping[str, CellErrors],
 ) -> Iterator[Row]:
     """Yield the load over all threats, one row per layout blasted under all of them."""
@@ -551,44 +483,38 @@ def _all_threats(
         if record.loads:
             found.setdefault(name, []).append((cost, record))
     whole = {name: own for name, own in found.items() if len(own) == len(threats)}
+    load_of = partial(_load, objective, ())
     loads = {
-        name: judge.objective.risk(np.array([judge.together(record) for _, record in own]))
+        name: objective.risk(np.array([load_of(blast_loads(record)) for _, record in own]))
         for name, own in whole.items()
     }
     for name, own in whole.items():
         (cost, last), error = own[-1], errors.get(name)
         load_off, off = nan, nan
         if error is not None:
-            load_off = error.of_load(last.loads[:1]) * loads[name]
-            off = error.of_reduction(last.loads[:1])
+            load_off = error.of_load(load_of) * loads[name]
+            off = error.of_reduction(load_of)
         without = next((loads[each] for each in whole if not whole[each][-1][1].layout), nan)
         share = reductions(loads[name], without).item() if last.layout else nan
         yield Row(
             layout=name,
-            threat=f"all {len(threats)}: {judge.objective.charges}",
+            threat=f"all {len(threats)}: {objective.charges}",
             structure=TOGETHER,
             impulse=(
                 _number(loads[name]) + _error(load_off)
-                if judge.objective.quantity == "impulse"
+                if objective.quantity == "impulse"
                 else _DASH
             ),
             peak=_DASH,
-            load=judge.text(loads[name]) + _error(load_off),
+            load=load_text(objective, loads[name]) + _error(load_off),
             cost=f"{cost:g}",
             reduction=_percent(share, off),
             engine=last.engine.label,
         )
 
 
-def _loads_of(record: BlastRecord | None) -> tuple[Load, ...]:
-    return () if record is None else record.loads
-
-
-def _impulse_text(load: Load) -> str:
-    text = _number(load.impulse_pa_s)
-    if load.low_pa_s == load.low_pa_s:
-        text += f" ({_number(load.low_pa_s)} to {_number(load.high_pa_s)})"
-    return text
+def _interval(low_high: tuple[float, float] | None) -> str:
+    return "" if low_high is None else f" ({_number(low_high[0])} to {_number(low_high[1])})"
 
 
 def _number(value: float) -> str:

@@ -92,38 +92,30 @@ def final_engine(
     return found if is_given else found.final(scenarios)
 
 
-@dataclass(frozen=True, eq=False)
-class GridError:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellErrors:
     """The loads of one charge with two sizes of cells, and the error of numbers made of them.
 
     Attributes:
-        case: The scenario and the objective.
-        layout: The layout.
-        threat: The charge.
-        coarser: The engine with the coarse cells.
         fine: Loads with the layout and without a barrier on the fine cells.
         coarse: The same on the coarse ones.
     """
 
-    case: Case
-    layout: Layout
-    threat: LoadCase
-    coarser: Engine
     fine: tuple[BlastLoads, BlastLoads]
     coarse: tuple[BlastLoads, BlastLoads]
 
-    @property
-    def reduction(self) -> float:
-        """Error of the reduction in the objective, as an absolute share; NaN without one."""
-        case = self.case
-        return self._of_reduction(
-            lambda loads: case.counted([self.objective(loads)], self.layout),
-            lambda loads: case.counted([self.objective(loads)]),
-        )
+    def of_reduction(self, load_of: LoadOf, bare_of: LoadOf | None = None) -> float:
+        """Return the error of the reduction of a load, as an absolute share; NaN without one.
 
-    def of_reduction(self, load_of: LoadOf) -> float:
-        """Return the error of the reduction of a load, as an absolute share; NaN without one."""
-        return self._of_reduction(load_of, load_of)
+        Args:
+            load_of: Selects the load.
+            bare_of: Selects that without a barrier, if it is another.
+        """
+        fine, coarse = (
+            reductions(load_of(walled), (bare_of or load_of)(bare)).item()
+            for walled, bare in (self.fine, self.coarse)
+        )
+        return convergence_index(fine, coarse)
 
     def of_load(self, load_of: LoadOf) -> float:
         """Return the error of a load with the layout as a share of it; NaN of no load."""
@@ -132,6 +124,36 @@ class GridError:
     def of_unprotected(self, load_of: LoadOf) -> float:
         """Return the error of a load without a barrier as a share of it; NaN of no load."""
         return self._share(1, load_of)
+
+    def _share(self, number: int, load_of: LoadOf) -> float:
+        fine, coarse = load_of(self.fine[number]), load_of(self.coarse[number])
+        return convergence_index(fine, coarse) / fine if fine > 0.0 else nan
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GridError(CellErrors):
+    """The error of the cells for a layout under one charge of a case.
+
+    Attributes:
+        case: The scenario and the objective.
+        layout: The layout.
+        threat: The charge.
+        coarser: The engine with the coarse cells.
+    """
+
+    case: Case
+    layout: Layout
+    threat: LoadCase
+    coarser: Engine
+
+    @property
+    def reduction(self) -> float:
+        """Error of the reduction in the objective, as an absolute share; NaN without one."""
+        case = self.case
+        return self.of_reduction(
+            lambda loads: case.counted([self.objective(loads)], self.layout),
+            lambda loads: case.counted([self.objective(loads)]),
+        )
 
     def objective(self, loads: BlastLoads) -> float:
         """Return the load in the unit of the objective."""
@@ -144,17 +166,6 @@ class GridError:
             f"(cells): grid convergence index against {self.coarser.words}, under the worst charge"
             f" (factor {FACTOR:g}, order {ORDER:g})"
         )
-
-    def _of_reduction(self, load_of: LoadOf, bare_of: LoadOf) -> float:
-        fine, coarse = (
-            reductions(load_of(walled), bare_of(bare)).item()
-            for walled, bare in (self.fine, self.coarse)
-        )
-        return convergence_index(fine, coarse)
-
-    def _share(self, number: int, load_of: LoadOf) -> float:
-        fine, coarse = load_of(self.fine[number]), load_of(self.coarse[number])
-        return convergence_index(fine, coarse) / fine if fine > 0.0 else nan
 
 
 def grid_error(
@@ -178,7 +189,14 @@ def grid_error(
     if coarser is None:
         return None
     walled, bare = coarser.loads_of_many([(layout, threat), ((), threat)], processes)
-    return GridError(case, layout, threat, coarser.engine, fine, (walled, bare))
+    return GridError(
+        case=case,
+        layout=layout,
+        threat=threat,
+        coarser=coarser.engine,
+        fine=fine,
+        coarse=(walled, bare),
+    )
 
 
 def with_errors(value: str, cells: str = "", sampled: str = "") -> str:

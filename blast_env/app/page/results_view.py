@@ -9,7 +9,6 @@ from nicegui import ui
 from blast_env.app.records import (
     TOGETHER,
     BlastRecord,
-    LoadJudge,
     Row,
     VerdictRow,
     frames_in,
@@ -170,8 +169,7 @@ class ResultsView:
         self._verdicts.visible = bool(verdicts)
         self._sharp.visible = any("; " in each.level for each in verdicts)
         self._unglazed.visible = bool(found) and not verdicts
-        judge = LoadJudge(session.scenario)
-        self._table.columns = _columns(judge.objective)
+        self._table.columns = _columns(session.scenario.objective)
         self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
         self._table.visible = bool(rows)
         self._errors.visible = any("\N{PLUS-MINUS SIGN}" in each.impulse for each in rows)
@@ -241,9 +239,8 @@ class ResultsView:
     def _summary(self, name: str, record: BlastRecord | None) -> str:
         if record is None or not record.loads:
             return "" if record is not None else "loads not yet available"
-        judge = LoadJudge(self._session.scenario)
-        is_impulse = judge.objective.noun == "impulse"
-        noun = "mean impulse on protected facades" if is_impulse else judge.objective.noun
+        noun = self._session.scenario.objective.noun
+        noun = "mean impulse on protected facades" if noun == "impulse" else noun
         parts = sum(each.protected for each in self._session.scenario.structures)
         added = f" ({parts} structures, weighted)" if parts > 1 else ""
         return f"{noun}: {self._loads[name, record.threat]}{added}"
