@@ -1,6 +1,6 @@
 """The surrogate of gas dynamics: training blasts, the fit, and a check for exploitation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,12 +14,26 @@ import pandas as pd
 import torch
 import typer
 
+from blast_env.arrays import BoolArray
 from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.moves import Moves, random_walls
-from blast_env.design.surrogate.fitting import ErrorsOfBoth, Samples, errors, fit, folds
+from blast_env.design.surrogate.fitting import (
+    Errors,
+    ErrorsOfBoth,
+    Loads,
+    Predictions,
+    Samples,
+    errors,
+    errors_of,
+    fit,
+    folds,
+    held_out_predictions,
+    predictions,
+)
+from blast_env.design.surrogate.intervals import covered, interval_factor
 from blast_env.design.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.errors import BlastEnvError
@@ -152,28 +166,23 @@ def fit_it(
     without: Annotated[
         list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
     ] = None,
-    check: Annotated[
-        bool, typer.Option(help="First tell the errors on a fifth of the sites, held out.")
-    ] = True,
     epochs: Annotated[int, typer.Option(min=1)] = 30,
     seed: int = 0,
     out: Annotated[Path, typer.Option(help="The surrogate, .json.")] = Path("out/surrogate.json"),
 ) -> None:
-    """Fit the surrogate; print its errors on held-out sites."""
+    """Fit the surrogate. `calibrate` adds its errors on held-out sites and its intervals."""
     torch.set_num_threads(1)  # more threads block each other, for minutes on busy cores
     with user_errors():
         make_folder(out.parent)
         named = named_rows(data or DATA, without or ())
         samples = samples_of(named)
         about = Fit(
-            command=join(("python", "-m", "studies.surrogate", *command()[1:])),
+            command=_command(),
             versions=versions(),
             engine="; ".join(named["engine"].unique()),
             blasts=len(samples),
             sites=len(np.unique(samples.site)),
         )
-        if check:
-            about = checked(samples, about, epochs, seed)
         began_s = perf_counter()
         every = np.ones(len(samples), dtype=bool)
         fitted = fit(samples, every, epochs, seed, about)
@@ -194,16 +203,114 @@ def samples_of(rows: pd.DataFrame) -> Samples:
     return Samples.of(rows, {each.content_hash: each for each in scenarios})
 
 
-def checked(samples: Samples, about: Fit, epochs: int, seed: int) -> Fit:
-    """Print the errors on a held-out fifth of the sites; return `about` with those errors."""
-    out_of, *_ = folds(samples.site, _FOLDS, seed)
-    found = errors(fit(samples, ~out_of, epochs, seed, about), samples, out_of)
-    sites = len(np.unique(samples.site[out_of]))
-    print_line(_errors_table({f"{sites} held-out sites": found}))
-    impulse, peak = (
-        Check(rms=each.rms, rank=each.rank, lost=each.lost) for each in (found.impulse, found.peak)
+@app.command()
+def calibrate(
+    data: Annotated[list[Path] | None, typer.Option(help="Tables of blasts, as for `fit`.")] = None,
+    without: Annotated[
+        list[str] | None, typer.Option(help="Scenarios of the tables that are left out.")
+    ] = None,
+    epochs: Annotated[int, typer.Option(min=1)] = 30,
+    seed: int = 0,
+    surrogate: Annotated[Path, typer.Option(help="Surrogate, .json, that `fit` wrote.")] = Path(
+        "out/surrogate.json"
+    ),
+    device: Annotated[str, typer.Option(help="Device of torch for the fits.")] = "cpu",
+    processes: Processes = 2,
+) -> None:
+    """Fit without each fifth of the sites in turn; print the errors and the coverage there.
+
+    The surrogate's file gets both, and the factors of its intervals.
+    """
+    torch.set_num_threads(1)
+    with user_errors():
+        loaded = load_surrogate(surrogate)
+        samples = samples_of(named_rows(data or DATA, without or ()))
+        held_out = folds(samples.site, _FOLDS, seed)
+        fold = partial(held_out_predictions, samples, epochs, seed, device)
+        with progress_bar("fits") as progress:
+            found = run_all(fold, held_out, processes, progress)
+        impulse, peak = (
+            HeldOut.of(samples, loads, held_out, [each[index] for each in found])
+            for index, loads in enumerate((samples.impulse, samples.peak))
+        )
+        sites = f"{len(np.unique(samples.site))} held-out sites"
+        print_line(_errors_table({sites: ErrorsOfBoth(impulse.errors, peak.errors)}))
+        print_line("\n" + _coverage_table(samples, impulse.inside, peak.inside, _kind))
+        about = loaded.fit.model_copy(
+            update={
+                "check_command": _command(),
+                "impulse": impulse.check,
+                "peak": peak.check,
+            }
+        )
+        print_line(f"wrote {replace(loaded, fit=about).save(surrogate)}")
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Predictions of one kind of load by fits without the sample's site, and what they show.
+
+    Attributes:
+        errors: Errors of the predictions.
+        inside: Whether each load lies in its interval, set on the other folds (samples,).
+        check: Record for the surrogate's file.
+    """
+
+    errors: Errors
+    inside: BoolArray
+    check: Check
+
+    @classmethod
+    def of(
+        cls,
+        samples: Samples,
+        loads: Loads,
+        held_out: Sequence[BoolArray],
+        found: Sequence[Predictions],
+    ) -> "HeldOut":
+        """Join the predictions of all folds."""
+        logs, spreads = np.empty(len(samples)), np.empty(len(samples))
+        for out_of, (own_logs, own_spreads) in zip(held_out, found, strict=True):
+            logs[out_of], spreads[out_of] = own_logs, own_spreads
+        off = logs - loads.target
+        errors = errors_of(Predictions(logs, spreads), loads.target, samples.case)
+        check = Check(
+            rms=round(errors.rms, 4),
+            rank=round(errors.rank, 4),
+            lost=round(errors.lost, 4),
+            spreads=round(interval_factor(off, spreads, samples.site), 3),
+        )
+        return cls(errors, covered(off, spreads, samples.site, held_out), check)
+
+
+def _coverage_table(
+    samples: Samples, impulse: BoolArray, peak: BoolArray, group: Callable[[str], str]
+) -> str:
+    """Return the coverage of intervals by group of sites, each site with the same weight."""
+    shares = pd.DataFrame(
+        {"group": [*map(group, samples.scenario)], "site": samples.site, "i": impulse, "p": peak}
     )
-    return about.model_copy(update={"impulse": impulse, "peak": peak})
+    by_site = shares.groupby(["group", "site"])[["i", "p"]].mean()
+    rows = [
+        (
+            str(name),
+            str(len(own)),
+            str((shares["group"] == name).sum()),
+            f"{100.0 * own['i'].mean():.1f} %",
+            f"{100.0 * own['p'].mean():.1f} %",
+        )
+        for name, own in by_site.groupby("group")
+    ]
+    headers = ("sites", "number", "loads", "impulses inside", "peaks inside")
+    return markdown_table(headers, rows)
+
+
+def _kind(scenario: str) -> str:
+    return scenario.partition("/")[0].replace("_", " ")
+
+
+def _command() -> str:
+    return join(("python", "-m", "studies.surrogate", *command()[1:]))
 
 
 @app.command()
@@ -211,14 +318,30 @@ def check(
     data: Annotated[list[Path], typer.Argument(help="Tables of blasts on other sites.")],
     surrogate: Annotated[Path, typer.Option(help="What `fit` wrote.")] = Path("out/surrogate.json"),
 ) -> None:
-    """Print the errors of a surrogate on the sites of other tables than its training data."""
+    """Print errors and coverage on the sites of other tables than the training data."""
     with user_errors():
-        loaded, found = load_surrogate(surrogate), {}
+        loaded, found, coverage = load_surrogate(surrogate), {}, []
         for path in data:
             samples = samples_of(named_rows([path]))
             sites = f"{len(np.unique(samples.site))} sites of {path.stem}"
-            found[sites] = errors(loaded, samples, np.ones(len(samples), dtype=bool))
-        print_line(_errors_table(found))
+            every = np.ones(len(samples), dtype=bool)
+            found[sites] = errors(loaded, samples, every)
+            if loaded.fit.impulse is not None and loaded.fit.peak is not None:
+                impulse, peak = (
+                    _inside(predictions(loaded, networks, samples, loads, every), loads, record)
+                    for networks, loads, record in (
+                        (loaded.impulse, samples.impulse, loaded.fit.impulse),
+                        (loaded.peak, samples.peak, loaded.fit.peak),
+                    )
+                )
+                coverage.append(_coverage_table(samples, impulse, peak, str))
+        print_line("\n\n".join((_errors_table(found), *coverage)))
+
+
+def _inside(found: Predictions, loads: Loads, record: Check) -> BoolArray:
+    """Return whether each load lies in its interval (samples,)."""
+    inside: BoolArray = np.abs(found.log_load - loads.target) <= record.spreads * found.spread
+    return inside
 
 
 def _errors_table(found: Mapping[str, ErrorsOfBoth]) -> str:

@@ -24,6 +24,7 @@ from blast_env.design.surrogate import walls
 from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.design.surrogate.fitting import (
     MEMBERS,
+    Predictions,
     Samples,
     elements,
     errors,
@@ -64,7 +65,7 @@ from blast_env.layout import Placement
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.scene import Charge
 from studies.blast_table import COLUMNS, scenario_of, site_name
-from studies.surrogate import Recipe, verdict
+from studies.surrogate import HeldOut, Recipe, verdict
 from tests.agents.test_self_labelling import wide_yard
 from tests.office_park import office_park
 
@@ -74,7 +75,7 @@ NOTHING = np.empty((0, 5))
 FAST = GasEngine(border_m=0.0, until=0.02)
 YARD = wide_yard()
 PEAKS = Scenario.from_document(YARD.model_dump() | {"objective": {"quantity": "peak"}}, "peaks")
-CHECK = Check(rms=0.2, rank=0.8, lost=0.03)
+CHECK = Check(rms=0.2, rank=0.8, lost=0.03, spreads=10.0)
 ABOUT = Fit(
     command="by hand",
     versions={},
@@ -397,6 +398,34 @@ def test_in_the_place_of_an_engine_it_says_what_it_guesses() -> None:
     assert SurrogateEngine(by_hand(1)) != SurrogateEngine(surrogate)
 
 
+def test_a_safe_engine_gives_the_upper_end_behind_a_barrier() -> None:
+    """So that a reduction is at its safe end; the load without a barrier is as predicted."""
+    about = ABOUT.model_copy(update={"peak": Check(rms=0.2, rank=0.8, lost=0.03, spreads=4.0)})
+    surrogate = replace(by_hand(), fit=about)
+    layout, (threat,) = random_layout(YARD, np.random.default_rng(0)), draw_threats(PEAKS, [0])
+    guess = surrogate.guess(site_of(PEAKS), [layout], [threat.charge_against(PEAKS, layout)])
+    assert guess.peak_pa is not None
+    assert guess.peak_spread is not None
+    (plain, safe), (bare, safe_bare) = (
+        [
+            BlastEvaluator(PEAKS, SurrogateEngine(surrogate, safe=flag)).loads(each, threat)
+            for flag in (False, True)
+        ]
+        for each in (layout, ())
+    )
+    for before, after, widths in (
+        ("impulse_pa_s", guess.impulse_pa_s, CHECK.spreads * guess.spread),
+        ("peak_pa", guess.peak_pa, 4.0 * guess.peak_spread),
+    ):
+        assert [getattr(each, before) for each in plain.protected] == pytest.approx(after[0])
+        upper = after[0] * np.exp(widths[0])
+        assert [getattr(each, before) for each in safe.protected] == pytest.approx(upper)
+        assert (upper > after[0]).all()
+    assert safe_bare.structures == bare.structures
+    with pytest.raises(BlastEnvError, match=r"has no intervals: .*calibrate"):
+        by_hand().upper_ends(guess)
+
+
 def test_in_the_place_of_an_engine_it_tells_peaks_where_they_count() -> None:
     surrogate, (threat,) = by_hand(), draw_threats(PEAKS, range(1))
     impulses, peaks = (
@@ -650,6 +679,24 @@ def test_a_surrogate_is_checked_on_the_sites_of_a_table(tmp_path: Path) -> None:
     for each in rows_of:
         assert 0.0 < float(each[2]) < 0.2  # near what it was fitted to, and never quite right
         assert float(each[4]) > 0.5
+    coverage = [line.split("|")[1:-1] for line in done.output.splitlines()[-2:]]
+    assert {each[0].strip() for each in coverage} == set(names.to_pylist())
+    assert all(float(each[3].strip(" %")) > 80.0 for each in coverage)
+
+
+def test_held_out_predictions_set_the_intervals() -> None:
+    """Errors of three spreads on each twentieth site, of one spread on the others."""
+    samples = Samples.of(table_of_guesses(by_hand(), 40), {YARD.content_hash: YARD})
+    samples = replace(samples, site=np.arange(len(samples)))
+    held_out = folds(samples.site, 2, 0)
+    spread = np.full(len(samples), 0.1)
+    off = np.where(samples.site % 40 == 0, 0.3, 0.1)
+    logs = samples.impulse.target + off
+    found = [Predictions(logs[each], spread[each]) for each in held_out]
+    joined = HeldOut.of(samples, samples.impulse, held_out, found)
+    assert joined.check.spreads == pytest.approx(1.0)
+    assert joined.errors.rms == pytest.approx(np.sqrt(np.mean(off**2)))
+    assert (joined.inside == (off < 0.2)).all()
 
 
 def test_scenarios_of_the_table_are_found_by_their_names() -> None:

@@ -38,6 +38,9 @@ class SurrogateEngine(Engine):
 
     Attributes:
         surrogate: The surrogate; by default the bundled one.
+        safe: Whether the loads behind barriers are the upper ends of their 95 % intervals, so
+            that a reduction is at its safe end and training does not live on the errors of the
+            surrogate.
         digest: Its digest.
     """
 
@@ -50,6 +53,7 @@ class SurrogateEngine(Engine):
     validated_range: ClassVar[str] = "a validated range: they are predictions of the surrogate"
 
     surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
+    safe: bool = False
     name: str = field(init=False, default=SURROGATE)
     version: str = field(init=False)
     digest: str = field(init=False)
@@ -59,7 +63,8 @@ class SurrogateEngine(Engine):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "digest", self.surrogate.digest)
-        object.__setattr__(self, "version", f"{SURROGATE} {self.digest}")
+        safe = " safe" if self.safe else ""
+        object.__setattr__(self, "version", f"{SURROGATE} {self.digest}{safe}")
 
     def loads(
         self,
@@ -81,7 +86,8 @@ class SurrogateEngine(Engine):
             predicted.
 
         Raises:
-            BlastEnvError: If no structure is protected.
+            BlastEnvError: If no structure is protected, or the surrogate has no intervals and
+                `safe` is set.
         """
         return self.loads_at_once([EngineBlast(scenario, layout, charge, seed)])[0]
 
@@ -96,6 +102,8 @@ class SurrogateEngine(Engine):
             site = self._site(own[0].scenario)
             charges = [charge_against(*each[:3]) for each in own]
             guess = self.surrogate.guess(site, [each.layout for each in own], charges)
+            if self.safe:
+                guess = self.surrogate.upper_ends(guess, np.array([bool(e.layout) for e in own]))
             for index, number in enumerate(numbers):
                 found[number] = _loads(site, guess, index)
         return [each for each in found if each is not None]
@@ -139,6 +147,8 @@ def is_surrogate(name: str) -> bool:
 def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None = None) -> Engine:
     """Return an engine by its name, which may be that of a surrogate.
 
+    A surrogate with intervals is safe (`SurrogateEngine`).
+
     Args:
         name: The name of an engine, or a surrogate's file (.json).
         cell_m: Side of the cells of gas dynamics; by default the engine's.
@@ -148,6 +158,8 @@ def engine_to_train_on(name: str, cell_m: float | None = None, cells: str | None
         UnknownNameError: If no engine has that name.
         BlastEnvError: If the engine does not support the cells, or the file is not a surrogate.
     """
-    if Path(name).suffix == ".json":
-        return find_engine(SurrogateEngine(load_surrogate(Path(name))), cell_m, cells=cells)
-    return find_engine(name, cell_m, cells=cells)
+    if not is_surrogate(name):
+        return find_engine(name, cell_m, cells=cells)
+    surrogate = packaged_surrogate() if name == SURROGATE else load_surrogate(Path(name))
+    safe = surrogate.fit.impulse is not None
+    return find_engine(SurrogateEngine(surrogate, safe=safe), cell_m, cells=cells)

@@ -86,6 +86,7 @@ class Samples:
         impulse: The impulses.
         peak: The peak overpressures.
         site: Index of the site (samples,).
+        scenario: Name of the site, or "" (samples,).
         case: Index of the combination of site, structure and charge (samples,).
         layout: Index of the combination of site and layout (samples,).
     """
@@ -98,6 +99,7 @@ class Samples:
     impulse: Loads
     peak: Loads
     site: np.ndarray
+    scenario: np.ndarray
     case: np.ndarray
     layout: np.ndarray
 
@@ -158,6 +160,7 @@ class Samples:
                 PEAK_POWER,
             ),
             site=rows.groupby("scenario_hash").ngroup().to_numpy(),
+            scenario=rows["scenario"].to_numpy(),
             case=place.groupby(list(place.columns)).ngroup().to_numpy(),
             layout=rows.groupby(["scenario_hash", "layout"]).ngroup().to_numpy(),
         )
@@ -177,6 +180,7 @@ def fit(
     about: Fit,
     members: int = MEMBERS,
     peaks: bool = True,
+    device: str = "cpu",
 ) -> Surrogate:
     """Fit the networks to some of the samples, two networks at a time.
 
@@ -188,6 +192,7 @@ def fit(
         about: Provenance, for the surrogate's file.
         members: Number of networks per kind of load.
         peaks: Whether to fit the networks for peaks, too.
+        device: Device of torch; the fit depends on it by rounding.
     """
     points = samples.features[np.repeat(chosen, samples.counts)]
     solids = samples.relations[np.repeat(chosen, samples.counts * samples.solids)]
@@ -196,13 +201,13 @@ def fit(
     scale += _LEAST_SCALE
     cases = [np.flatnonzero(chosen & (samples.case == case)) for case in np.unique(samples.case)]
     own = [each for each in cases if len(each)]
-    tensors = _Tensors.of(samples, mean, scale)
+    tensors = _Tensors.of(samples, mean, scale, device)
     of_both = (samples.impulse, samples.peak) if peaks else (samples.impulse,)
     tasks = []
     for loads in of_both:
         for number in range(members):
             torch.manual_seed(seed + number)
-            tasks.append((_Network(), _Target.of(loads), seed + number))
+            tasks.append((_Network().to(device), _Target.of(loads, device), seed + number))
 
     def fitted(task: tuple["_Network", "_Target", int]) -> Member:
         return _fitted(tensors, own, epochs, *task)
@@ -258,6 +263,42 @@ def load_errors(
     chosen: BoolArray,
 ) -> Errors:
     """Compare predictions of one kind of load, by `networks` of the surrogate, with `loads`."""
+    found = predictions(surrogate, networks, samples, loads, chosen)
+    return errors_of(found, loads.target[chosen], samples.case[chosen])
+
+
+class Predictions(NamedTuple):
+    """Predictions of one kind of load.
+
+    Attributes:
+        log_load: Logarithm of each load (samples,).
+        spread: Its standard deviation among the networks (samples,).
+    """
+
+    log_load: FloatArray
+    spread: FloatArray
+
+
+def held_out_predictions(
+    samples: Samples, epochs: int, seed: int, device: str, out_of: BoolArray
+) -> tuple[Predictions, Predictions]:
+    """Return the impulses and peaks of the samples `out_of` a fit to all others."""
+    about = Fit(command="", versions={}, engine="", blasts=1, sites=1)
+    fitted = fit(samples, ~out_of, epochs, seed, about, device=device)
+    return (
+        predictions(fitted, fitted.impulse, samples, samples.impulse, out_of),
+        predictions(fitted, fitted.peak, samples, samples.peak, out_of),
+    )
+
+
+def predictions(
+    surrogate: Surrogate,
+    networks: Networks,
+    samples: Samples,
+    loads: Loads,
+    chosen: BoolArray,
+) -> Predictions:
+    """Predict one kind of load, by `networks` of the surrogate, on the `chosen` samples."""
     counts, solids = samples.counts[chosen], samples.solids[chosen]
     points = np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
@@ -274,11 +315,12 @@ def load_errors(
     differs = networks(surrogate.scaled(samples.features[points]), heard)
     known, area_m2 = loads.known[points], samples.area_m2[points]
     logs = log_loads(differs, known, area_m2, starts, loads.power)
-    return _errors(agreed(logs), loads.target[chosen], samples.case[chosen])
+    return Predictions(agreed(logs), logs.std(axis=0))
 
 
-def _errors(guess: FloatArray, target: FloatArray, cases: np.ndarray) -> Errors:
-    """Compare logarithms of predicted and simulated loads (samples,)."""
+def errors_of(found: Predictions, target: FloatArray, cases: np.ndarray) -> Errors:
+    """Compare predictions with logarithms of simulated loads (samples,)."""
+    guess = found.log_load
     off = guess - target
     ranks, lost, within = [], [], np.zeros_like(off)
     for case in np.unique(cases):
@@ -326,9 +368,10 @@ class _Target:
     power: float
 
     @classmethod
-    def of(cls, loads: Loads) -> "_Target":
+    def of(cls, loads: Loads, device: str) -> "_Target":
         known, target = (
-            torch.from_numpy(each.astype(np.float32)) for each in (loads.known, loads.target)
+            torch.from_numpy(each.astype(np.float32)).to(device)
+            for each in (loads.known, loads.target)
         )
         return cls(known, target, loads.power)
 
@@ -358,13 +401,13 @@ class _Tensors:
     solids: IntArray
 
     @classmethod
-    def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray) -> "_Tensors":
+    def of(cls, samples: Samples, mean: FloatArray, scale: FloatArray, device: str) -> "_Tensors":
         of_points, of_solids = slice(None, FEATURES), slice(FEATURES, INPUTS)
         features, relations = (
-            torch.from_numpy(bounded(each, mean[own], scale[own]).astype(np.float32))
+            torch.from_numpy(bounded(each, mean[own], scale[own]).astype(np.float32)).to(device)
             for each, own in ((samples.features, of_points), (samples.relations, of_solids))
         )
-        area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32))
+        area_m2 = torch.from_numpy(samples.area_m2.astype(np.float32)).to(device)
         starts = np.cumsum([0, *samples.counts[:-1]])
         rows = samples.counts * samples.solids
         firsts = np.cumsum([0, *rows[:-1]])
@@ -384,8 +427,8 @@ class _Tensors:
 
     def _errors(self, network: "_Network", target: _Target, numbers: IntArray) -> Tensor:
         """Return the errors of the logarithm on some samples (samples,)."""
-        counts, solids = self.counts[numbers], self.solids[numbers]
-        points = torch.from_numpy(_runs_of(self.starts[numbers], counts))
+        counts, solids, device = self.counts[numbers], self.solids[numbers], self.area_m2.device
+        points = torch.from_numpy(_runs_of(self.starts[numbers], counts)).to(device)
         related = torch.from_numpy(_runs_of(self.first_rows[numbers], self.rows[numbers]))
         begin = np.cumsum([0, *counts[:-1]])
         hearing = [
@@ -394,19 +437,19 @@ class _Tensors:
         ]
         over = network(
             self.features[points],
-            self.relations[related],
-            torch.from_numpy(np.concatenate(hearing)),
+            self.relations[related.to(device)],
+            torch.from_numpy(np.concatenate(hearing)).to(device),
         )
-        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts))
+        owner = torch.from_numpy(np.repeat(np.arange(len(numbers)), counts)).to(device)
         logs = target.power * (target.known[points] + over)
-        empty = torch.zeros(len(numbers))
+        empty = torch.zeros(len(numbers), device=device)
         # Relative to the largest: high powers of pascals overflow.
-        largest = torch.from_numpy(np.maximum.reduceat(logs.detach().numpy(), begin))
+        largest = (empty - torch.inf).scatter_reduce(0, owner, logs.detach(), "amax")
         area_m2 = self.area_m2[points]
         shares = area_m2 * torch.exp(logs - largest[owner])
         mean = empty.index_add(0, owner, shares) / empty.index_add(0, owner, area_m2)
         log_loads = (torch.log(mean) + largest) / target.power
-        return log_loads - target.target[torch.from_numpy(numbers)]
+        return log_loads - target.target[torch.from_numpy(numbers).to(device)]
 
 
 def _runs_of(starts: IntArray, counts: IntArray) -> IntArray:
@@ -436,7 +479,7 @@ class _Network(nn.Module):
         """
         silu = nn.functional.silu
         messages = silu(self.message(silu(self.send(relations))))
-        heard = torch.zeros(len(features), MESSAGE).index_add(0, hearing, messages)
+        heard = features.new_zeros(len(features), MESSAGE).index_add(0, hearing, messages)
         hidden = silu(self.first(torch.cat((features, heard), dim=1)))
         said: Tensor = self.last(silu(self.second(hidden)))[:, 0]
         return said
@@ -444,7 +487,7 @@ class _Network(nn.Module):
     def plain(self) -> Member:
         """Return the weights and biases as arrays."""
         arrays: Sequence[FloatArray] = [
-            each.detach().numpy().astype(np.float64) for each in self.parameters()
+            each.detach().cpu().numpy().astype(np.float64) for each in self.parameters()
         ]
         return Member(*(array.T if array.ndim == 2 else array for array in arrays))
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.design.surrogate.relations import RELATIONS
 from blast_env.design.surrogate.walls import FEATURES, INPUTS, Approach, SingleArray, SurrogateSite
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
@@ -72,6 +72,8 @@ class Check(BaseModel):
         rank: Rank correlation with the engine among the layouts of a case.
         lost: Regret of a choice by prediction: excess of the load of the layout with the best
             prediction over the least load of the case, relative to the largest.
+        spreads: Half-width of the 95 % interval of ln load, in standard deviations among the
+            networks (`intervals.interval_factor`).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -79,6 +81,7 @@ class Check(BaseModel):
     rms: float
     rank: float
     lost: float
+    spreads: Annotated[float, Field(gt=0.0)]
 
 
 class Fit(BaseModel):
@@ -91,7 +94,8 @@ class Fit(BaseModel):
         engine: Engine of the blasts.
         blasts: Number of loads of structures in the fit.
         sites: Number of sites in the fit.
-        seconds: Duration of the fit without the check, in s.
+        seconds: Duration of the fit, in s.
+        check_command: Command that made the check.
         impulse: Errors of impulses, if checked.
         peak: Errors of peak overpressures, if checked.
     """
@@ -105,6 +109,7 @@ class Fit(BaseModel):
     blasts: Annotated[int, Field(ge=1)]
     sites: Annotated[int, Field(ge=1)]
     seconds: Annotated[float, Field(ge=0.0)] = 0.0
+    check_command: str = ""
     impulse: Check | None = None
     peak: Check | None = None
 
@@ -316,6 +321,34 @@ class Surrogate:
         if not site.counts_peaks:
             return Guess(*impulse)
         return Guess(*impulse, *of(self.peak, [each.log_peak for each, _ in pairs], PEAK_POWER))
+
+    def upper_ends(self, guess: Guess, which: BoolArray | bool = True) -> Guess:
+        """Return predicted loads at the upper ends of their 95 % intervals.
+
+        Args:
+            guess: The predictions.
+            which: Layouts to change (layouts,); the others stay.
+
+        Raises:
+            BlastEnvError: If the surrogate has no intervals.
+        """
+
+        chosen = np.atleast_1d(which)[:, np.newaxis]
+
+        def upper(loads: FloatArray, spread: FloatArray, check: Check | None) -> FloatArray:
+            if check is None:
+                raise BlastEnvError(
+                    "this surrogate has no intervals: `python -m studies.surrogate calibrate` adds "
+                    "them"
+                )
+            found: FloatArray = loads * np.exp(check.spreads * spread * chosen)
+            return found
+
+        impulse_pa_s = upper(guess.impulse_pa_s, guess.spread, self.fit.impulse)
+        if guess.peak_pa is None or guess.peak_spread is None:
+            return guess._replace(impulse_pa_s=impulse_pa_s)
+        peak_pa = upper(guess.peak_pa, guess.peak_spread, self.fit.peak)
+        return guess._replace(impulse_pa_s=impulse_pa_s, peak_pa=peak_pa)
 
     def save(self, path: str | Path) -> Path:
         """Write the surrogate as a JSON file, numbers to five digits.
