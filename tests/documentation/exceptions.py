@@ -165,7 +165,7 @@ SMALLER: Final[dict[str, str]] = {
     " --cache blasts": "--sites 1 --layouts 1 --rules 1",
     "python -m studies.blast_table blasts --sites 420 --out blasts.parquet": "--sites 1",
     "python -m studies.surrogate fit --out surrogate.json": (
-        "--data docs/data/close_site_blasts.parquet --epochs 1 --no-check"
+        "--data docs/data/close_site_blasts.parquet --epochs 1"
     ),
     "python -m studies.surrogate judge control_room school_and_clinic visitor_entrance"
     " hotel_forecourt shopping_street --charges 3 --surrogate surrogate.json": (
@@ -187,7 +187,7 @@ SMALLER: Final[dict[str, str]] = {
         "--steps 20 --set first_updates=3 --set updates=2"
     ),
     "python -m studies.surrogate fit --data docs/data/close_site_blasts.parquet"
-    " --data out/hotel.parquet --no-check --out out/hotel.json": "--epochs 1",
+    " --data out/hotel.parquet --out out/hotel.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
     " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
     " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
@@ -238,6 +238,8 @@ NOT_RUN: Final[dict[str, str]] = {
     "python -m studies.blast_again docs/data/close_site_blasts.parquet --layouts 4": (
         "200 sites; tests/studies/test_blast_again.py"
     ),
+    "python -m studies.surrogate calibrate --surrogate surrogate.json --device cuda"
+    " --processes 5": ("an hour without a GPU; tests/design/test_surrogate.py"),
     "python -m studies.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/studies/test_blast_table.py"
     ),

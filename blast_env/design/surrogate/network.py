@@ -332,7 +332,6 @@ class Surrogate:
         Raises:
             BlastEnvError: If the surrogate has no intervals.
         """
-
         chosen = np.atleast_1d(which)[:, np.newaxis]
 
         def upper(loads: FloatArray, spread: FloatArray, check: Check | None) -> FloatArray:
