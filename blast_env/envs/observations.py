@@ -244,7 +244,7 @@ def cells_shown(placements: Sequence[Placement], legal: BoolArray) -> BoolArray:
         placements: The placements.
         legal: `Placement.legal` of each (placements, variants, rows, columns).
     """
-    occupied = np.stack([each.standing for each in placements]) > 0
+    occupied = np.array([each.standing for each in placements]) > 0
     return np.stack((occupied, legal.any(axis=1)), axis=1)
 
 
@@ -606,7 +606,7 @@ class GridEpisode(BatchedObservation):
     @staticmethod
     def observe_many(episodes: Sequence["GridEpisode"], placements: Sequence[Placement]) -> Plane:
         """Return the planes of several episodes (episodes, channels, rows, columns)."""
-        planes = np.stack([each.static for each in episodes])
+        planes = np.array([each.static for each in episodes])
         GridEpisode.draw(episodes, placements, planes)
         return planes.astype(np.float32) / _LEVELS
 
@@ -624,7 +624,7 @@ class GridEpisode(BatchedObservation):
             planes: All planes (episodes, channels, rows, columns), changed in place.
         """
         channels = episodes[0].channels
-        legal = np.stack([each.legal for each in placements])
+        legal = np.array([each.legal for each in placements])
         uniform, on_cells = stock_shares(placements), cells_shown(placements, legal)
         names, cell_names = ["stock_share", "stock", "budget_share"], ["barrier", "free"]
         if BARRIER_HEIGHT in channels:
@@ -756,7 +756,7 @@ class ImageEpisode(BatchedObservation):
         episodes: Sequence["ImageEpisode"], placements: Sequence[Placement]
     ) -> NDArray[np.uint8]:
         """Return the images of several episodes (episodes, height, width, channels)."""
-        images = np.stack([each.static for each in episodes])
+        images = np.array([each.static for each in episodes])
         _, rows, columns = episodes[0].planes.static.shape
         planes = np.moveaxis(images[:, :rows, :columns], -1, 1)
         GridEpisode.draw([each.planes for each in episodes], placements, planes)
@@ -862,13 +862,13 @@ class FeaturesEpisode(BatchedObservation):
         episodes: Sequence["FeaturesEpisode"], placements: Sequence[Placement]
     ) -> Array:
         """Return the vectors of several episodes (episodes, features)."""
-        legal = np.stack([each.legal for each in placements])
+        legal = np.array([each.legal for each in placements])
         parts: list[NDArray[Any]] = [
             stock_shares(placements),
-            np.stack([each.site for each in episodes]),
+            np.array([each.site for each in episodes]),
         ]
-        parts += [cells_shown(placements, legal), np.stack([each.costs for each in episodes])]
-        parts.append(np.stack([each.items for each in episodes]))
+        parts += [cells_shown(placements, legal), np.array([each.costs for each in episodes])]
+        parts.append(np.array([each.items for each in episodes]))
         if placements[0].catalogue.has_items:
             parts += items_placed(placements, legal)
         if episodes[0].shows_vehicles:
@@ -978,7 +978,7 @@ class DictEpisode(BatchedObservation):
         episodes: Sequence["DictEpisode"], placements: Sequence[Placement]
     ) -> dict[str, Array]:
         """Return planes and vectors of several episodes, with a leading axis (episodes, ...)."""
-        parts = [stock_shares(placements), np.stack([each.site for each in episodes])]
+        parts = [stock_shares(placements), np.array([each.site for each in episodes])]
         if placements[0].catalogue.has_items:
             parts.append(items_left(placements))
         if episodes[0].shows_vehicles:

@@ -156,7 +156,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         """
         if not self._episodes:
             raise gym.error.ResetNeeded("there is no episode yet: call reset")
-        return np.stack([each.action_mask() for each in self._episodes])
+        return np.array([each.action_mask() for each in self._episodes])
 
     def _checked(self, actions: IntArray | Sequence[int], played: list[int]) -> list[int]:
         given = np.asarray(actions)
@@ -247,7 +247,7 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
             return concatenate(space, [each.observe() for each in episodes], empty)
         observed = kind.observe_many([each.observation for each in episodes], shown)
         if isinstance(space, spaces.Dict):
-            masks = np.stack([each.action_mask() for each in episodes])
+            masks = np.array([each.action_mask() for each in episodes])
             observed |= {MASK: masks.astype(np.int8)}
         return observed
 

@@ -84,7 +84,7 @@ class Placement:
         whole = cls(empty.scenario, empty.catalogue.layout_from(layout))
         return whole if whole._is_sound else _placed_one_by_one(empty, whole.layout)
 
-    @property
+    @cached_property
     def checked(self) -> CheckedLayout:
         """The layout, marked as checked by `of` and `place`."""
         layout = CheckedLayout(self.layout)
@@ -448,7 +448,7 @@ def find_legal(placements: Iterable[Placement]) -> None:
 def _legal_of(placements: Sequence[Placement]) -> BoolArray:
     """Return `Placement.legal` of placements on one site (placements, variants, rows, columns)."""
     cells, catalogue = placements[0]._empty_zone, placements[0].catalogue
-    taken = np.stack([each.standing for each in placements]) > 0
+    taken = np.array([each.standing for each in placements]) > 0
     legal = cells.places(cells.usable & ~taken)
     if placements[0]._zone.budget is not None:
         spendable = np.array([each._spendable for each in placements])

@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
-from blast_env.design.surrogate.walls import SurrogateSite, site_of
+from blast_env.design.surrogate.walls import Memory, SurrogateSite, site_of
 from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.geometry import Element
@@ -21,9 +21,6 @@ SURROGATE: Final = "surrogate"
 
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
-
-_SITE_BYTES: Final = 2**23
-"""Bound on the cache of messages per site."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +57,7 @@ class SurrogateEngine(Engine):
     _sites: OrderedDict[str, SurrogateSite] = field(
         default_factory=OrderedDict, init=False, repr=False, compare=False
     )
+    _memory: Memory = field(default_factory=Memory, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "digest", self.surrogate.digest)
@@ -111,7 +109,7 @@ class SurrogateEngine(Engine):
     def _site(self, scenario: Scenario) -> SurrogateSite:
         key = scenario.content_hash
         if key not in self._sites:
-            self._sites[key] = site_of(scenario, _SITE_BYTES)
+            self._sites[key] = site_of(scenario, self._memory)
             if len(self._sites) > _KEPT_SITES:
                 self._sites.popitem(last=False)
         self._sites.move_to_end(key)

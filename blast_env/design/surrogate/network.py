@@ -4,11 +4,10 @@ Each solid sends a message to each point, computed from their relations. The pre
 is a function of the features of the point and the sum of all messages.
 """
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from hashlib import sha256
-from itertools import pairwise, zip_longest
+from itertools import chain, pairwise, zip_longest
 from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, Self
@@ -377,24 +376,25 @@ class Surrogate:
 
         Layouts have many pieces in common, so the messages of each piece are cached.
         """
-        related: dict[Hashable, Callable[[], FloatArray]] = {}
-        keys: list[list[Hashable]] = []
-        for approach, barrier in pairs:
-            related[networks, approach] = partial(getattr, approach, "solids")
-            keys.append([(networks, approach)])
-            for piece in barrier:
-                keys[-1].append((networks, approach, piece.tobytes()))
-                related[keys[-1][-1]] = partial(approach.relations, piece[np.newaxis])
-        known = site.memory.of_all(related, lambda missing: self._sent(networks, missing))
-        return [_sum([known[key] for key in of_pair]) for of_pair in keys]
+        of_pairs = [
+            [_Sender(networks, each), *(_Sender(networks, each, tuple(row)) for row in barrier)]
+            for each, barrier in ((each, barrier.tolist()) for each, barrier in pairs)
+        ]
+        known = site.memory.of_all(chain.from_iterable(of_pairs), self._sent)
+        return [_sum([known[each] for each in senders]) for senders in of_pairs]
 
-    def _sent(self, networks: Networks, related: Sequence[FloatArray]) -> list[SingleArray]:
-        """Return the sum of the messages of solids to each point (members, points, MESSAGE).
-
-        Args:
-            networks: The networks.
-            related: Relations of each group of solids (solids, points, RELATIONS).
-        """
+    def _sent(self, senders: Sequence["_Sender"]) -> list[SingleArray]:
+        """Return the sum of the messages to each point (members, points, MESSAGE)."""
+        of_approaches: dict[Approach, list[int]] = {}
+        related = [each.approach.solids for each in senders]
+        for number, each in enumerate(senders):
+            if each.piece is not None:
+                of_approaches.setdefault(each.approach, []).append(number)
+        for approach, numbers in of_approaches.items():
+            pieces = np.array([senders[number].piece for number in numbers])
+            for number, own in zip(numbers, approach.relations(pieces), strict=True):
+                related[number] = own[np.newaxis]
+        networks = senders[0].networks
         rows = np.concatenate([each.reshape(-1, RELATIONS) for each in related])
         told = networks.messages(self.related(rows))
         ends = np.cumsum([each.shape[0] * each.shape[1] for each in related])
@@ -410,6 +410,14 @@ class Surrogate:
     def related(self, relations: FloatArray) -> FloatArray:
         """Return the scaled and bounded relations (solids x points, RELATIONS)."""
         return bounded(relations, self.mean[FEATURES:], self.scale[FEATURES:])
+
+
+class _Sender(NamedTuple):
+    """A piece, or all structures, whose messages are wanted."""
+
+    networks: Networks
+    approach: Approach
+    piece: tuple[float, ...] | None = None
 
 
 def _sum(messages: Sequence[SingleArray]) -> SingleArray:

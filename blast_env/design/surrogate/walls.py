@@ -1,8 +1,9 @@
 """Sites as the surrogate represents them: points on protected walls, and obstacles to the blast."""
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,9 @@ _LEAST_Z: Final = 0.2
 """Least scaled distance, m/kg^(1/3): nearer points have the reflected loads at this distance."""
 
 _MOST_BYTES: Final = 2**26
+
+_MOST_APPROACH_BYTES: Final = 2**28
+"""Bound on the paths of the charges of a site: some 130 charges with the most points."""
 
 SingleArray = NDArray[np.float32]
 
@@ -180,38 +184,42 @@ class Approach:
 
 
 class Memory:
-    """A cache of arrays that is cleared when it exceeds a bound.
+    """A cache of arrays that is cleared when it exceeds a bound; copies begin empty.
 
     Args:
         most_bytes: The bound.
     """
 
-    def __init__(self, most_bytes: int) -> None:
+    def __init__(self, most_bytes: int = _MOST_BYTES) -> None:
         self._most_bytes, self._bytes = most_bytes, 0
         self._kept: dict[Hashable, SingleArray] = {}
 
+    def __reduce__(self) -> tuple[type["Memory"], tuple[int]]:
+        """Pickle the bound alone."""
+        return Memory, (self._most_bytes,)
+
     def of_all(
         self,
-        wanted: Mapping[Hashable, Callable[[], FloatArray]],
-        make: Callable[[Sequence[FloatArray]], Sequence[SingleArray]],
-    ) -> dict[Hashable, SingleArray]:
+        wanted: Iterable[Hashable],
+        make: Callable[[Sequence[Any]], Sequence[SingleArray]],
+    ) -> dict[Any, SingleArray]:
         """Return the arrays of keys, which must not be modified.
 
         Args:
-            wanted: The keys, each with a function that gives the data of its array.
-            make: Makes the missing arrays from their data.
+            wanted: The keys.
+            make: Makes the missing arrays from their keys.
         """
-        found = {key: self._kept[key] for key in wanted if key in self._kept}
-        missing = [key for key in wanted if key not in found]
-        if missing:
-            made = make([wanted[key]() for key in missing])
-            found.update(zip(missing, made, strict=True))
-        for key in missing:
-            if self._bytes + found[key].nbytes > self._most_bytes:
+        distinct = dict.fromkeys(wanted)
+        found = {key: self._kept[key] for key in distinct if key in self._kept}
+        missing = [key for key in distinct if key not in found]
+        made = make(missing) if missing else ()
+        for key, array in zip(missing, made, strict=True):
+            found[key] = array
+            if self._bytes + array.nbytes > self._most_bytes:
                 self._kept.clear()
                 self._bytes = 0
-            self._kept[key] = found[key]
-            self._bytes += found[key].nbytes
+            self._kept[key] = array
+            self._bytes += array.nbytes
         return found
 
 
@@ -224,7 +232,7 @@ class SurrogateSite:
 
     Args:
         scenario: The scenario.
-        most_bytes: Bound on the cache of messages.
+        memory: The cache of messages, which sites may share; by default a separate one.
 
     Attributes:
         scenario: The scenario.
@@ -234,9 +242,9 @@ class SurrogateSite:
         alternatives: The bays of the facades, if the objective counts their response.
     """
 
-    def __init__(self, scenario: Scenario, most_bytes: int = _MOST_BYTES) -> None:
+    def __init__(self, scenario: Scenario, memory: Memory | None = None) -> None:
         self.scenario = scenario
-        self.memory = Memory(most_bytes)
+        self.memory = Memory() if memory is None else memory
         self.protected = tuple(each for each in scenario.structures if each.protected)
         self.counts_peaks = scenario.objective.needs_peaks
         self.alternatives = scenario.alternatives if scenario.objective.is_response else ()
@@ -250,7 +258,7 @@ class SurrogateSite:
             ]
         ).reshape(-1, 5)
         self._points = WallPoints.on(self.protected, air_m)
-        self._approaches: dict[Charge, Approach] = {}
+        self._approaches: OrderedDict[Charge, Approach] = OrderedDict()
         self._boxes: dict[Element, tuple[float, ...]] = {}
         self._triangular = {
             each.name: TriangularLoads(
@@ -264,7 +272,11 @@ class SurrogateSite:
     def approach(self, charge: Charge) -> Approach:
         """Return the layout-independent data of a charge and the protected structures."""
         if charge not in self._approaches:
-            self._approaches[charge] = self._approach_of(charge)
+            made = self._approach_of(charge)
+            self._approaches[charge] = made
+            if len(self._approaches) * made.ways.weights.nbytes > _MOST_APPROACH_BYTES:
+                self._approaches.popitem(last=False)
+        self._approaches.move_to_end(charge)
         return self._approaches[charge]
 
     def bay_damages(
@@ -386,17 +398,17 @@ def _apart(structures: Sequence[AnyStructure], heights_m: Sequence[float]) -> fl
     return float(max(1.0, (area_m2 / (_ALONG_M * _UP_M * MOST_POINTS)) ** 0.5))
 
 
-def site_of(scenario: Scenario, most_bytes: int = _MOST_BYTES) -> SurrogateSite:
+def site_of(scenario: Scenario, memory: Memory | None = None) -> SurrogateSite:
     """Return a scenario as the surrogate represents it.
 
     Args:
         scenario: The scenario.
-        most_bytes: Bound on the cache of messages.
+        memory: As for `SurrogateSite`.
 
     Raises:
         BlastEnvError: If no structure is protected.
     """
-    site = SurrogateSite(scenario, most_bytes)
+    site = SurrogateSite(scenario, memory)
     if not site.protected:
         raise BlastEnvError(f"{scenario.name}: no structure is protected")
     return site
