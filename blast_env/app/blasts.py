@@ -256,6 +256,8 @@ def _gas(
     scale = _scale(shot, Path(task.blasts) / bare_key / _SCALE)
     if not layout:
         write_kept(scale, folder / _SCALE)
+    evaluator = BlastEvaluator(scenario, task.engine.gas, cache=task.cache)
+    evaluator.keep(layout, LoadCase(charge), result.loads())  # for searches, reports and others
     painter = PressurePainter([shot], scale.film_kpa, _FILM_PX)
     times_s = np.linspace(0.0, scale.until_s, FRAMES).tolist()
     frames = (painter.paint(time_s, "") for time_s in times_s)

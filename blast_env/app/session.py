@@ -26,7 +26,14 @@ from blast_env.app.records import (
     comparison,
 )
 from blast_env.app.threats import threats_of, usual_threats
-from blast_env.app.verdicts import FacadeVerdict, facades_digest, picture_name, verdict_rows
+from blast_env.app.verdicts import (
+    draw_damage,
+    facades_digest,
+    picture_name,
+    stored_consequences,
+    verdict_rows,
+    verdicts_of,
+)
 from blast_env.app.work import (
     BlastTask,
     FilmTask,
@@ -39,6 +46,7 @@ from blast_env.app.work import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
 from blast_env.layout.build_scene import charge_against
@@ -442,7 +450,7 @@ class Session:
             read = self._facades(shown, threat)
             if read is None:
                 return ()
-            self._verdicts[known] = read.verdicts()
+            self._verdicts[known] = verdicts_of(read)
         return self._verdicts[known]
 
     def damage_picture(self, shown: Shown, number: int) -> str:
@@ -461,16 +469,16 @@ class Session:
         for threat in self.chosen_threats():
             for each in self.shown(threat):
                 read = self._facades(each, threat) if each.key == key else None
-                for number in range(0 if read is None else len(self.scenario.structures)):
-                    if read is not None and self.damage_picture(each, number) == name:
-                        read.draw(number, path)
+                for number, building in enumerate(() if read is None else read.responses):
+                    if self.damage_picture(each, number) == name:
+                        draw_damage(building, path)
                         return path
         raise BlastEnvError(f"there is no {name}")
 
-    def _facades(self, shown: Shown, threat: LoadCase) -> FacadeVerdict | None:
+    def _facades(self, shown: Shown, threat: LoadCase) -> Consequences | None:
         folder = self.folder.blast_of(shown.key)
         cell_m = self.engine.gas.smallest_m
-        return FacadeVerdict.read(self.scenario, shown.layout, threat.charge, cell_m, folder)
+        return stored_consequences(self.scenario, shown.layout, threat.charge, cell_m, folder)
 
     def waves(self, threat: LoadCase) -> Sequence[tuple[str, BlastRecord]]:
         """Return the blasts with gauges under a threat, by the names of the layouts."""

@@ -4,7 +4,6 @@ Other windows and hardening measures need no new blast: the loads stay the same.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -14,7 +13,6 @@ from zipfile import BadZipFile
 import numpy as np
 
 from blast_env.app.records import BlastRecord, BuildingVerdict, VerdictRow
-from blast_env.arrays import FloatArray
 from blast_env.evaluation.consequences import BuildingResponse, Consequences, by_building
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.probability import Uncertainty, level_probability, probability_text
@@ -23,9 +21,8 @@ from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
 from blast_env.layout.placement import met_by_blasts
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import FilledBay, peak_factor, respond
+from blast_env.response.facade import peak_factor, respond
 from blast_env.site import AnyCharge, Scenario
-from blast_env.site.scene import BlastSite
 
 _BAYS: Final = "bays.npz"
 _DASH: Final = "\N{EN DASH}"
@@ -52,69 +49,53 @@ def keep_histories(result: Any, folder: Path) -> None:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FacadeVerdict:
-    """The response of the facades of a site with a layout to one blast.
+def stored_consequences(
+    scenario: Scenario, layout: Layout, charge: AnyCharge, cell_m: float, folder: Path
+) -> Consequences | None:
+    """Return the response of the facades to a stored blast; `None` without their histories.
 
-    Attributes:
-        bays: The bays with a history, filled as the layout's measures have them.
-        time_s: Times of the histories (times,).
-        pressure_pa: Mean overpressure on each bay (bays, times).
-        site: The site with the charge at its place and the barrier.
+    Args:
         scenario: The scenario.
-        cell_m: Side of the cells.
+        layout: The layout, whose measures fill the bays.
+        charge: The charge, or the vehicle that carries it.
+        cell_m: Side of the cells of the blast.
+        folder: Its folder.
     """
+    try:
+        content = BytesIO((folder / _BAYS).read_bytes())  # closes a damaged file, too
+        with np.load(content, allow_pickle=False) as kept:
+            names, time_s, pressure = (kept[key] for key in ("names", "time_s", "pressure_pa"))
+    except (OSError, ValueError, KeyError, BadZipFile):
+        return None
+    known = {each.bay.name: each for each in scenario.bays_with(layout)}
+    rows = [row for row, name in enumerate(names.tolist()) if name in known]
+    if not rows:
+        return None
+    bays = [known[names[row]] for row in rows]
+    site = build_site(scenario, met_by_blasts(layout), 0, charge)
+    found = respond(bays, time_s, pressure[rows].astype(np.float64))
+    factor = peak_factor(cell_m, site.charge.tnt_kg)
+    return Consequences(tuple(by_building(scenario, found, site, factor)))
 
-    bays: tuple[FilledBay, ...]
-    time_s: FloatArray
-    pressure_pa: FloatArray
-    site: BlastSite
-    scenario: Scenario
-    cell_m: float
 
-    @classmethod
-    def read(
-        cls, scenario: Scenario, layout: Layout, charge: AnyCharge, cell_m: float, folder: Path
-    ) -> "FacadeVerdict | None":
-        """Return the verdict of a stored blast; `None` without histories of the facades."""
-        try:
-            content = BytesIO((folder / _BAYS).read_bytes())  # closes a damaged file, too
-            with np.load(content, allow_pickle=False) as kept:
-                names, time_s, pressure = (kept[key] for key in ("names", "time_s", "pressure_pa"))
-        except (OSError, ValueError, KeyError, BadZipFile):
-            return None
-        known = {each.bay.name: each for each in scenario.bays_with(layout)}
-        rows = [row for row, name in enumerate(names.tolist()) if name in known]
-        if not rows:
-            return None
-        bays = tuple(known[names[row]] for row in rows)
-        site = build_site(scenario, met_by_blasts(layout), 0, charge)
-        return cls(bays, time_s, pressure[rows].astype(np.float64), site, scenario, cell_m)
+def verdicts_of(found: Consequences) -> tuple[BuildingVerdict, ...]:
+    """Return the verdict on each building, in numbers."""
+    return tuple(map(_verdict, found.responses))
 
-    def buildings(self) -> list[BuildingResponse]:
-        """Return the response of each building."""
-        found = respond(self.bays, self.time_s, self.pressure_pa)
-        factor = peak_factor(self.cell_m, self.site.charge.tnt_kg)
-        return by_building(self.scenario, found, self.site, factor)
 
-    def verdicts(self) -> tuple[BuildingVerdict, ...]:
-        """Return the verdict on each building, in numbers."""
-        return tuple(map(_verdict, self.buildings()))
+def draw_damage(building: BuildingResponse, path: Path) -> None:
+    """Draw the facade of one building in the colours of its damage.
 
-    def draw(self, number: int, path: Path) -> None:
-        """Draw the facade of one building in the colours of its damage.
+    Raises:
+        BlastEnvError: If it cannot be written.
+    """
+    # Here, because pictures take half a second to import, and tables need none.
+    from blast_env.plots.facade import facade_picture
+    from blast_env.plots.figures import save_figure
 
-        Raises:
-            BlastEnvError: If it cannot be written.
-        """
-        # Here, because pictures take half a second to import, and tables need none.
-        from blast_env.plots.facade import facade_picture
-        from blast_env.plots.figures import save_figure
-
-        building = self.buildings()[number]
-        (x_m, y_m), tnt_kg = self.site.charge.position_m, self.site.charge.tnt_kg
-        words = f"{tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
-        save_figure(facade_picture([(words, building)], building.building), path)
+    (x_m, y_m), tnt_kg = building.charge.position_m, building.charge.tnt_kg
+    words = f"{tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
+    save_figure(facade_picture([(words, building)], building.building), path)
 
 
 def facades_digest(scenario: Scenario, layout: Layout) -> str:
