@@ -1,8 +1,8 @@
-"""Means, reductions and tails over threats, with their uncertainty."""
+"""Means, reductions and tails over threats, with their uncertainty, and means over areas."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,3 +192,26 @@ class ConditionalValueAtRisk:
     def __call__(self, loads: NDArray[np.float64]) -> float:
         """Return the mean of the worst share 1 - `level`."""
         return conditional_value_at_risk(loads, self.level)
+
+
+class _Part(Protocol):
+    @property
+    def protected(self) -> bool: ...
+
+
+AnyPart = TypeVar("AnyPart", bound=_Part)
+
+
+def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
+    """Return the parts whose loads make up a building's load: the protected ones, or else all."""
+    return [each for each in parts if each.protected] or parts
+
+
+def mean_over_area(load: FloatArray, area: FloatArray) -> float:
+    """Return the area-weighted mean load of a wall, structure or building; NaN without parts.
+
+    Args:
+        load: Loads on its parts (n,).
+        area: Their areas, in any unit (n,).
+    """
+    return float(np.average(load, weights=area)) if len(load) else np.nan

@@ -12,8 +12,8 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
-from blast_env.evaluation.engines.gas_tables import FACE_COLUMNS
 from blast_env.gas.engine import scaled_distance
+from blast_env.gas.tables import FACE_COLUMNS
 from blast_env.particles.parquet import read_parquet
 from blast_env.particles.run import EndReason
 from blast_env.site.scene import Charge

@@ -20,7 +20,6 @@ from blast_env.evaluation.engines.contract import (
     CALIBRATED_ENGINES,
     BlastLoads,
     StructureLoad,
-    counted_parts,
     on_buildings,
 )
 from blast_env.evaluation.engines.gas import GasEngine
@@ -31,7 +30,7 @@ from blast_env.geometry import Layout
 from blast_env.layout.placement import met_by_blasts
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.scene import Charge
-from blast_env.statistics import reductions
+from blast_env.statistics import counted_parts, reductions
 from blast_env.units import PA_PER_KPA
 
 RECORD: Final = "record.json"

@@ -223,7 +223,7 @@ class UnfoldingGas(Unfolding):
 
     def __init__(self, blast: "GasBlast") -> None:
         self.blast = blast
-        from blast_env.evaluation.engines.oblique_walls import ObliqueLoads
+        from blast_env.gas.oblique_walls import ObliqueLoads
 
         self.run = blast.engine.start_on(blast.site)
         self._oblique = ObliqueLoads.begin(self.run, blast.scenario.structures_with(blast.layout))

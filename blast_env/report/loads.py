@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.engines.contract import counted_parts
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
-from blast_env.evaluation.engines.gas_tables import means_by_wall
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder
+from blast_env.gas.tables import means_by_wall
 from blast_env.geometry import Rectangle
 from blast_env.plots.pressure_film import record_planes
 from blast_env.plots.pressure_frames import PressureShot, VerticalSection
@@ -25,6 +24,7 @@ from blast_env.report.peaks import CountedPeak, counted_peak
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.scene import WALLS, BlastSite, WallName
 from blast_env.site.sections import buildings_of
+from blast_env.statistics import counted_parts
 from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
 
 

@@ -13,7 +13,7 @@ import pytest
 from blast_env.app.records import BlastRecord, EngineRecord, comparison
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.engines.oblique_walls import stepped_buildings
+from blast_env.gas.oblique_walls import stepped_buildings
 from blast_env.report.loads import measure, targets_of
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge

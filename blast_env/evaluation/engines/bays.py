@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.engines.gas_tables import KNOWN_COLUMN
 from blast_env.evaluation.standing import STANDING_COLUMNS, bay_standings
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
+from blast_env.gas.tables import KNOWN_COLUMN
 from blast_env.response.damage import Alternatives, BayDamage, bay_damages
 from blast_env.response.facade import Bay, FacadeResponse, FilledBay, respond
 from blast_env.response.glass import GlazingCondition

@@ -18,12 +18,11 @@ from functools import cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
 from blast_env.geometry import Element
 from blast_env.particles.calibration.model import Calibration
@@ -32,6 +31,7 @@ from blast_env.response.damage import BayDamage, level_of, worst
 from blast_env.site import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
 from blast_env.site.facade import NamedBay
 from blast_env.site.models import StructureSection
+from blast_env.statistics import counted_parts, mean_over_area
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
     import pandas as pd
@@ -117,29 +117,6 @@ class ParticleLoad(StructureLoad):
 
     impulse_sim: float = field(kw_only=True)
     transferred_impulse_sim: float = field(kw_only=True)
-
-
-class _Part(Protocol):
-    @property
-    def protected(self) -> bool: ...
-
-
-AnyPart = TypeVar("AnyPart", bound=_Part)
-
-
-def counted_parts(parts: Sequence[AnyPart]) -> Sequence[AnyPart]:
-    """Return the parts whose loads make up a building's load: the protected ones, or else all."""
-    return [each for each in parts if each.protected] or parts
-
-
-def mean_over_area(load: FloatArray, area: FloatArray) -> float:
-    """Return the area-weighted mean load of a wall, structure or building; NaN without parts.
-
-    Args:
-        load: Loads on its parts (n,).
-        area: Their areas, in any unit (n,).
-    """
-    return float(np.average(load, weights=area)) if len(load) else np.nan
 
 
 def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:

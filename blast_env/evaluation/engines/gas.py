@@ -28,9 +28,16 @@ from blast_env.evaluation.engines.contract import (
     Engine,
     EngineOption,
     StructureLoad,
-    mean_over_area,
 )
-from blast_env.evaluation.engines.gas_tables import (
+from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
+from blast_env.gas.cost import CostGuess, cost_of_run
+from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
+from blast_env.gas.settings import (
+    CHECKED_SCALED_DISTANCE,
+    FACE_NAMES,
+    GasSettings,
+)
+from blast_env.gas.tables import (
     BUILDING_COLUMNS,
     FACE_COLUMNS,
     GAUGE_COLUMNS,
@@ -43,14 +50,6 @@ from blast_env.evaluation.engines.gas_tables import (
     module_table,
     structure_table,
     wall_table,
-)
-from blast_env.evaluation.engines.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
-from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
-from blast_env.gas.cost import CostGuess, cost_of_run
-from blast_env.gas.settings import (
-    CHECKED_SCALED_DISTANCE,
-    FACE_NAMES,
-    GasSettings,
 )
 from blast_env.geometry import Element, layout_text
 from blast_env.layout.build_scene import build_site, draw_threat, outlines
@@ -69,6 +68,7 @@ from blast_env.site import (
 )
 from blast_env.site.scene import WALLS, BlastSite, Charge
 from blast_env.site.zone import source_bounds_m
+from blast_env.statistics import mean_over_area
 from blast_env.tables import table_of
 from blast_env.units import MODULE_SIDE_M
 

@@ -8,7 +8,7 @@ import pytest
 from blast_env.evaluation import draw_threats
 from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
-from blast_env.evaluation.engines.oblique_walls import STEPPED, stepped_buildings
+from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.site.scene import WALLS
 from studies.gas.oblique import turned_block

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.engines.contract import counted_parts, mean_over_area
 from blast_env.gas.ending import AREA, is_known
 from blast_env.gas.settings import FACE_NAMES, ROOF
 from blast_env.site.scene import WALLS, StructureOutline
+from blast_env.statistics import counted_parts, mean_over_area
 from blast_env.tables import Column, as_types, table_of, texts
 from blast_env.units import MODULE_SIDE_M
 
