@@ -359,7 +359,7 @@ class Task:
         )
 
     def _prepared_for(self, scenario: Scenario) -> "_Prepared":
-        """Return what episodes on a site have in common.
+        """Return the parts that all episodes on a site share.
 
         Raises:
             BlastEnvError: If the scenario has another size than the representative one.

@@ -188,7 +188,7 @@ class BatchVecEnv(VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Return what a method of the vector gives for environments, as `action_masks` does."""
+        """Return the results of a method of the vector for environments, as `action_masks` does."""
         found = getattr(self.envs, method_name)(*method_args, **method_kwargs)
         return [found[index] for index in self._get_indices(indices)]
 
