@@ -10,7 +10,6 @@ from typing import Any, Final
 
 import typer
 from docutils import nodes
-from rich.text import Text
 
 from blast_env.provenance import package_version
 
@@ -113,8 +112,8 @@ def _commands(package: str) -> str:
 
 
 def _cell(text: str | None) -> str:
-    """Return a text for a cell of a table, from the markup of the command line."""
-    return Text.from_markup(text or "").plain.replace("|", r"\|").replace("\n", " ")
+    """Return a text for a cell of a table."""
+    return (text or "").replace("|", r"\|").replace("\n", " ")
 
 
 _WRITERS: Final[dict[str, Callable[[str], str]]] = {

@@ -122,13 +122,14 @@ def assess(
     if layout is not None:
         elements = tuple(load_layout(layout, site))
         layouts[layout_counts(elements, "barrier")] = elements
-    engine = final_engine(JUDGE, [site], cell_m, cells=cells)
     if screen:
         refuse_given(context, _OF_DRAWN_CHARGES + _OF_ASSESSMENT, "does not apply to --screen")
         *_, last = layouts.values()
-        print_screening(site, last, mass, required, engine if gas else None, picture)
+        engine = final_engine(JUDGE, [site], cell_m, cells=cells) if gas else None
+        print_screening(site, last, mass, required, engine, picture)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
+    engine = final_engine(JUDGE, [site], cell_m, cells=cells)
     drawn = GivenCharge.of(charge, tnt_kg).fixed_charges(site, charges)
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:

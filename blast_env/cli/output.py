@@ -97,19 +97,16 @@ class InterruptedCommandError(Exception):
 
 
 @contextmanager
-def user_errors(resume: Callable[[], str] | None = None) -> Iterator[None]:
+def user_errors() -> Iterator[None]:
     """Turn errors of the user into a message and exit code 2, interruptions into 130 or 143.
 
     SIGTERM (`timeout`, a batch system, a shutdown) ends the block as Ctrl-C does.
-
-    Args:
-        resume: Returns the way to resume after an interruption; empty if there is none.
     """
     with _sigterm_as_interrupt() as terminated:
         try:
             yield
         except KeyboardInterrupt:
-            parts: tuple[str, ...] = (NOTHING_HALF_WRITTEN, resume() if resume else "")
+            parts: tuple[str, ...] = (NOTHING_HALF_WRITTEN,)
         except InterruptedCommandError as interrupted:
             parts = interrupted.parts
         except BlastEnvError as error:

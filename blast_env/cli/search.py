@@ -192,7 +192,8 @@ def search(
                 for name, each in context.params.items()
                 if name not in _NOT_OF_THE_SEARCH
             }
-            write_search(run, {**options, "surrogate": digest}, checked, out)
+            options |= {"budget": run.result.budget, "surrogate": digest}
+            write_search(run, options, checked, out)
     if run.result.interrupted:
         raise InterruptedCommandError(
             "the best layout so far was kept",
@@ -208,15 +209,14 @@ def _method(
     if surrogate is not None and name != _SURROGATE:
         raise BlastEnvError(f"--surrogate is for --method {_SURROGATE}, not {name}")
     proposer_row(name)  # refuses an unknown one
-    # Here, because it takes half a second to import.
-    from blast_env.design.surrogate import load_surrogate, packaged_surrogate, search_by
-
-    guessing = None if surrogate is None else load_surrogate(surrogate)
     check_suits(name, scenario)
     initial = tuple(load_layout(path, scenario) for path in start_from)
     if name != _SURROGATE or initial:
         return find_proposer(name, initial), None
-    guessing = guessing or packaged_surrogate()
+    # Here, because it takes half a second to import.
+    from blast_env.design.surrogate import load_surrogate, packaged_surrogate, search_by
+
+    guessing = packaged_surrogate() if surrogate is None else load_surrogate(surrogate)
     return search_by(guessing), guessing.digest
 
 
