@@ -202,7 +202,7 @@ def layout_picture(scenario: Scenario, layout: Sequence[Element]) -> "Figure":
 
 
 @contextmanager
-def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+def progress_bar(label: str) -> Iterator[Callable[..., None]]:
     """Show a progress bar on standard error, and remove it at the end of the work.
 
     If standard error is no terminal, as in a log file, print a line every half minute instead.
@@ -211,16 +211,17 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
         label: The current work.
 
     Yields:
-        A function to call with the completed share, 0 to 1.
+        A function to call with the completed share, 0 to 1, and perhaps words on the state.
     """
     console = message_console()
     if not console.is_terminal:
         yield _progress_lines(console, printable(label))
         return
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    text = "{task.description} {task.fields[words]}"
+    columns = (TextColumn(text, markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(printable(label), total=1.0)
-        yield lambda share: progress.update(task, completed=share)
+        task = progress.add_task(printable(label), total=1.0, words="")
+        yield lambda share, words="": progress.update(task, completed=share, words=words)
 
 
 def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> None:
@@ -243,16 +244,17 @@ def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> 
         print_line(f"up to {cost_words(found)}")
 
 
-def _progress_lines(console: Console, label: str) -> Callable[[float], None]:
+def _progress_lines(console: Console, label: str) -> Callable[..., None]:
     """Return a function that writes the completed share, at most every half minute."""
     began = told = perf_counter()
 
-    def show(share: float) -> None:
+    def show(share: float, words: str = "") -> None:
         nonlocal told
         now = perf_counter()
         if now - told >= _LINE_EVERY_S:
             told = now
-            console.print(f"{label}: {share:.0%} after {now - began:,.0f} s")
+            text = f"{label}: {share:.0%} after {now - began:,.0f} s"
+            console.print(f"{text}, {words}" if words else text)
 
     return show
 

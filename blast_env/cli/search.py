@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
@@ -34,7 +33,6 @@ from blast_env.cli.output import (
     LAYOUT_PICTURE,
     InterruptedCommandError,
     layout_picture,
-    message_console,
     percent,
     print_cost,
     print_line,
@@ -47,12 +45,12 @@ from blast_env.cli.output import (
 from blast_env.cli.proposal import PACKAGE, package_proposal, verify_proposal
 from blast_env.design.search import (
     DesignProblem,
+    Progress,
     Proposer,
     SearchResult,
     find_proposer,
     proposers,
 )
-from blast_env.design.search import Progress as SearchProgress
 from blast_env.design.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
 from blast_env.envs.episode import find_realisations, find_risk, find_threat_model
 from blast_env.envs.strategies import HiddenThreat
@@ -244,20 +242,11 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
     print_cost((evaluator.engine, scenario, each.charge) for each in turns)
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
     hits, begun_s = evaluator.cache_hits, perf_counter()
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("blasts, best reduction {task.fields[best]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=message_console(), transient=True) as progress:
-        label = f"{method.name} search in {scenario.name}"
-        task = progress.add_task(label, total=budget, best="-")
+    with progress_bar(f"{method.name} search in {scenario.name}") as progress:
 
-        def report(state: SearchProgress) -> None:
-            best = "-" if state.best is None else percent(state.best.reduction(problem))
-            progress.update(task, completed=state.blasts, best=best)
+        def report(state: Progress) -> None:
+            best = "" if state.best is None else percent(state.best.reduction(problem))
+            progress(state.share, f"{state.blasts} of {budget} blasts{best and f', best {best}'}")
 
         result = method.propose(problem, budget, seed, report)
     return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)

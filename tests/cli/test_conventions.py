@@ -66,6 +66,10 @@ def test_the_list_of_commands_says_what_each_says_first_of_itself(name: str) -> 
     assert (command.loaded.help or "").partition("\n\n")[0].replace("\n", " ") == command.help
 
 
+def test_there_are_at_most_twelve_commands() -> None:
+    assert len(commands()) <= 12
+
+
 @pytest.mark.parametrize("name", ["simulate", "evaluate", "train"])
 def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
     """Both come from the engines: a new one, or a new setting of one, is seen."""
