@@ -5,6 +5,10 @@ import multiprocessing
 import os
 from collections.abc import Iterator
 
+# Two threads for small sums cost many times what one does where workers share the cores. Set before
+# NumPy and torch are imported.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import hypothesis  # looks for what refers to it, which is not found once frozen
 import pytest
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -17,9 +21,6 @@ gc.set_threshold(20_000, 20, 20)
 # Windows of render_mode="human" need no screen here. Set before pygame is imported.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-# Two threads for the small sums of these networks cost many times what one does where workers share
-# the cores. Set before torch is imported.
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 # Tables are as wide as in a pipe, whatever the terminal that runs the tests.
 os.environ.pop("COLUMNS", None)
 # TorchRL, once imported, has every process of Python's started from nothing, which takes seconds;
@@ -37,6 +38,20 @@ def _nothing_here_outlives_a_power_failure() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda _: None)
         yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _files_are_read_in_this_process() -> Iterator[None]:
+    """Spare tests of what is in a file a process for each reading, unless they ask for `apart`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BLAST_ENV_READING", "1")
+        yield
+
+
+@pytest.fixture
+def apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read files in processes of their own, as outside the tests."""
+    monkeypatch.delenv("BLAST_ENV_READING")
 
 
 LAY_OUT = ConstrainedLayoutEngine.execute

@@ -12,6 +12,8 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.reading import Reading, ReadingError, ReadingLimits, read_apart
 
+pytestmark = pytest.mark.usefixtures("apart")
+
 
 def _double(value: int) -> int:
     print("what a library prints is no answer")

@@ -238,14 +238,17 @@ class SiteMeasures:
             BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
-        lines = Visibility.of(scenario)
-        layout = visibility_layout(scenario, lines)
-        random_share = _random_pieces_share if scenario.zone.items else _random_share
+        lines, placement = Visibility.of(scenario), Placement.empty(scenario)
+        cut = _cut_by_variants(lines, placement.catalogue)
+        if scenario.zone.items:
+            random_share = _random_pieces_share(placement, lines, cut)
+        else:
+            random_share = _random_share(scenario, lines)
         return cls(
             open_share=lines.open_share,
-            layout_share=cut_share_of(lines, Placement(scenario, layout)),
+            layout_share=cut_share_of(lines, _greedy(placement, lines, cut)),
             wall_share=_wall_share(scenario, lines),
-            random_share=random_share(scenario, lines),
+            random_share=random_share,
         )
 
 
@@ -265,9 +268,15 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
         lines: Its lines of sight.
     """
     placement = Placement.empty(scenario)
+    return _greedy(placement, lines, _cut_by_variants(lines, placement.catalogue)).layout
+
+
+def _greedy(placement: Placement, lines: Visibility, cut: BoolArray) -> Placement:
     left = np.ones(len(lines.weight), dtype=bool)
-    cut = _cut_by_variants(lines, placement.catalogue)
-    gain = _gains(lines.weight, cut)
+    possible = placement.legal.reshape(-1)  # what is not legal at first never becomes so
+    cut, gain = cut[:, possible], np.zeros(len(possible))
+    gain[possible] = _gains(lines.weight, cut)
+    column = np.cumsum(possible) - 1
     nothing = _ROUNDING * float(lines.weight.sum())
     while not placement.is_full:
         worth = np.where(placement.legal, gain.reshape(placement.legal.shape), 0.0)
@@ -276,10 +285,10 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
         if not gain[action] > nothing or not worth.flat[action] > 0.0:
             break
         placement = placement.place(placement.catalogue.element(action))
-        newly = left & cut[:, action]
+        newly = left & cut[:, column[action]]
         left &= ~newly
-        gain = gain - _gains(lines.weight[newly], cut[newly])
-    return placement.layout
+        gain[possible] -= _gains(lines.weight[newly], cut[newly])
+    return placement
 
 
 _ROUNDING: Final = 1e-9
@@ -338,7 +347,7 @@ def _wall_share(scenario: Scenario, lines: Visibility) -> float:
         for along_rows in (cut, cut.transpose(0, 2, 1)):
             run = min(longest, along_rows.shape[1])
             cut_by_run = _any_in_runs(along_rows, run).reshape(len(lines.weight), -1)
-            best = max(best, float((lines.weight @ cut_by_run).max(initial=0.0)))
+            best = max(best, float(_gains(lines.weight, cut_by_run).max(initial=0.0)))
     return min(float(best / lines.weight.sum()), 1.0)
 
 
@@ -359,10 +368,9 @@ def _longest_runs(zone: BuildZone) -> Iterator[tuple[float | None, int]]:
 
 def _any_in_runs(cut: BoolArray, run: int) -> BoolArray:
     """Return whether any cell of each run along the second axis is true, (lines, runs, others)."""
-    counts = np.zeros((cut.shape[0], cut.shape[1] + 1, cut.shape[2]), dtype=np.int32)
-    np.cumsum(cut, axis=1, out=counts[:, 1:])
-    anything: BoolArray = counts[:, run:] > counts[:, :-run]
-    return anything
+    anything = cut.copy()
+    _take_next(anything.transpose(1, 0, 2), run)
+    return anything[:, : cut.shape[1] - run + 1]
 
 
 def _random_share(scenario: Scenario, lines: Visibility) -> float:
@@ -382,11 +390,11 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
     return round(share, 9)  # the last bit differs between machines and must not decide
 
 
-def _random_pieces_share(scenario: Scenario, lines: Visibility) -> float:
+def _random_pieces_share(placement: Placement, lines: Visibility, cut: BoolArray) -> float:
     """Return the approximate share of the lines that random pieces cut; overlaps are allowed."""
-    zone, placement = scenario.zone, Placement.empty(scenario)
+    zone = placement.scenario.zone
     legal = placement.legal.reshape(len(placement.legal), -1)
-    cut = _cut_by_variants(lines, placement.catalogue).reshape(len(lines.weight), *legal.shape)
+    cut = cut.reshape(len(lines.weight), *legal.shape)
     numbers = np.array([each.item for each in placement.catalogue.variants])
     there = [number for number in range(len(zone.items)) if legal[numbers == number].any()]
     mean_cost = float(np.mean([zone.items[number].cost for number in there]))

@@ -23,6 +23,7 @@ def test_table_and_record_come_back_exactly(
     assert record == result.run_record
 
 
+@pytest.mark.usefixtures("apart")
 def test_a_folder_that_looks_like_a_partition_adds_no_column(
     blast: BlastResult, tmp_path: Path
 ) -> None:
