@@ -253,6 +253,7 @@ def test_values_of_a_submission_are_not_converted(
     assert words in str(caught.value)
 
 
+@pytest.mark.usefixtures("apart")
 def test_so_many_runs_and_no_more_before_any_is_looked_at(tmp_path: Path) -> None:
     path = tmp_path / "many.json"
     path.write_text(json.dumps({"runs": [0] * 10_001}))

@@ -176,6 +176,7 @@ def test_what_is_exported_can_be_imported_again(block: ImportedSite, tmp_path: P
         assert getattr(here, key) == pytest.approx(getattr(there, key), abs=1e-8)  # a millimetre
 
 
+@pytest.mark.usefixtures("apart")
 def test_map_in_another_reference_system_goes_back_to_it(tmp_path: Path) -> None:
     """The older form of GeoJSON says which in its member crs; so does what is written."""
     collection = json.loads(BLOCK.read_text())
