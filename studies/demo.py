@@ -20,11 +20,10 @@ from sb3_contrib import MaskablePPO
 
 from blast_env.cli.evaluation_report import interval
 from blast_env.cli.output import (
-    ResultTable,
     percent,
     print_line,
+    print_table,
     progress_bar,
-    result_console,
     user_errors,
 )
 from blast_env.design.rules import random_layout
@@ -388,14 +387,11 @@ def demonstrate(settings: DemoSettings) -> AgentComparison:
 def print_comparison(comparison: AgentComparison) -> None:
     """Print one row per method: mean load, reduction, lead of the agent."""
     cases = comparison.agent.cases
-    table = ResultTable(
+    title = (
         f"{cases[0].scenario.name}: charges of {', '.join(each.name for each in cases)}, which the "
-        f"training has not met; judged by the engine {comparison.engine}",
-        HEADERS,
+        f"training has not met; judged by the engine {comparison.engine}"
     )
-    for row in comparison.rows():
-        table.add_row(*row)
-    result_console().print(table)
+    print_table(title, HEADERS, comparison.rows())
     print_line("Pa s: mean load on the protected structures; ahead: percentage points, paired")
 
 

@@ -5,13 +5,11 @@ from typing import Annotated
 
 import pandas as pd
 import typer
-from rich.table import Table
 
 from blast_env.cli.output import (
-    ResultTable,
     print_line,
+    print_table,
     print_written,
-    result_console,
     save_figures,
     user_errors,
 )
@@ -41,35 +39,35 @@ def main(
     """
     with user_errors():
         make_folder(out)
-        console, written = result_console(), []
+        written: list[Path] = []
         headers: tuple[str, ...] = ("R (m)", "i_ufc", "i_sim", "i_scaled", "E_abs", "E%")
         for law in PAPER_LAWS:
             table = comparison_table(law)
             title = f"Table {law.number}: {law.name} (impulses in psi s)"
             formats = (".0f", f".{law.decimals[0]}f", ".2f", *(f".{n}f" for n in law.decimals))
-            console.print(rich_table(title, headers, table, formats))
+            print_rounded(title, headers, table, formats)
             print_line(largest_deviation(table, law.decimals))
             written.append(write_csv(table, out / f"table_{law.number}.csv", "%.10g"))
         table = comparative_table()
         headers = ("scaling method", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
         formats = ("s", *(f".{n}f" for n in TABLE_4_DECIMALS))
-        console.print(rich_table("Table 4: comparison", headers, table, formats))
+        print_rounded("Table 4: comparison", headers, table, formats)
         print_line(largest_deviation(table, TABLE_4_DECIMALS))
         written.append(write_csv(table, out / "table_4.csv", "%.10g"))
-        console.print(coefficient_table())
+        print_coefficients()
         print_line(f"{CONTRADICTIONS}\n")
         print_written(written + save_figures((out / "figure_5.png", figure_5)))
 
 
-def rich_table(
+def print_rounded(
     title: str, headers: tuple[str, ...], table: pd.DataFrame, formats: tuple[str, ...]
-) -> Table:
-    """Return the first columns of a table, rounded, one for each format."""
-    shown = ResultTable(title, headers)
-    for row in table.itertuples(index=False):
-        cells = zip(row, formats, strict=False)
-        shown.add_row(*(format(value, wanted) for value, wanted in cells))
-    return shown
+) -> None:
+    """Print the first columns of a table, rounded, one for each format."""
+    rows = [
+        [format(value, wanted) for value, wanted in zip(row, formats, strict=False)]
+        for row in table.itertuples(index=False)
+    ]
+    print_table(title, headers, rows)
 
 
 def largest_deviation(table: pd.DataFrame, decimals: tuple[int, int, int]) -> str:
@@ -81,17 +79,17 @@ def largest_deviation(table: pd.DataFrame, decimals: tuple[int, int, int]) -> st
     )
 
 
-def coefficient_table() -> Table:
-    """Return the coefficients of the paper's text and of its columns, with their errors."""
-    headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
-    table = ResultTable("Coefficients, and the row of Table 4 that they give", headers, 3)
+def print_coefficients() -> None:
+    """Print the coefficients of the paper's text and of its columns, with their errors."""
+    rows = []
     for law in PAPER_LAWS:
         for source, coefficients in (("text", law.in_text), ("columns", law.fitted)):
             named = (f"{name} = {value:.5g}" for name, value in coefficients.coefficients.items())
             measures = zip(metrics_row(coefficients), TABLE_4_DECIMALS, strict=True)
-            row = (f"{value:.{digits}f}" for value, digits in measures)
-            table.add_row(law.name, source, ", ".join(named), *row)
-    return table
+            errors = (f"{value:.{digits}f}" for value, digits in measures)
+            rows.append((law.name, source, ", ".join(named), *errors))
+    headers = ("law", "from", "coefficients", "MAPE (%)", "RMSE (psi s)", "integral error (%)")
+    print_table("Coefficients, and the row of Table 4 that they give", headers, rows, 3)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 from signal import SIG_DFL, SIGINT, SIGTERM, getsignal, signal
@@ -259,48 +260,48 @@ def _progress_lines(console: Console, label: str) -> Callable[..., None]:
     return show
 
 
-class ResultTable(Table):
+@dataclass(frozen=True)
+class ResultTable:
     """A table whose columns get narrower by wrapping between words, never inside a word.
 
     Rich's table cuts words if columns do not fit. This one then splits the columns into several
     tables one below the other, each with the first column, so that rows keep their names.
 
-    Args:
+    Attributes:
         title: Its title.
         headers: The headers.
+        rows: The rows.
         text_columns: Number of leading text columns; the others are aligned to the right.
     """
 
-    def __init__(self, title: str, headers: Sequence[str], text_columns: int = 1) -> None:
-        super().__init__()
-        self.heading = printable_line(title)
-        self._has_names = text_columns > 0
-        for number, header in enumerate(headers):
-            side: Literal["left", "right"] = "left" if number < text_columns else "right"
-            self.add_column(printable(header), justify=side)
-
-    def add_row(self, *cells: Any, **options: Any) -> None:
-        """Add a row, with control characters escaped."""
-        super().add_row(*(printable_line(str(each)) for each in cells), **options)
+    title: str
+    headers: Sequence[str]
+    rows: Iterable[Sequence[str]]
+    text_columns: int = 1
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        yield Text(self.heading, style="bold")
-        unlimited = options.update(width=10_000)
-        widths = [
-            measure_renderables(
-                console, unlimited, [Text(str(cell)) for cell in (each.header, *each.cells)]
-            )
-            for each in self.columns
-        ]
+        yield Text(printable_line(self.title), style="bold")
+        lines = zip(self.headers, *self.rows, strict=True)
+        columns = [[printable_line(str(cell)) for cell in column] for column in lines]
+        free = options.update(width=10_000)
+        widths = [measure_renderables(console, free, [*map(Text, column)]) for column in columns]
         for number, group in enumerate(self._groups(widths, options.max_width)):
             if number:
                 yield Text()
+            part = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
             room = options.max_width - _BETWEEN * (len(group) - 1)
-            yield self._part(group, _shared([widths[index] for index in group], room))
+            for index, width in zip(
+                group, _shared([widths[index] for index in group], room), strict=True
+            ):
+                side: Literal["left", "right"] = "left" if index < self.text_columns else "right"
+                part.add_column(columns[index][0], justify=side, width=width)
+            for row in zip(*(columns[index][1:] for index in group), strict=True):
+                part.add_row(*row)
+            yield part
 
     def _groups(self, widths: Sequence[Measurement], width: int) -> list[list[int]]:
         """Return the column numbers of each table, by the width of their longest words."""
-        names = [0] if self._has_names and widths else []
+        names = [0] if self.text_columns > 0 else []
         groups = [[*names]]
         for index in range(len(names), len(widths)):
             taken = [*groups[-1], index]
@@ -309,15 +310,6 @@ class ResultTable(Table):
                 groups.append([*names])
             groups[-1].append(index)
         return groups
-
-    def _part(self, columns: Sequence[int], widths: Sequence[int]) -> Table:
-        part = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-        for index, width in zip(columns, widths, strict=True):
-            each = self.columns[index]
-            part.add_column(str(each.header), justify=each.justify, width=width)
-        for row in zip(*(list(self.columns[index].cells) for index in columns), strict=True):
-            part.add_row(*row)
-        return part
 
 
 def _shared(widths: Sequence[Measurement], room: int) -> list[int]:
@@ -336,10 +328,7 @@ def print_table(
     title: str, headers: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int = 1
 ) -> None:
     """Print a table to standard output; see `ResultTable`."""
-    table = ResultTable(title, headers, text_columns)
-    for row in rows:
-        table.add_row(*row)
-    result_console().print(table)
+    result_console().print(ResultTable(title, headers, rows, text_columns))
 
 
 def print_written(paths: Iterable[Path]) -> None:
@@ -369,11 +358,9 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
     """
     if not len(pieces):
         return
-    table = ResultTable(f"{title}: {outcome_words(pieces)}", _PIECE_HEADERS, text_columns=2)
     ordered = pieces.sort_values(["tilt", "slide_m"], ascending=False, kind="stable")
-    for row in ordered.head(_MOST_PIECES).to_dict("records"):
-        overturn_s = row["overturn_s"]
-        table.add_row(
+    rows = [
+        (
             row["piece"],
             row["outcome"],
             f"{row['mass_kg']:,.0f}",
@@ -381,8 +368,10 @@ def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
             f"{row['impulse_pa_s']:,.0f}",
             f"{row['slide_m']:.2f}",
             f"{row['tilt']:.2f}",
-            "-" if isnan(overturn_s) else f"{MS_PER_S * overturn_s:,.0f}",
+            "-" if isnan(row["overturn_s"]) else f"{MS_PER_S * row['overturn_s']:,.0f}",
         )
-    result_console().print(table)
+        for row in ordered.head(_MOST_PIECES).to_dict("records")
+    ]
+    print_table(f"{title}: {outcome_words(pieces)}", _PIECE_HEADERS, rows, text_columns=2)
     if len(ordered) > _MOST_PIECES:
         print_line(f"and {len(ordered) - _MOST_PIECES} more pieces with smaller movements")
