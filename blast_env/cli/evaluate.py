@@ -13,7 +13,7 @@ from blast_env.cli.options import (
     ChargeOption,
     ClusterAddress,
     CvarOption,
-    EngineOption,
+    EngineChoice,
     FinalCellOption,
     FinalCellsOption,
     GivenCharge,
@@ -58,7 +58,7 @@ def evaluate(
     first_seed: int | None = typer.Option(
         None, help="First seed.", min=0, show_default="the first one outside training and search"
     ),
-    engine: EngineOption = JUDGE,
+    engine: EngineChoice = JUDGE,
     cell_m: FinalCellOption = None,
     cells: FinalCellsOption = None,
     until: str | None = typer.Option(None, help=UNTIL_HELP, show_default="structures"),

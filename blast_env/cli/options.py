@@ -63,7 +63,7 @@ DrawsOption = Annotated[
     int,
     typer.Option("--charges", help="Draws of the charge; each place counts once.", min=1),
 ]
-EngineOption = Annotated[str, typer.Option("--engine", help=ENGINE_HELP)]
+EngineChoice = Annotated[str, typer.Option("--engine", help=ENGINE_HELP)]
 CellOption = Annotated[float | None, typer.Option("--cell", help=CELL_HELP)]
 CellsOption = Annotated[
     str | None, typer.Option("--cells", help=CELLS_HELP, show_default="uniform")
