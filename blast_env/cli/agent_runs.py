@@ -4,7 +4,6 @@ Imports torch, so the command imports this module only for `--run`.
 """
 
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -19,11 +18,10 @@ from blast_agents.training.run_folder import RunFolder
 from blast_env.cli.evaluation_report import (
     EvaluateOptions,
     asked_blasts,
-    cache_record,
     cache_text,
     print_if_all_charges,
+    print_json_record,
     print_means,
-    print_record,
     report_layout,
     threats_text,
 )
@@ -52,7 +50,7 @@ from blast_env.layout.build_scene import charge_against
 from blast_env.plots.evaluation_figures import comparison_figure
 from blast_env.plots.figures import save_figure
 from blast_env.provenance import command, versions
-from blast_env.site import Scenario, save_scenario
+from blast_env.site import save_scenario
 from blast_env.sites import FAMILIES
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
@@ -80,45 +78,32 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     """
     folder = RunFolder(run)
     configuration = folder.configuration()
-    settings = configuration.settings
-    weights = newest_weights(run)
+    settings, weights = configuration.settings, newest_weights(run)
     agent = load_agent(run, weights)
-    source: ScenarioSource = SingleScenario(folder.scenario(configuration))
+    provenance = _provenance(run, settings, weights)
+    note = _overlap(settings, options.seeds) if weights == "best" else _NO_BEST
+    if note and not options.is_json:
+        print_line(f"note: {note}")
+    own = settings.judge  # gas dynamics judges final statements
+    engine = own if own.name == options.engine != JUDGE else options.engine
     if settings.scenario in FAMILIES:
         source = scenario_source(settings.scenario)
-    provenance = _provenance(run, settings, weights)
-    notes = [_overlap(settings, options.seeds)] if weights == "best" else [_NO_BEST]
-    for note in notes:
-        if note and not options.is_json:
-            print_line(f"note: {note}")
-    if isinstance(source, SingleScenario) and settings.threat == "hidden":
-        _report_hidden(agent, settings, source, provenance, options)
+        _report_cases(agent, settings, source, engine, provenance, options)
+        return
+    scenario = folder.scenario(configuration)
+    if settings.threat == "hidden":  # one layout for all possible places of the charge
+        used = options.engine_for(engine, [scenario])
+        plan = LayoutPlan(scenario, agent.propose(scenario), provenance=provenance)
+        report_layout(plan, BlastEvaluator(scenario, used, cache=options.cache), options)
     else:
-        _report_cases(agent, settings, source, provenance, options)
-
-
-def _report_hidden(
-    agent: TrainedAgent,
-    settings: TrainingSettings,
-    source: SingleScenario,
-    provenance: dict[str, Any],
-    options: EvaluateOptions,
-) -> None:
-    """Report on one layout for all possible places of the charge."""
-    evaluator = BlastEvaluator(
-        source.scenario,
-        _engine(settings, [source.scenario], options),
-        cache=options.cache,
-    )
-    layout = agent.propose(source.scenario)
-    plan = LayoutPlan(source.scenario, layout, provenance=provenance)
-    report_layout(plan, evaluator, options)
+        _report_cases(agent, settings, SingleScenario(scenario), engine, provenance, options)
 
 
 def _report_cases(
     agent: TrainedAgent,
     settings: TrainingSettings,
     source: ScenarioSource,
+    engine: str | Engine,
     provenance: dict[str, Any],
     options: EvaluateOptions,
 ) -> None:
@@ -126,26 +111,26 @@ def _report_cases(
     seeds = options.seeds
     options.prepare_files(len(seeds))
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
-    evaluators = Evaluators(
-        _engine(settings, [each.scenario for each in cases], options), options.cache
-    )
-    if not evaluators.engine.has_noise:  # the same charge again would be the same blast
+    used = options.engine_for(engine, [each.scenario for each in cases])
+    if not used.has_noise:  # the same charge again would be the same blast
         distinct: dict[object, Case] = {}
         for each in cases:
             distinct.setdefault((each.scenario.content_hash, each.charge), each)
         cases = [*distinct.values()]
+    evaluators = Evaluators(used, options.cache)
     coarser = evaluators.coarser()
-    told = [(each.scenario, each.charge) for each in cases]
     if not options.is_json:
-        print_line(evaluators.engine.describe([case.scenario for case in cases]))
-        print_cost(asked_blasts(cases, evaluators.engine))
+        print_line(used.describe([case.scenario for case in cases]))
+        print_cost(asked_blasts(cases, used))
     layouts, seconds = [], []
-    for asked in told:
+    for case in cases:
         began_s = perf_counter()
-        layouts.append(agent.propose(*asked))
+        layouts.append(agent.propose(case.scenario, case.charge))
         seconds.append(perf_counter() - began_s)
-    with progress_bar(f"{2 * len(cases)} blasts in {_place(settings, cases)}") as progress:
-        comparison = compare(
+    is_family = settings.scenario in FAMILIES
+    place = f"{len(cases)} generated sites" if is_family else cases[0].scenario.name
+    with progress_bar(f"{2 * len(cases)} blasts in {place}") as progress:
+        found = compare(
             evaluators,
             cases,
             layouts,
@@ -154,35 +139,26 @@ def _report_cases(
             cvar_level=options.cvar_level,
             progress=progress,
         )
-    record = {**comparison_record(comparison, evaluators.engine), "provenance": provenance}
-    written = [] if options.out is None else _write(comparison, record, options.out)
-    exported = _export(comparison, settings, provenance, options)
-    if options.is_json:
-        files = [str(path) for path in [*written, *exported]]
-        print_record(
-            {**record, "cache": cache_record(evaluators, coarser), "files": files}, options
-        )
+    record = {**comparison_record(found, used), "provenance": provenance}
+    written = [] if options.out is None else _write(found, record, options.out)
+    exported: list[Path] = []
+    if options.export is not None:
+        plans = _plans(found, provenance)
+        exported = export_layouts(plans, options.export)
+        if is_family:  # no other file holds the sites
+            exported += _write_sites(plans, options.export)
+    if print_json_record(record, [*written, *exported], options, evaluators, coarser):
         return
     title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
-    _print_cases(comparison, evaluators.engine, f"{title}, {threats_text(len(cases), seeds)}")
-    print_if_all_charges(
-        cases[0].scenario, [each.charge for each in cases], "training may have met them, and "
-    )
+    _print_cases(found, used, f"{title}, {threats_text(len(cases), seeds)}")
+    charges = [each.charge for each in cases]
+    print_if_all_charges(cases[0].scenario, charges, "training may have met them, and ")
     milliseconds = MS_PER_S * median(seconds)
     print_line(f"proposed in {milliseconds:.1f} ms each (median), no blast spent on any")
     print_written(written)
     if exported:
         print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
     print_line(cache_text(evaluators, coarser))
-
-
-def _engine(
-    settings: TrainingSettings, sites: Sequence[Scenario], options: EvaluateOptions
-) -> Engine:
-    """Return the engine that judges: gas dynamics for final statements, else that of the run."""
-    own = settings.judge
-    engine = own if own.name == options.engine != JUDGE else options.engine
-    return options.engine_for(engine, sites)
 
 
 def _fixed(case: Case, options: EvaluateOptions) -> Case:
@@ -192,19 +168,6 @@ def _fixed(case: Case, options: EvaluateOptions) -> Case:
     )
     charge = None if case.charge is None else options.given.fixed(case.scenario, case.charge)
     return replace(case, threats=threats, charge=charge)
-
-
-def _export(
-    comparison: Evaluation,
-    settings: TrainingSettings,
-    provenance: dict[str, Any],
-    options: EvaluateOptions,
-) -> list[Path]:
-    if options.export is None:
-        return []
-    plans = _plans(comparison, provenance)
-    exported = export_layouts(plans, options.export)
-    return exported + _write_sites(settings, plans, options.export)
 
 
 def _print_cases(comparison: Evaluation, engine: Engine, title: str) -> None:
@@ -255,22 +218,12 @@ def _plans(comparison: Evaluation, provenance: dict[str, Any]) -> dict[str, Layo
     }
 
 
-def _write_sites(
-    settings: TrainingSettings, plans: dict[str, LayoutPlan], folder: Path
-) -> list[Path]:
-    """Write the scenario of a generated site beside each layout: no other file holds it."""
-    if settings.scenario not in FAMILIES:
-        return []
+def _write_sites(plans: dict[str, LayoutPlan], folder: Path) -> list[Path]:
+    """Write the scenario of each layout beside it."""
     paths = [folder / f"{name}_site.toml" for name in plans]
     for path, plan in zip(paths, plans.values(), strict=True):
         save_scenario(plan.scenario, path)
     return paths
-
-
-def _place(settings: TrainingSettings, cases: Sequence[Case]) -> str:
-    if settings.scenario in FAMILIES:
-        return f"{len(cases)} generated sites"
-    return cases[0].scenario.name
 
 
 def _provenance(run: Path, settings: TrainingSettings, weights: str) -> dict[str, Any]:

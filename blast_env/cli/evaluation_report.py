@@ -181,10 +181,25 @@ _NOT_IN_SHORT: Final = ("scenario", "threats", "modules", "cases")
 """Parts of a record that `--json` leaves out."""
 
 
-def print_record(record: Mapping[str, object], options: EvaluateOptions) -> None:
-    """Print a record as JSON, short or complete."""
-    shown = {key: each for key, each in record.items() if key not in _NOT_IN_SHORT}
-    print_json(record if options.json_all else shown)
+def print_json_record(
+    record: Mapping[str, object],
+    files: Sequence[Path],
+    options: EvaluateOptions,
+    *evaluators: AnyEvaluator | None,
+) -> bool:
+    """Print a record as JSON, short or complete, if that is wanted; return whether it is.
+
+    Args:
+        record: The record of an evaluation.
+        files: The files written.
+        options: The options.
+        evaluators: Those that ran the blasts, as for `cache_record`.
+    """
+    if options.is_json:
+        more = {"cache": cache_record(*evaluators), "files": [str(path) for path in files]}
+        left_out = () if options.json_all else _NOT_IN_SHORT
+        print_json({key: x for key, x in {**record, **more}.items() if key not in left_out})
+    return options.is_json
 
 
 _HEADERS: Final = (
@@ -230,16 +245,13 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
     written = [] if options.out is None else _write(evaluation, options.out)
     if options.export is not None:
         written += export_layouts({"layout": plan}, options.export)
-    if options.is_json:
-        record = {
-            **evaluation.to_dict(),
-            "scenario_name": plan.scenario.name,
-            "preset": engine.preset(plan.scenario),
-            "provenance": dict(plan.provenance),
-            "cache": cache_record(evaluator, coarser),
-            "files": [str(path) for path in written],
-        }
-        print_record(record, options)
+    record = {
+        **evaluation.to_dict(),
+        "scenario_name": plan.scenario.name,
+        "preset": engine.preset(plan.scenario),
+        "provenance": dict(plan.provenance),
+    }
+    if print_json_record(record, written, options, evaluator, coarser):
         return
     _print_evaluation(evaluation, options.seeds)
     print_written(written)
