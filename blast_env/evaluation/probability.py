@@ -19,13 +19,13 @@ without sharper peaks, as in a verdict; which of them is found without draws.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isnan, log, nan, sqrt
 from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import BuildingResponse, Consequences
 from blast_env.evaluation.grid_error import GridError
@@ -176,7 +176,7 @@ def level_probability(
     quantiles = _latin(draws, seed)
     levels = np.full(draws, int(LevelOfProtection.HIGH))
     for each in _deciding(judged.responses, deciding):
-        levels = np.minimum(levels, each.levels(uncertainty, quantiles))
+        each.lower(levels, uncertainty, quantiles)
     return LevelProbability(levels, quantiles)
 
 
@@ -203,8 +203,8 @@ class _Component:
         filled = self.response.on_cells.bays[self.index]
         return self.response.building, filled.glazing if self.is_window else filled.wall
 
-    def levels(self, uncertainty: Uncertainty, quantiles: FloatArray) -> FloatArray:
-        """Return the level of protection by the component in each draw (draws,)."""
+    def lower(self, levels: IntArray, uncertainty: Uncertainty, quantiles: FloatArray) -> None:
+        """Lower the level of protection of each draw to that by the component (draws,)."""
         from scipy.special import ndtri  # a quarter of a second to import
 
         normal = np.clip(ndtri(quantiles), -4.0, 4.0)
@@ -222,13 +222,15 @@ class _Component:
             quantiles[:, 3],
             np.exp(uncertainty.panels * normal[:, 4]),
         )
-        facade, levels = self.response.on_cells, np.full(len(mass), int(LevelOfProtection.HIGH))
+        facade = self.response.on_cells
         filled = facade.bays[self.index]
         for pressure_pa, factor in self._histories:
-            sharper = replace(draws, peaks=factor * draws.peaks, durations=draws.durations / factor)
+            (left,) = np.nonzero(levels > LevelOfProtection.BELOW_STANDARDS)  # the lowest stay so
+            if not left.size:
+                return
+            sharper = draws.sharper(factor, left)
             found = drawn_levels(filled, self.is_window, facade.time_s, pressure_pa, sharper)
-            levels = np.minimum(levels, found)
-        return levels
+            levels[left] = np.minimum(levels[left], found)
 
     @property
     def _histories(self) -> list[tuple[FloatArray, float]]:

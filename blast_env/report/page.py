@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from math import isfinite, isnan
 from pathlib import Path
+from types import CodeType
 from typing import Any, Final
 from warnings import catch_warnings, filterwarnings
 
@@ -143,7 +144,21 @@ def report_html(study: Study, commands: list[str]) -> str:
         "money": study.scenario.zone.priced,
         "picture": lambda png: f"data:image/png;base64,{b64encode(png).decode()}",
     }
-    return environment.get_template(_TEMPLATE).render(_context(study, commands))
+    code = _template_code(environment)
+    template = environment.template_class.from_code(environment, code, environment.globals)
+    return template.render(_context(study, commands))
+
+
+_COMPILED: Final[dict[str, CodeType]] = {}
+
+
+def _template_code(environment: Environment) -> CodeType:
+    """Return the compiled template, which takes longer to compile than to fill in."""
+    if _TEMPLATE not in _COMPILED:
+        assert environment.loader is not None
+        source, path, _ = environment.loader.get_source(environment, _TEMPLATE)
+        _COMPILED[_TEMPLATE] = environment.compile(source, _TEMPLATE, path)
+    return _COMPILED[_TEMPLATE]
 
 
 def _context(study: Study, commands: list[str]) -> dict[str, Any]:

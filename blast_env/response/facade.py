@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, WallLine
 from blast_env.response.buildings import LevelOfProtection, level_of_protection
@@ -507,6 +507,20 @@ class LoadDraws:
     durations: FloatArray
     weaker: FloatArray
     resistance: FloatArray
+
+    def sharper(self, factor: float, chosen: IntArray) -> "LoadDraws":
+        """Return some of the draws, with higher peaks and the same impulses.
+
+        Args:
+            factor: Factor on the pressures, by which times are divided.
+            chosen: Numbers of the draws.
+        """
+        return LoadDraws(
+            factor * self.peaks[chosen],
+            self.durations[chosen] / factor,
+            self.weaker[chosen],
+            self.resistance[chosen],
+        )
 
 
 def drawn_levels(
