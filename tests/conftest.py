@@ -11,6 +11,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import hypothesis  # looks for what refers to it, which is not found once frozen
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 # The modules that tests import, and the tests, all stay: it would look through them for nothing,
@@ -54,7 +55,7 @@ def apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("BLAST_ENV_READING")
 
 
-LAY_OUT = ConstrainedLayoutEngine.execute
+LAY_OUT, DRAW = ConstrainedLayoutEngine.execute, Figure.draw
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -71,6 +72,20 @@ def laid_out() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ConstrainedLayoutEngine, "execute", LAY_OUT)
         yield
+
+
+@pytest.fixture(scope="package")
+def undrawn() -> Iterator[None]:
+    """Leave figures empty: for tests of what is around them; tests/plots draws each of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "draw", lambda *_: None)
+        yield
+
+
+@pytest.fixture
+def drawn(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw figures, among tests that are `undrawn`."""
+    monkeypatch.setattr(Figure, "draw", DRAW)
 
 
 def pytest_collection_finish() -> None:

@@ -11,5 +11,17 @@ from blast_env.app import blasts
 def short_films() -> Iterator[None]:
     """Draw few frames, yet more than after which a film can begin."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(blasts, "FRAMES", 8)
+        patch.setattr(blasts, "FRAMES", 3)
+        patch.setattr(blasts, "_FIRST_FRAMES", 2)
         yield
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _undrawn(undrawn: None) -> None:
+    """Leave the figures of these tests empty, unless one asks for `drawn`."""
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare a blast of gas its pictures, which take longer than it."""
+    monkeypatch.setattr(blasts, "_pictures", lambda *_: ())

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import pickle
 import signal
 import sys
 import tomllib
@@ -359,7 +360,28 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
     play(tmp_path, story)
 
 
-def test_a_map_becomes_a_site_with_its_deviations_told(tmp_path: Path) -> None:
+class ReadHere(Reading[Any]):
+    """Reads in this process what would go to another and come back from it."""
+
+    def __init__(self, what: str, function: Callable[..., Any], *arguments: Any) -> None:
+        self._work = pickle.dumps((function, arguments))
+
+    def result(self) -> Any:
+        function, arguments = pickle.loads(self._work)
+        return pickle.loads(pickle.dumps(function(*arguments)))
+
+    def end(self) -> None:
+        """End nothing."""
+
+    def __exit__(self, *_: object) -> None:
+        """Close nothing."""
+
+
+def test_a_map_becomes_a_site_with_its_deviations_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "Reading", ReadHere)
+
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
         choose(user, "replace the site from a file")

@@ -91,7 +91,7 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
         kind.value in text for kind in (MeasureKind.NOTHING, MeasureKind.SHIELD, MeasureKind.HARDEN)
     )
     assert load_layout(out) is not None
-    assert picture.stat().st_size > 1000
+    assert "<svg" in picture.read_text("utf-8")
 
 
 def test_rings_are_the_points_of_their_layouts_where_both_have_the_same_cells(

@@ -109,6 +109,7 @@ def test_what_only_gas_has_is_said(site: Path, option: str) -> None:
     assert f"{option.split('=')[0]} is for gas dynamics" in " ".join(result.stderr.split())
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_layout_and_the_empty_site_are_shown_in_every_picture(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,7 +129,7 @@ def test_a_layout_and_the_empty_site_are_shown_in_every_picture(
         assert "barrier of 6 modules" in words
     assert "Kingery-Bulmash" in (tmp_path / "history.svg").read_text("utf-8")
     assert "peak overpressure" in (tmp_path / "heat-map.svg").read_text("utf-8")
-    assert (tmp_path / "film.gif").stat().st_size > 10_000
+    assert (tmp_path / "film.gif").stat().st_size > 1000
 
 
 def test_parts_of_a_building_are_one_row(tmp_path: Path) -> None:

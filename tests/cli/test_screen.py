@@ -24,7 +24,7 @@ def test_threats_stand_offs_and_rings(tmp_path: Path) -> None:
     assert "required: ISO 16933 rating D" in output
     assert output.count("glass: small_window *") == 2
     assert "left out: shielding" in output
-    assert picture.stat().st_size > 10_000
+    assert picture.stat().st_size > 1000
 
 
 @pytest.mark.slow

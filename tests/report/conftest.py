@@ -1,12 +1,24 @@
 """One small study for all tests of reports: a hut and a wall, a second or two a blast."""
 
+from collections.abc import Iterator
+from functools import cache
+
 import pytest
 
-from blast_env.report import Limit, Study, StudyOptions, run_study
+from blast_env.evaluation.probability import level_probability
+from blast_env.report import Limit, Study, StudyOptions, page, run_study
 from tests.report.sites import LAYOUT, glazed_hut
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package", autouse=True)
+def _probabilities_are_drawn_once() -> Iterator[None]:
+    """Many pages show one study."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "level_probability", cache(level_probability))
+        yield
+
+
+@pytest.fixture(scope="package")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     front = tmp_path_factory.mktemp("front") / "front.csv"
     rows = ("blasts,impulse_pa_s,threats,modules,layout", "3,1,1,0,", '4,1,1,2,"2,0 3,0"')
@@ -14,3 +26,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     limits = (Limit("hut", impulse_pa_s=300.0),)
     options = StudyOptions(limits=limits, front=front, places=1, stills=2)
     return run_study(glazed_hut(), LAYOUT, options)
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _undrawn(undrawn: None) -> None:
+    """Leave the figures of these tests empty, unless one asks for `drawn`."""
