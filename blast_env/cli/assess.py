@@ -9,6 +9,7 @@ from blast_env.cli.assessment import print_assessment
 from blast_env.cli.capacity import print_capacity
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
+    CacheOption,
     ChargeOption,
     DrawsOption,
     FinalCellOption,
@@ -21,8 +22,10 @@ from blast_env.cli.options import (
     TargetOption,
     TntOption,
     refuse_given,
+    resume_words,
     wanted_level,
 )
+from blast_env.cli.output import resumable
 from blast_env.cli.screening import print_screening
 from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
@@ -44,7 +47,7 @@ _MASS_HELP: Final = (
 )
 _OF_SCREENING: Final = ("mass", "gas")
 _OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg")
-_OF_ASSESSMENT: Final = ("without_fallen", "view", "diagram", "table")
+_OF_ASSESSMENT: Final = ("without_fallen", "view", "diagram", "table", "cache")
 
 
 def assess(
@@ -92,6 +95,7 @@ def assess(
     table: Path | None = writes("Table of every bay under every charge", ".csv", ".xlsx"),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
+    cache: CacheOption = None,
     mass: list[str] = typer.Option(
         [],
         help=_MASS_HELP,
@@ -136,9 +140,18 @@ def assess(
         refuse_given(context, (*_OF_ASSESSMENT, "require"), "does not apply to --capacity")
         print_capacity(site, layouts, drawn, engine, level, Uncertainty(mass=mass_error), picture)
         return
-    assessed = print_assessment(
-        site, layouts, drawn, engine, level, required, mass_error, without_fallen=without_fallen
-    )
+    with resumable(resume_words(cache)):
+        assessed = print_assessment(
+            site,
+            layouts,
+            drawn,
+            engine,
+            level,
+            required,
+            mass_error,
+            without_fallen=without_fallen,
+            cache=cache,
+        )
     if table is not None:
         assessed.write_table(table, engine)
     assessed.draw(picture, view, diagram)

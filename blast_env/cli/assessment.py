@@ -16,7 +16,7 @@ from blast_env.cli.output import (
     progress_bar,
     save_figures,
 )
-from blast_env.evaluation import Case, LoadCase
+from blast_env.evaluation import BlastEvaluator, Case, LoadCase
 from blast_env.evaluation.consequences import (
     BAY_CASE_COLUMNS,
     CASE_COLUMNS,
@@ -34,6 +34,7 @@ from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.probability import Uncertainty, level_probability
+from blast_env.evaluation.shared import shared_consequences
 from blast_env.geometry import Layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
@@ -171,6 +172,7 @@ def print_assessment(
     mass_error: float,
     *,
     without_fallen: bool,
+    cache: Path | None,
 ) -> Assessed:
     """Run the blasts, and print the verdict.
 
@@ -183,6 +185,7 @@ def print_assessment(
         required: Further requirements.
         mass_error: Uncertainty of the masses; see `Uncertainty`.
         without_fallen: Whether pieces that overturn are removed, and the blasts run again.
+        cache: Folder of stored blasts, not used for those without fallen pieces.
     """
     coarser = engine.coarser
     print_line(engine.describe([scenario]))
@@ -193,9 +196,13 @@ def print_assessment(
         found = {}
         for name, layout in layouts.items():
             with progress_bar(f"{label}, {name}") as progress:
-                found[name] = consequences(
-                    scenario, layout, charges, engine, progress, without_fallen=without_fallen
-                )
+                if without_fallen:
+                    found[name] = consequences(
+                        scenario, layout, charges, engine, progress, without_fallen=True
+                    )
+                    continue
+                evaluator = BlastEvaluator(scenario, engine, cache=cache)
+                found[name] = shared_consequences(evaluator, layout, charges, progress)
         return found
 
     found, coarse = all_of(engine, charges, f"{len(charges)} blasts"), {}

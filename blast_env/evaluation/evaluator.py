@@ -42,6 +42,7 @@ class BlastEvaluator:
         engine: The engine.
         calibration: The scenario's calibration, checked against its parameters and the engine;
             `None` for engines without particles, which need none.
+        store: Where the loads are.
         blasts: Number of simulated blasts.
         cache_hits: Number of requested loads that needed no blast.
 
@@ -66,7 +67,7 @@ class BlastEvaluator:
         self.calibration: Calibration | None = self.engine.calibration(self.scenario)
         self.blasts = 0
         self.cache_hits = 0
-        self._store = BlastStore.of(cache, cache_size)
+        self.store = BlastStore.of(cache, cache_size)
         self._key_of_nothing = BlastKey(
             scenario_hash=self.scenario.content_hash,
             layout=(),
@@ -96,7 +97,7 @@ class BlastEvaluator:
     def coarser(self) -> "BlastEvaluator | None":
         """Return an evaluator with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
-        return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self._store)
+        return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self.store)
 
     def loads(self, layout: Sequence[Element], threat: LoadCase) -> BlastLoads:
         """Return the loads of one blast.
@@ -176,12 +177,12 @@ class BlastEvaluator:
 
     def _known(self, key: BlastKey) -> BlastLoads | None:
         """Return stored loads; `None` without any."""
-        return self._store.get(key, self.scenario)
+        return self.store.get(key, self.scenario)
 
     def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
         """Count and store a blast."""
         self.blasts += 1
-        self._store.add(key, loads)
+        self.store.add(key, loads)
 
 
 def _run(

@@ -4,12 +4,12 @@ import dataclasses
 import json
 import warnings
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -22,6 +22,8 @@ from blast_env.response.damage import BayDamage
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.store import Store
+
+T = TypeVar("T")
 
 
 class BlastKey(NamedTuple):
@@ -95,6 +97,11 @@ class BlastStore:
         return cls(value, size)
 
     @property
+    def has_file(self) -> bool:
+        """Whether loads are kept in a file, too."""
+        return self._file is not None
+
+    @property
     def damaged(self) -> int:
         """Number of damaged blasts found in the file by this object."""
         return 0 if self._file is None else self._file.damaged
@@ -110,25 +117,34 @@ class BlastStore:
         loads = self._loads.get(key)
         if loads is not None:
             self._loads.move_to_end(key)
-        elif self._file is not None:
-            try:
-                loads = self._file.read(json.dumps(key), _decoded)
-            except BlastEnvError as error:
-                warnings.warn(f"a blast counts as missing: {error}", RuntimeWarning, stacklevel=2)
-            if loads is not None and scenario is not None and not loads.are_for(scenario):
-                return None
-            if loads is not None:
-                self.remember(key, loads)
+            return loads
+        loads = self.read(json.dumps(key), _decoded)
+        if loads is None or not (scenario is None or loads.are_for(scenario)):
+            return None
+        self.remember(key, loads)
         return loads
 
     def add(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast, which may displace others."""
         self.remember(key, loads)
         if self._file is not None:
-            try:
-                self._file.put(json.dumps(key), _encoded(loads))
-            except BlastEnvError as error:
-                warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=2)
+            self.put(json.dumps(key), _encoded(loads))
+
+    def read(self, key: str, decode: Callable[[bytes], T]) -> T | None:
+        """Return a content of the file as `Store.read`; `None` if it is missing or damaged."""
+        try:
+            return None if self._file is None else self._file.read(key, decode)
+        except BlastEnvError as error:
+            warnings.warn(f"a blast counts as missing: {error}", RuntimeWarning, stacklevel=3)
+            return None
+
+    def put(self, key: str, content: bytes) -> None:
+        """Keep a content in the file, if there is one."""
+        try:
+            if self._file is not None:
+                self._file.put(key, content)
+        except BlastEnvError as error:
+            warnings.warn(f"a blast is not kept: {error}", RuntimeWarning, stacklevel=3)
 
     def remember(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast in memory only."""

@@ -17,6 +17,7 @@ from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.governing import Severity
 from blast_env.evaluation.probability import Uncertainty
+from blast_env.evaluation.shared import keep_consequences
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, Piece, layout_text, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
@@ -545,6 +546,7 @@ class Runs:
             self.digests.append((label, each.digest))
             self._found.setdefault((cells, bool(layout)), []).append(each.found)
             self._evaluators[cells].keep(layout, threat, each.loads)
+            keep_consequences(self._evaluators[cells], layout, threat.charge, each.found)
         for target in self.targets:
             if target.name in bare.on_targets and target.name in walled.on_targets:
                 loads = bare.on_targets[target.name], walled.on_targets[target.name]

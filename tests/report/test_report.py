@@ -18,6 +18,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.grid_error import convergence_index
+from blast_env.evaluation.shared import shared_consequences
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
@@ -497,3 +498,5 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     fine = BlastEvaluator(small_hut(), GasEngine.with_cells(options.cells[1]), cache=tmp_path)
     fine.loads_of_many([((), threat), (LAYOUT, threat)])
     assert fine.blasts == 0  # an evaluation after the report has them too
+    monkeypatch.setattr("blast_env.evaluation.shared.consequences", None)
+    assert shared_consequences(fine, LAYOUT, [threat.charge]).barriers  # and so has `assess`

@@ -1,0 +1,161 @@
+"""The consequences of blasts in a store, so that commands with the same charges share them.
+
+A content has the histories of the bays, from which the response is computed again, and the other
+numbers as they were. Its key has all inputs: those of the blast, and the whole site and layout.
+"""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from typing import ClassVar, Final
+
+import numpy as np
+from pydantic import ConfigDict, TypeAdapter
+
+from blast_env.evaluation.cases import LoadCase
+from blast_env.evaluation.consequences import (
+    BarrierResponse,
+    Consequences,
+    Neighbour,
+    by_building,
+    consequences,
+)
+from blast_env.evaluation.engines.bays import UnjudgedWalls
+from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
+from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
+from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.geometry import Layout
+from blast_env.layout.build_scene import build_site
+from blast_env.response.facade import respond
+from blast_env.site import AnyCharge, Scenario
+from blast_env.tables import table_of
+
+
+@dataclass(frozen=True)
+class _Header:
+    """The numbers of a content that are not in its arrays, and the sizes of these."""
+
+    __pydantic_config__: ClassVar = ConfigDict(ser_json_inf_nan="constants")
+
+    bays: tuple[str, ...]
+    times: int
+    modules: int
+    peak_factor: float
+    known: dict[str, bool]
+    neighbours: tuple[Neighbour, ...]
+    pieces: str
+    unchecked: tuple[tuple[str, str], ...]
+    unjudged: tuple[UnjudgedWalls, ...]
+    structures: tuple[StructureLoad, ...]
+
+
+_HEADER: Final = TypeAdapter(_Header)
+
+
+def shared_consequences(
+    evaluator: BlastEvaluator,
+    layout: Layout,
+    charges: Sequence[AnyCharge],
+    progress: Callable[[float], None] | None = None,
+) -> Consequences:
+    """Return `consequences`, with those of blasts in the store of an evaluator; others are kept.
+
+    Args:
+        evaluator: The evaluator of the scenario, with gas dynamics.
+        layout: A legal layout.
+        charges: The charges, or the vehicles that carry them.
+        progress: Called with the finished share of the charges.
+
+    Raises:
+        BlastEnvError: As for `consequences`.
+    """
+    scenario, parts = evaluator.scenario, []
+    for number, charge in enumerate(charges, start=1):
+        decode = partial(_decoded, scenario=scenario, layout=layout, charge=charge)
+        found = evaluator.store.read(_key(evaluator, layout, charge), decode)
+        if found is None:
+            found = consequences(scenario, layout, [charge], evaluator.engine)
+            keep_consequences(evaluator, layout, charge, found)
+            if not scenario.objective.is_response:  # whose loads have the damage of bays
+                evaluator.keep(layout, LoadCase(charge), *found.loads)
+        parts.append(found)
+        if progress is not None:
+            progress(number / len(charges))
+    return Consequences.together(parts)
+
+
+def keep_consequences(
+    evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge, found: Consequences
+) -> None:
+    """Keep the consequences of one charge in the store of an evaluator.
+
+    Args:
+        evaluator: The evaluator of the scenario, with gas dynamics.
+        layout: The layout, of which no piece was taken away.
+        charge: The charge, or the vehicle that carries it.
+        found: The consequences, as they come from the blast.
+    """
+    if evaluator.store.has_file:
+        evaluator.store.put(_key(evaluator, layout, charge), _encoded(found))
+
+
+def _key(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> str:
+    inputs = evaluator.scenario.model_dump_json() + repr(layout)
+    blast = evaluator.key(layout, LoadCase(charge))
+    return json.dumps(("consequences", blast, sha256(inputs.encode()).hexdigest()))
+
+
+def _encoded(found: Consequences) -> bytes:
+    (barrier,), (loads,) = found.barriers, found.loads
+    facades = [each.on_cells for each in found.responses]
+    time_s = facades[0].time_s if facades else np.zeros(0)
+    known = {name: one for each in found.responses for name, one in each.known.items()}
+    header = _Header(
+        bays=tuple(each.bay.name for facade in facades for each in facade.bays),
+        times=len(time_s),
+        modules=len(loads.module_impulse),
+        peak_factor=found.responses[0].peak_factor if facades else 1.0,
+        known=known,
+        neighbours=found.neighbours,
+        pieces=json.dumps(barrier.pieces.to_dict("records")),  # NaN for numbers that they lack
+        unchecked=found.unchecked,
+        unjudged=found.unjudged,
+        structures=loads.structures,
+    )
+    line = _HEADER.dump_json(header)
+    arrays = [time_s.astype("<f8"), loads.module_impulse.astype("<f8")]
+    arrays += [facade.pressure_pa.astype("<f4") for facade in facades]  # as they were recorded
+    return b"\n".join((line, b"".join(each.tobytes() for each in arrays)))
+
+
+def _decoded(content: bytes, scenario: Scenario, layout: Layout, charge: AnyCharge) -> Consequences:
+    line, _, arrays = content.partition(b"\n")
+    header = _HEADER.validate_json(line)
+    times, modules = header.times, header.modules
+    ends = 8 * times, 8 * (times + modules)
+    time_s, impulses, pressure = (
+        np.frombuffer(part, dtype=kind).astype(np.float64)
+        for part, kind in (
+            (arrays[: ends[0]], "<f8"),
+            (arrays[ends[0] : ends[1]], "<f8"),
+            (arrays[ends[1] :], "<f4"),
+        )
+    )
+    site = build_site(scenario, layout, 0, charge)
+    responses = []
+    if header.bays:
+        bays = {each.bay.name: each for each in scenario.bays_with(layout)}
+        own = [bays[name] for name in header.bays]
+        facade = respond(own, time_s, pressure.reshape(len(own), times))
+        responses = by_building(scenario, facade, site, header.peak_factor, header.known)
+    pieces = table_of(json.loads(header.pieces), PIECE_COLUMNS)
+    return Consequences(
+        tuple(responses),
+        header.neighbours,
+        (BarrierResponse(site.charge, pieces),),
+        header.unchecked,
+        header.unjudged,
+        (BlastLoads(header.structures, impulses),),
+    )

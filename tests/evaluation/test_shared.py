@@ -1,0 +1,48 @@
+"""Consequences come back from a store as they were, and other inputs find none."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from blast_env.evaluation import BlastEvaluator, LoadCase
+from blast_env.evaluation.consequences import Consequences, bay_table, piece_table
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.shared import shared_consequences
+from blast_env.site import Scenario
+from blast_env.site.scene import Charge
+from tests.report.sites import LAYOUT, glazed_hut
+
+CHARGE = Charge((2.0, 4.0), 5.0)
+
+
+def evaluator(folder: Path, scenario: Scenario | None = None) -> BlastEvaluator:
+    return BlastEvaluator(scenario or glazed_hut(), GasEngine(), cache=folder)
+
+
+def tables(found: Consequences) -> tuple[pd.DataFrame, pd.DataFrame]:
+    return bay_table({"": found}), piece_table({"": found})
+
+
+def test_a_stored_blast_has_the_same_consequences(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = shared_consequences(evaluator(tmp_path), LAYOUT, [CHARGE])
+    monkeypatch.setattr("blast_env.evaluation.shared.consequences", None)  # no blast
+    again = shared_consequences(evaluator(tmp_path), LAYOUT, [CHARGE])
+    for table, same in zip(tables(first), tables(again), strict=True):
+        pd.testing.assert_frame_equal(table, same, check_exact=True)
+    assert len(tables(first)[0]) > 0
+    for name in ("neighbours", "unchecked", "unjudged", "notes", "is_flagged", "force_words"):
+        assert getattr(again, name) == getattr(first, name)
+    assert again.loads[0].structures == first.loads[0].structures
+    np.testing.assert_array_equal(again.loads[0].module_impulse, first.loads[0].module_impulse)
+    (one,), (other,) = first.responses, again.responses
+    np.testing.assert_array_equal(one.facade.pressure_pa, other.facade.pressure_pa)
+    assert (one.standings, one.known, one.charge) == (other.standings, other.known, other.charge)
+    known = evaluator(tmp_path)
+    known.loads(LAYOUT, LoadCase(CHARGE))
+    assert known.blasts == 0  # an evaluation has the loads of the same blast, too
+    with pytest.raises(TypeError):
+        shared_consequences(known, (), [CHARGE])  # another layout is another blast
