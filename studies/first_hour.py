@@ -3,7 +3,7 @@
 `python -m studies.first_hour` prints the table of docs/researchers/training.md.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from time import process_time
 from typing import Annotated, Any, Final
 
@@ -23,34 +23,38 @@ from blast_env.evaluation.store import BlastStore
 from blast_env.statistics import mean_estimate
 
 HELD_OUT: Final = range(10_000, 10_048)
-"""Seeds of the episodes of the judgement."""
+"""Seeds of the episodes of the judgement; gas dynamics judges the first ones."""
 
 Agent = PPO | MaskablePPO
+KNOWN: Final[dict[str, type[Agent]]] = {each.__name__: each for each in (PPO, MaskablePPO)}
 
 
-def environment(action: str, realisations: int | None = None) -> BlastBarrierEnv:
+def environment(
+    action: str, engine: str = "event", realisations: int | None = None, cache: str | None = None
+) -> BlastBarrierEnv:
     """Return the default site with what the page recommends, apart from the action space."""
     return BlastBarrierEnv(
         reward="relative",
         observation="features",
         action=action,
+        engine=engine,
         realisations=realisations,
-        cache=BlastStore(size=8192),
+        cache=BlastStore(cache, size=8192),
     )
 
 
-def trained(algorithm: type[Agent], action: str, steps: int, seed: int) -> Agent:
+def trained(algorithm: str, action: str, steps: int, seed: int) -> Agent:
     """Return an agent of the library's defaults, on 128 threats."""
     pool: gym.Env[Any, Any] = ThreatPool(environment(action, realisations=1), 128, seed)
-    agent: Agent = algorithm("MlpPolicy", pool, seed=seed, device="cpu")
+    agent: Agent = KNOWN[algorithm]("MlpPolicy", pool, seed=seed, device="cpu")
     agent.learn(steps)
     return agent
 
 
-def reductions(env: BlastBarrierEnv, agent: Agent | None, rng: np.random.Generator) -> FloatArray:
+def reductions(env: BlastBarrierEnv, agent: Agent | None, seeds: Sequence[int]) -> FloatArray:
     """Return the reduction in each held-out episode by an agent, or by random legal actions."""
-    found = []
-    for seed in HELD_OUT:
+    found, rng = [], np.random.default_rng(0)
+    for seed in seeds:
         observation, info = env.reset(seed=seed)
         ended = False
         while not ended:
@@ -66,10 +70,10 @@ def reductions(env: BlastBarrierEnv, agent: Agent | None, rng: np.random.Generat
     return np.array(found)
 
 
-def by_rules(env: BlastBarrierEnv) -> Iterator[tuple[str, FloatArray]]:
+def by_rules(env: BlastBarrierEnv, seeds: Sequence[int]) -> Iterator[tuple[str, FloatArray]]:
     """Yield each rule with its reduction in each held-out episode."""
     found: dict[str, list[float]] = {}
-    for seed in HELD_OUT:
+    for seed in seeds:
         env.reset(seed=seed)
         scenario = env.placement.scenario
         (charge,) = env.step(env.action_space.n - 1)[-1]["charges"]  # type: ignore[attr-defined]
@@ -81,36 +85,47 @@ def by_rules(env: BlastBarrierEnv) -> Iterator[tuple[str, FloatArray]]:
         yield name, np.array(each)
 
 
-def report(name: str, of_episodes: FloatArray) -> None:
-    """Print a mean reduction with its 95 % interval."""
+def report(name: str, of_episodes: FloatArray, best: FloatArray | None = None) -> None:
+    """Print a mean reduction with its 95 % interval, and the paired lead over the best rule."""
     value, low, _ = mean_estimate(of_episodes).scaled(100.0)
-    print_line(f"{name}: {value:.1f} % +- {value - low:.1f}")
+    lead = ""
+    if best is not None:
+        more, least, most = mean_estimate(of_episodes - best).scaled(100.0)
+        lead = f"; {more:+.1f} points on the best rule ({least:.1f} to {most:.1f})"
+    print_line(f"{name}: {value:.1f} % +- {value - low:.1f}{lead}")
 
 
 def main(
-    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 12_288,
+    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 16_384,
     algorithm: Annotated[
         list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
     ] = None,
-    action: Annotated[list[str] | None, typer.Option(help="Action spaces.")] = None,
+    action: Annotated[str, typer.Option(help="Action space.")] = "half_row",
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
-    rules: Annotated[bool, typer.Option(help="Also judge rules and random actions.")] = True,
+    threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
+    by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 16,
+    cache: Annotated[str | None, typer.Option(help="Folder for the blasts of gas.")] = None,
 ) -> None:
-    """Train and judge on 48 held-out threats; print one line for each rule and agent."""
+    """Train, and judge on held-out threats; print one line for each rule and agent."""
     torch.set_num_threads(1)
-    if rules:
-        judge = environment("place")
-        for name, each in by_rules(judge):
-            report(name, each)
-        report("random", reductions(judge, None, np.random.default_rng(0)))
-    known = {each.__name__: each for each in (PPO, MaskablePPO)}
-    for space in action or ["row"]:
-        for kind in algorithm or known:
-            for seed in range(seeds):
-                began_s = process_time()
-                agent = trained(known[kind], space, steps, seed)
-                name = f"{kind}, {space}, seed {seed}, {process_time() - began_s:.0f} CPU s"
-                report(name, reductions(environment(space), agent, np.random.default_rng(0)))
+    agents: dict[str, Agent] = {}
+    for kind in algorithm or KNOWN:
+        for seed in range(seeds):
+            began_s = process_time()
+            agent = trained(kind, action, steps, seed)
+            agents[f"{kind}, seed {seed}, {process_time() - began_s:.0f} CPU s"] = agent
+    for engine, judged in (("event", HELD_OUT[:threats]), ("gas", HELD_OUT[:by_gas])):
+        if judged:
+            print_line(f"judged by {engine} on {len(judged)} threats")
+            judge = environment(action, engine, cache=cache if engine == "gas" else None)
+            rules = dict(by_rules(judge, judged))
+            best = max(rules.values(), key=lambda each: float(each.mean()))
+            for name, each in rules.items():
+                report(name, each)
+            if engine == "event":
+                report("random", reductions(environment("place"), None, judged))
+            for name, agent in agents.items():
+                report(name, reductions(judge, agent, judged), best)
 
 
 if __name__ == "__main__":

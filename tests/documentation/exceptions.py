@@ -140,7 +140,7 @@ SMALLER: Final[dict[str, str]] = {
     " --mass backpack --gas --cells coarse": "--cells uniform --cell 1",
     "python -m studies.response angles": "--width 12",
     # docs/researchers/training.md
-    "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --no-rules",
+    "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
     "python -m studies.response_sites": "clinic_front",
