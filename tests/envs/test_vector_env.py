@@ -1,5 +1,6 @@
 """Environments in one batch: the same episodes as single ones, to the last bit."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -8,8 +9,28 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from blast_env.design.surrogate.engine import SurrogateEngine
+from blast_env.envs.observations import Observable
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
+from blast_env.errors import BlastEnvError
+from blast_env.layout import Placement
+from blast_env.site import Scenario
 from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
+from tests.evaluation.engines.shade import ShadeEngine
+
+
+@dataclass(frozen=True)
+class OneNumber:
+    """An observation as a user writes one: the number of modules."""
+
+    def space(self, scenario: Scenario) -> gym.spaces.Box:
+        return gym.spaces.Box(0.0, 1e6, (1,), np.float32)
+
+    def episode(self, observable: Observable) -> "OneNumber":
+        return self
+
+    def observe(self, placement: Placement) -> np.ndarray:
+        return np.array([len(placement.layout)], dtype=np.float32)
+
 
 COUNTS = ("blasts", "cache_hits", "cache_hit_rate")
 """Of all environments together in a batch, of each one otherwise."""
@@ -56,15 +77,24 @@ def check_same(how: str = "NextStep", least: int = 2, **chosen: Any) -> None:
 
 
 @pytest.mark.parametrize("observation", ["image", "grid", "features", "dict"])
-@pytest.mark.parametrize("scenario", [small_scenario(), restricted_scenario()])
-def test_episodes_are_those_of_single_environments(scenario: Any, observation: str) -> None:
+def test_episodes_are_those_of_single_environments(observation: str) -> None:
+    scenario = restricted_scenario()
     check_same(scenario=scenario, observation=observation, engine=ThinEngine(), realisations=1)
 
 
 @pytest.mark.parametrize("how", [each.value for each in AutoresetMode])
-@pytest.mark.parametrize("limit", [{}, {"max_episode_steps": 2}])
-def test_every_autoreset_mode(how: str, limit: dict[str, int]) -> None:
-    check_same(how, scenario=small_scenario(), engine=ThinEngine(), realisations=1, **limit)
+def test_every_autoreset_mode(how: str) -> None:
+    check_same(how, scenario=small_scenario(), engine=ThinEngine(), realisations=1)
+
+
+def test_episodes_are_truncated_with_their_last_observation() -> None:
+    limit = {"scenario": small_scenario(), "engine": ThinEngine(), "max_episode_steps": 2}
+    check_same("SameStep", realisations=1, **limit)
+
+
+def test_a_strategy_without_batches_and_sites_of_an_episode_each() -> None:
+    """Observations of one's own are stacked; every episode has a site of its own."""
+    check_same(scenario="sites", observation=OneNumber(), engine=ShadeEngine(), least=1)
 
 
 @pytest.mark.parametrize(
@@ -79,3 +109,30 @@ def test_every_autoreset_mode(how: str, limit: dict[str, int]) -> None:
 )
 def test_predictions_in_one_pass_are_those_one_by_one(chosen: dict[str, Any]) -> None:
     check_same(engine=SurrogateEngine(), **chosen)
+
+
+def test_it_takes_what_a_single_environment_takes() -> None:
+    with pytest.raises(TypeError, match="scenarios"):
+        BlastBarrierVectorEnv(2, scenarios="courtyard")
+    with pytest.raises(BlastEnvError, match="autoreset_mode 'Next'"):
+        BlastBarrierVectorEnv(2, "Next")
+    with pytest.raises(BlastEnvError, match="render_mode is 'human', must be None"):
+        BlastBarrierVectorEnv(2, render_mode="human")
+
+
+def test_wrong_calls_are_refused_and_change_nothing() -> None:
+    envs = BlastBarrierVectorEnv(2, "Disabled", scenario=small_scenario(), engine=ThinEngine())
+    with pytest.raises(gym.error.ResetNeeded):
+        envs.step([0, 0])
+    first, _ = envs.reset(seed=1)
+    for wrong in ([0], [0, 99], [0.5, 1.0]):
+        with pytest.raises(gym.error.InvalidAction, match="must be"):
+            envs.step(np.array(wrong))
+    with pytest.raises(BlastEnvError, match=r"reset_mask has shape \(1,\)"):
+        envs.reset(options={"reset_mask": np.array([True])})
+    with pytest.raises(BlastEnvError, match="seed has 1 values"):
+        envs.reset(seed=[1])
+    assert same(envs.reset(seed=1)[0], first)
+    envs.step([40, 0])
+    with pytest.raises(gym.error.ResetNeeded, match=r"\[0\]"):
+        envs.step([0, 0])
