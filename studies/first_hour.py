@@ -96,11 +96,11 @@ def report(name: str, of_episodes: FloatArray, best: FloatArray | None = None) -
 
 
 def main(
-    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 16_384,
+    steps: Annotated[int, typer.Option(help="Steps of the environment in a training.")] = 12_288,
     algorithm: Annotated[
         list[str] | None, typer.Option(help="PPO or MaskablePPO; may be given again.")
     ] = None,
-    action: Annotated[str, typer.Option(help="Action space.")] = "half_row",
+    action: Annotated[str, typer.Option(help="Action space.")] = "row",
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
     by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 16,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -113,11 +113,20 @@ class SiteSource:
         """
         if not 0 <= index < self.count:
             raise BlastEnvError(f"site {index} does not exist, must be 0 to {self.count - 1}")
-        return generate_site(self.first_seed + index, self.ranges, self.criterion)
+        seed = self.first_seed + index
+        if self.criterion is not None:
+            return generate_site(seed, self.ranges, self.criterion)
+        return _site(seed, self.ranges)
 
     def __iter__(self) -> Iterator[Scenario]:
         """Yield all sites in order."""
         return (self.site(index) for index in range(self.count))
+
+
+@lru_cache(maxsize=512)
+def _site(seed: int, ranges: AnyRanges) -> Scenario:
+    """Return a site; training draws the same few hundred again and again, at a quarter second."""
+    return generate_site(seed, ranges)
 
 
 @cache

@@ -88,8 +88,8 @@ def test_every_autoreset_mode(how: str) -> None:
 
 
 def test_episodes_are_truncated_with_their_last_observation() -> None:
-    limit = {"scenario": small_scenario(), "engine": ThinEngine(), "max_episode_steps": 2}
-    check_same("SameStep", realisations=1, **limit)
+    chosen: dict[str, Any] = {"scenario": small_scenario(), "engine": ThinEngine()}
+    check_same("SameStep", max_episode_steps=2, realisations=1, **chosen)
 
 
 def test_a_strategy_without_batches_and_sites_of_an_episode_each() -> None:
