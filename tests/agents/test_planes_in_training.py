@@ -90,27 +90,26 @@ def test_every_bundled_site(name: str) -> None:
     check(load_scenario(name))
 
 
-@pytest.mark.parametrize("name", BUNDLED)
-def test_every_bundled_site_as_an_image(name: str) -> None:
+@pytest.mark.parametrize("name", ["courtyard", "visitor_entrance", "guard_post"])
+def test_bundled_sites_as_images(name: str) -> None:
     check(load_scenario(name), "image", "CnnPolicy")
 
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 def test_generated_sites(family: str) -> None:
-    for seed in range(3):
-        check(generate_site(seed, FAMILIES[family]))
+    check(generate_site(0, FAMILIES[family]))
 
 
 def test_sites_of_many_shapes() -> None:
     """Also those where columns are fewest, of which stable-baselines3 does not even warn."""
     rng = np.random.default_rng(0)
-    sizes = {tuple(rng.integers(24, 70, size=2).tolist()) for _ in range(60)}
+    sizes = {tuple(rng.integers(24, 70, size=2).tolist()) for _ in range(20)}
     shapes = set()
-    for rows, columns in islice(sorted(sizes), 20):
+    for rows, columns in islice(sorted(sizes), 8):
         scenario = shaped_yard(columns / 2.0, rows / 2.0)
         shapes.add(GridObservation().space(scenario).shape)
         check(scenario)
-    assert len(shapes) == 20
+    assert len(shapes) == 8
 
 
 def test_a_policy_refuses_turned_planes() -> None:

@@ -33,27 +33,20 @@ def test_frames_are_of_one_size_from_the_first_module_to_the_film() -> None:
         assert (earlier != later).any()
 
 
-BARRIER_IDS = [each for each in gym.registry if each.startswith("BlastBarrier")]
-
-
-@pytest.mark.parametrize("environment_id", BARRIER_IDS)
-def test_every_episode_of_an_environment_has_frames_of_one_size(environment_id: str) -> None:
-    env = gym.make(environment_id, render_mode="rgb_array")
+@pytest.mark.parametrize("family", ["Sites", "ItemSites", "LargeSites"])
+def test_every_site_of_a_family_has_frames_of_one_size(family: str) -> None:
+    env = gym.make(f"BlastBarrier{family}-v0", render_mode="rgb_array")
     sizes = set()
-    for seed in range(3):
+    for seed in range(2):
         env.reset(seed=seed)
         sizes.add(np.asarray(env.render()).shape)
     assert len(sizes) == 1
 
 
-@pytest.mark.parametrize(
-    "scenario",
-    ["courtyard", "perimeter_gate"],
-)
-def test_the_blast_on_a_bundled_site_has_frames_of_the_size_that_placing_has(
-    scenario: str,
-) -> None:
-    env = gym.make("BlastBarrier-v0", scenario=scenario, render_mode="rgb_array", realisations=1)
+def test_the_blast_on_a_bundled_site_has_frames_of_the_size_that_placing_has() -> None:
+    env = gym.make(
+        "BlastBarrier-v0", scenario="perimeter_gate", render_mode="rgb_array", realisations=1
+    )
     env.reset(seed=1)
     placing = np.asarray(env.render()).shape
     env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
@@ -75,15 +68,6 @@ def test_gymnasiums_wrappers_record_and_show_the_default_environment(tmp_path: P
 
 def _finishing() -> gym.Env:
     return gym.make("BlastBarrier-v0", render_mode="rgb_array", realisations=1)
-
-
-def test_the_film_comes_to_an_end_and_shows_the_blast() -> None:
-    env = make(render_mode="rgb_array")
-    env.reset(seed=1, options={"charge_position_m": (3.0, 9.0)})
-    env.step(FINISH)
-    film = list(env.blast_frames())
-    assert 150 <= len(film) <= 320
-    assert (film[0] != film[len(film) // 4]).mean() > 0.001
 
 
 def test_the_last_frame_stays_and_does_not_leak_into_the_next_episode() -> None:

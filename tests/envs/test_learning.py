@@ -16,9 +16,9 @@ from blast_env.site import AnyCharge, Scenario
 from tests.envs.small import small_document
 from tests.evaluation.engines.shade import ShadeEngine
 
-STEPS = 2 * 2048
-HELD_OUT = range(10_000, 10_048)
-LEAST_LEAD = 0.15
+STEPS = 2048
+HELD_OUT = range(10_000, 10_024)
+LEAST_LEAD = 0.05
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """The error of the cells: the index, the cells it takes, and where it stands."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -90,11 +92,11 @@ def test_words() -> None:
 
 def test_final_statements_have_it_beside_each_number() -> None:
     """The loads on the hut by hand: fine cells, and coarse ones under the only charge."""
-    evaluation = evaluate_layout(hut(), WALL, [0])
-    assert evaluation.engine == GasEngine(cell_m=0.25)
+    fine = GasEngine(cell_m=0.25, border_m=0.0)
+    evaluation = evaluate_layout(hut(), WALL, [0], engine=fine)
     walled, bare = (
         [
-            GasBlast(hut(), layout, 0, GasEngine(cell_m=cell_m)).run().impulse("hut").pa_s
+            GasBlast(hut(), layout, 0, replace(fine, cell_m=cell_m)).run().impulse("hut").pa_s
             for cell_m in (0.25, 0.5)
         ]
         for layout in (WALL, ())

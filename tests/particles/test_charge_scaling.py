@@ -135,7 +135,7 @@ def mean_impulse(tnt_kg: float, scaled_distance: float) -> float:
     x_m, y_m = source_bounds_m(source).centre
     results = [
         simulate(field, seed=seed, engine="event", charge=Charge((x_m, y_m), tnt_kg))
-        for seed in range(6)
+        for seed in range(3)
     ]
     loads = [result.obstacle("building").transferred_impulse for result in results]
     return float(np.mean(loads)) / scale
@@ -143,10 +143,8 @@ def mean_impulse(tnt_kg: float, scaled_distance: float) -> float:
 
 @pytest.mark.slow
 def test_impulses_obey_hopkinson_cranz_scaling() -> None:
-    """At Z = 3 m/kg^(1/3), 20 to 1000 kg; one standard error of a ratio is about 6 %.
+    """At Z = 3 m/kg^(1/3), 100 and 1000 kg; one standard error of the ratio is about 9 %.
 
     With losses that do not follow the charge, 1000 kg gives 0.72 of this.
     """
-    reference = mean_impulse(100.0, 3.0)
-    assert mean_impulse(20.0, 3.0) / reference == pytest.approx(1.0, abs=0.2)
-    assert mean_impulse(1000.0, 3.0) / reference == pytest.approx(1.0, abs=0.2)
+    assert mean_impulse(1000.0, 3.0) / mean_impulse(100.0, 3.0) == pytest.approx(1.0, abs=0.2)

@@ -124,4 +124,5 @@ def test_commands_name_walls_that_no_verdict_covers(command: str, tmp_path: Path
     save_scenario(strips(), tmp_path / "strips.toml")
     shown = CliRunner().invoke(app, [command, str(tmp_path / "strips.toml"), "--cell", "0.5"])
     assert shown.exit_code == 0, shown.output
+    assert shown.stdout.startswith("engine gas")
     assert "6.0 of 18.0 m2 of its walls stand in no bay (strip)" in " ".join(shown.output.split())
