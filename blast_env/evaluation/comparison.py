@@ -23,6 +23,7 @@ from blast_env.layout import check_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import share_of
+from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.statistics import (
     CVAR_LEVEL,
@@ -172,16 +173,6 @@ class Evaluation:
         return mean_estimate(self.case_reductions - other.case_reductions)
 
     @property
-    def worst_reduction(self) -> float:
-        """The smallest reduction in any case; with a single case, under any threat.
-
-        Threats of a single case without a load on the unprotected site are left out.
-        """
-        if not self.has_one_case:
-            return float(self.case_reductions.min())
-        return float(np.nanmin(reductions(self.loads[0], self.unprotected[0])))
-
-    @property
     def mean(self) -> Estimate:
         """Mean load with the layouts, in the unit of the objective."""
         return mean_estimate(self._samples(self.loads))
@@ -276,7 +267,7 @@ def compare(
         tuple(check_layout(case.scenario, layout))
         for case, layout in zip(cases, layouts, strict=True)
     ]
-    blasts = list(_both(evaluators, cases, cells, processes, progress))
+    blasts = list(loads_of_both(evaluators.of, cases, cells, processes, progress))
     loads = _counted(cases, [protected for protected, _ in blasts])
     error = None
     if coarser is not None:
@@ -294,24 +285,6 @@ def compare(
         cvar_level=cvar_level,
         grid_error=error,
     )
-
-
-def loads_of_both(
-    evaluator: BlastEvaluator,
-    case: Case,
-    layout: Sequence[Element],
-    processes: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]:
-    """Return the loads with a layout and those without a barrier, each one per threat.
-
-    Raises:
-        BlastEnvError: If a threat is repeated, or `processes` is below 1.
-    """
-    check_distinct(case.threats)
-    pairs = [(each, threat) for threat in case.threats for each in (layout, ())]
-    loads = evaluator.loads_of_many(pairs, processes, progress)
-    return tuple(loads[0::2]), tuple(loads[1::2])
 
 
 def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> None:
@@ -332,31 +305,35 @@ def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> N
             )
 
 
-def _both(
-    evaluators: Evaluators,
+def loads_of_both(
+    evaluator_of: Callable[[Scenario], BlastEvaluator],
     cases: Sequence[Case],
     layouts: Sequence[Layout],
-    processes: int,
-    progress: Callable[[float], None] | None,
+    processes: int = 1,
+    progress: Callable[[float], None] | None = None,
 ) -> Iterator[tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]]:
-    """Yield the loads with and without the layout of each case.
+    """Yield the loads with the layout of each case and those without a barrier, one per threat.
 
     Consecutive cases on one scenario run together.
+
+    Raises:
+        BlastEnvError: If a threat is repeated, or `processes` is below 1.
     """
     done = 0
     for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):
         together = list(group)
+        for case, _ in together:
+            check_distinct(case.threats)
         pairs = [
             (cells, threat)
             for case, layout in together
             for threat in case.threats
             for cells in (layout, ())
         ]
-        tell = share_of(progress, done, len(cases), len(together))
-        evaluator = evaluators.of(together[0][0].scenario)
-        loads = iter(evaluator.loads_of_many(pairs, processes, tell))
+        told = share_of(progress, done, len(cases), len(together))
+        evaluator = evaluator_of(together[0][0].scenario)
+        loads = iter(evaluator.loads_of_many(pairs, processes, told))
         for case, _ in together:
-            check_distinct(case.threats)
             own = list(islice(loads, 2 * len(case.threats)))
             yield tuple(own[0::2]), tuple(own[1::2])
         done += len(together)

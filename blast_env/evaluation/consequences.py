@@ -29,6 +29,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.comparison import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
 from blast_env.evaluation.engines.contract import BlastLoads, Engine
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
@@ -445,9 +446,7 @@ def other_glazing(scenario: Scenario) -> dict[str, Glazing]:
 
 CASE_COLUMNS: Final = (
     Column("layout", "", "the layout, or that there is none"),
-    Column("charge_x_m", "m", "where the charge goes off, from the left border"),
-    Column("charge_y_m", "m", "where the charge goes off, from the lower border"),
-    Column("tnt_kg", "kg", "its mass"),
+    *CHARGE_COLUMNS,
 )
 """The first columns in tables of bays and of pieces under several charges."""
 
@@ -462,7 +461,8 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
         found: The consequences by the name of the layout.
     """
     rows = [
-        _case(name, each.charge)
+        {"layout": name}
+        | charge_values(each.charge)
         | row
         | {"known": each.known.get(str(row["bay"]), False)}
         | {"standing": stood.standing.label, "reason": stood.reason}
@@ -479,19 +479,13 @@ def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
     Args:
         found: The consequences by the name of the layout.
     """
-    rows = [
-        _case(name, each.charge) | row
+    rows: list[dict[Any, Any]] = [
+        {"layout": name, **charge_values(each.charge), **row}
         for name, judged in found.items()
         for each in judged.barriers
         for row in each.pieces.to_dict("records")
     ]
     return table_of(rows, (*CASE_COLUMNS, *PIECE_COLUMNS))
-
-
-def _case(layout: str, charge: Charge) -> dict[Any, Any]:
-    x_m, y_m = charge.position_m
-    values = (layout, x_m, y_m, charge.tnt_kg)
-    return {column.name: value for column, value in zip(CASE_COLUMNS, values, strict=True)}
 
 
 def consequences(

@@ -550,7 +550,9 @@ def evaluate_against(
     scenario = evaluator.scenario
     cells = tuple(sorted(check_layout(scenario, layout)))
     case = Case(scenario, tuple(threats))
-    loads, unprotected = loads_of_both(evaluator, case, cells, processes, progress)
+    ((loads, unprotected),) = loads_of_both(
+        lambda _: evaluator, [case], [cells], processes, progress
+    )
     counts = scenario.objective
     evaluation = LayoutEvaluation(
         cases=(case,),
