@@ -13,12 +13,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.contract import BlastLoads
 from blast_env.layout.build_scene import build_site
-from blast_env.particles.calibration.references import (
-    CURVES_SCALED_M,
-    burst_of,
-    kingery_bulmash,
-    oblique,
-)
+from blast_env.particles.calibration.references import burst_of, in_the_open
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.scene import OUTWARDS, BlastSite, Charge, StructureOutline
 from blast_env.site.sight import in_sight
@@ -86,13 +81,8 @@ def _open_pa_s(site: BlastSite, structure: StructureOutline) -> float:
     way_m = np.array([*charge.position_m, charge.height_m]) - points_m
     away_m = np.linalg.norm(way_m, axis=1)
     facing = (way_m * outward).sum(axis=1) / away_m
-    low_m, high_m = (scaled * np.cbrt(charge.tnt_kg) for scaled in CURVES_SCALED_M)
     burst = burst_of(charge.height_m, charge.tnt_kg)
-    reflected, incident = (
-        kingery_bulmash(quantity, np.clip(away_m, low_m, high_m), charge.tnt_kg, burst)
-        for quantity in ("reflected_impulse", "incident_impulse")
-    )
-    return float(np.where(seen, oblique(reflected, incident, facing), incident).mean())
+    return float(in_the_open("impulse", away_m, facing, seen, charge.tnt_kg, burst).mean())
 
 
 def _points(site: BlastSite, structure: StructureOutline) -> tuple[FloatArray, FloatArray]:

@@ -1,13 +1,14 @@
 """Places of bays relative to a charge: their distance, and whether it sees them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
+from blast_env.geometry import Rectangle
 from blast_env.response.facade import Bay
-from blast_env.site.scene import OUTWARDS, BlastSite, StructureOutline
+from blast_env.site.scene import OUTWARDS, BlastSite
 from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
 
@@ -31,19 +32,31 @@ def bay_places(site: BlastSite, bays: Sequence[Bay]) -> BayPlaces:
         site: The site with its charge, structures and barrier.
         bays: The bays.
     """
-    outlines = {each.name: each for each in site.structures}
-    points = np.array([_middle_m(outlines[each.structure], each) for each in bays]).reshape(-1, 3)
-    outward = np.array([(*_outward(each), 0.0) for each in bays]).reshape(-1, 3)
+    points, outward = bay_middles({each.name: each.rectangle_m for each in site.structures}, bays)
     charge_m = np.array([*site.charge.position_m, site.charge.height_m])
     distance_m = np.linalg.norm(points - charge_m, axis=1)
     return BayPlaces(distance_m, in_sight(site, points + MODULE_SIDE_M * outward, outward))
 
 
-def _middle_m(outline: StructureOutline, bay: Bay) -> tuple[float, float, float]:
+def bay_middles(
+    rectangles_m: Mapping[str, Rectangle], bays: Sequence[Bay]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of bays on their walls, m, and their outward normals (bays, 3).
+
+    Args:
+        rectangles_m: The rectangle around each structure, by name.
+        bays: The bays.
+    """
+    points = np.array([_middle_m(rectangles_m[each.structure], each) for each in bays])
+    outward = np.array([(*_outward(each), 0.0) for each in bays])
+    return points.reshape(-1, 3), outward.reshape(-1, 3)
+
+
+def _middle_m(rectangle_m: Rectangle, bay: Bay) -> tuple[float, float, float]:
     along_m, height_m = 0.5 * (bay.left_m + bay.right_m), 0.5 * (bay.floor_m + bay.top_m)
     if bay.line is not None:
         return (*bay.line.point_at(along_m), height_m)
-    left, bottom, right, top = outline.rectangle_m
+    left, bottom, right, top = rectangle_m
     if bay.wall in ("west", "east"):
         return left if bay.wall == "west" else right, along_m, height_m
     return along_m, bottom if bay.wall == "south" else top, height_m

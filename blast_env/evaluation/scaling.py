@@ -14,10 +14,9 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.consequences import BuildingResponse, Consequences
 from blast_env.evaluation.places import bay_places
 from blast_env.particles.calibration.references import (
-    CURVES_SCALED_M,
     Quantity,
     burst_of,
-    kingery_bulmash,
+    within_curves,
 )
 from blast_env.response.facade import rescaled, respond
 from blast_env.site.scene import Charge
@@ -52,9 +51,7 @@ def load_factors(
 def _curve(
     quantity: Quantity, charge: Charge, distance_m: FloatArray, tnt_kg: FloatArray
 ) -> FloatArray:
-    low_m, high_m = (scaled * np.cbrt(tnt_kg) for scaled in CURVES_SCALED_M)
-    burst = burst_of(charge.height_m, charge.tnt_kg)
-    return kingery_bulmash(quantity, np.clip(distance_m, low_m, high_m), tnt_kg, burst)
+    return within_curves(quantity, distance_m, tnt_kg, burst_of(charge.height_m, charge.tnt_kg))
 
 
 def scaled_to(judged: Consequences, charge: Charge) -> Consequences:

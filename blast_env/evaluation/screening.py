@@ -12,12 +12,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, hypot
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.places import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
 from blast_env.layout.build_scene import build_site, worst_places
@@ -26,8 +27,8 @@ from blast_env.particles.calibration.references import (
     Burst,
     Quantity,
     burst_of,
-    kingery_bulmash,
-    oblique,
+    in_the_open,
+    within_curves,
 )
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue
@@ -38,7 +39,7 @@ from blast_env.response.requirements import Requirement
 from blast_env.response.walls import DamageLevel, Panel, PanelResponses, damage_level
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.presets import NamedMass
-from blast_env.site.scene import OUTWARDS, BlastSite, Charge
+from blast_env.site.scene import BlastSite, Charge
 from blast_env.site.sections import PointM
 from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M
@@ -358,19 +359,15 @@ class _Curves:
         self._tnt_kg = charge.tnt_kg
         self._burst: Burst = burst_of(charge.height_m, charge.tnt_kg)
         scale = float(np.cbrt(charge.tnt_kg))
-        self._ends_m = CURVES_SCALED_M[0] * scale, CURVES_SCALED_M[1] * scale
-        self.least_m, self.most_m = CHECKED_SCALED_DISTANCE[0] * scale, self._ends_m[1]
-
-    def at(self, quantity: Quantity, distance_m: FloatArray) -> FloatArray:
-        """Return a load at distances, or that at the nearer end of the curve."""
-        inside_m = np.clip(distance_m, *self._ends_m)
-        return kingery_bulmash(quantity, inside_m, self._tnt_kg, self._burst)
+        self.least_m = CHECKED_SCALED_DISTANCE[0] * scale
+        self.most_m = CURVES_SCALED_M[1] * scale
 
     @cached_property
     def reflected(self) -> FloatArray:
         """Distances, and the reflected peak and impulse there (3, distances)."""
         distances_m = np.geomspace(self.least_m, self.most_m, _DISTANCES)
-        return np.stack([distances_m, *(self.at(each, distances_m) for each in _REFLECTED)])
+        loads = (within_curves(n, distances_m, self._tnt_kg, self._burst) for n in _REFLECTED)
+        return np.stack([distances_m, *loads])
 
     def stand_off_m(self, part: Pane | Panel, level: LevelOfProtection) -> float:
         """Return the least of the distances at which a part allows a level."""
@@ -393,7 +390,7 @@ class _Curves:
 
 
 _REFLECTED: Final[tuple[Quantity, Quantity]] = ("reflected_overpressure", "reflected_impulse")
-_INCIDENT: Final[tuple[Quantity, Quantity]] = ("incident_overpressure", "incident_impulse")
+_QUANTITIES: Final[tuple[Literal["overpressure", "impulse"], ...]] = ("overpressure", "impulse")
 
 
 @dataclass(frozen=True, eq=False)
@@ -417,25 +414,9 @@ class _Facade:
         cls, scenario: Scenario, layout: Sequence[Element], bays: Sequence[FilledBay]
     ) -> "_Facade":
         """Return the bays that no structure covers."""
-        boxes = {each.name: each.rectangle_m for each in scenario.structures}
-        middles, outward = [], []
-        for bay in (each.bay for each in bays):
-            along_m = 0.5 * (bay.left_m + bay.right_m)
-            if bay.line is not None:
-                (x_m, y_m), normal = bay.line.point_at(along_m), bay.line.normal
-            else:
-                left, bottom, right, top = boxes[bay.structure]
-                normal = OUTWARDS[bay.wall]
-                x_m, y_m = {
-                    "west": (left, along_m),
-                    "east": (right, along_m),
-                    "south": (along_m, bottom),
-                    "north": (along_m, top),
-                }[bay.wall]
-            middles.append((x_m, y_m, 0.5 * (bay.floor_m + bay.top_m)))
-            outward.append((*normal, 0.0))
-        normals = np.array(outward)
-        before_m = np.array(middles) + MODULE_SIDE_M * normals
+        rectangles_m = {each.name: each.rectangle_m for each in scenario.structures}
+        middles_m, normals = bay_middles(rectangles_m, [each.bay for each in bays])
+        before_m = middles_m + MODULE_SIDE_M * normals
         site = replace(build_site(scenario, layout), charge=Charge((0.0, 0.0), 1.0))
         free = ~_covered(site, before_m)
         kept = tuple(bay for bay, is_free in zip(bays, free.tolist(), strict=True) if is_free)
@@ -477,11 +458,9 @@ class _Seen(NamedTuple):
 
     def loads(self, charge: Charge) -> Iterator[FloatArray]:
         """Yield the peak, Pa, and the impulse, Pa s, of a mass (places, bays)."""
-        curves = _Curves(charge)
-        for reflected, incident in zip(_REFLECTED, _INCIDENT, strict=True):
-            side_on = curves.at(incident, self.away_m)
-            met = oblique(curves.at(reflected, self.away_m), side_on, self.cosine)
-            yield np.where(self.seen, met, side_on)
+        burst = burst_of(charge.height_m, charge.tnt_kg)
+        for quantity in _QUANTITIES:
+            yield in_the_open(quantity, self.away_m, self.cosine, self.seen, charge.tnt_kg, burst)
 
 
 def _covered(site: BlastSite, points_m: FloatArray) -> BoolArray:

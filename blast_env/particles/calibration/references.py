@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, Literal, get_args, overload
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
+from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.particles.calibration.laws import Numbers, checked_array
 from blast_env.tables import Column
@@ -232,6 +232,42 @@ def oblique(reflected: FloatArray, incident: FloatArray, cosine: FloatArray) -> 
     return value
 
 
+def within_curves(
+    quantity: Quantity, distance_m: FloatArray, charge_kg: float | FloatArray, burst: Burst
+) -> FloatArray:
+    """Return `kingery_bulmash`, outside `CURVES_SCALED_M` with the value at the nearer end."""
+    low_m, high_m = (scaled * np.cbrt(charge_kg) for scaled in CURVES_SCALED_M)
+    return kingery_bulmash(quantity, np.clip(distance_m, low_m, high_m), charge_kg, burst)
+
+
+def in_the_open(
+    quantity: Literal["overpressure", "impulse"],
+    distance_m: FloatArray,
+    cosine: FloatArray,
+    seen: BoolArray,
+    charge_kg: float,
+    burst: Burst,
+) -> FloatArray:
+    """Return peaks or impulses on walls without obstacles, Pa or Pa s.
+
+    In sight of the charge they go by the angle of incidence (`oblique`); elsewhere they are those
+    of the incident wave at the same distance.
+
+    Args:
+        quantity: Peaks or impulses.
+        distance_m: Distances from the charge.
+        cosine: As for `oblique`.
+        seen: Whether the charge sees the place.
+        charge_kg: TNT-equivalent mass, above 0.
+        burst: As for `kingery_bulmash`.
+    """
+    names: tuple[Quantity, Quantity] = ("reflected_impulse", "incident_impulse")
+    if quantity == "overpressure":
+        names = "reflected_overpressure", "incident_overpressure"
+    reflected, incident = (within_curves(each, distance_m, charge_kg, burst) for each in names)
+    return np.where(seen, oblique(reflected, incident, cosine), incident)
+
+
 def largest_reflected_peak_pa(distance_m: FloatArray, charge_kg: float) -> FloatArray:
     """Return the reflected peak at normal incidence in the open, for a hemispherical burst, Pa.
 
@@ -243,9 +279,7 @@ def largest_reflected_peak_pa(distance_m: FloatArray, charge_kg: float) -> Float
         distance_m: Distances from the charge, above 0.
         charge_kg: TNT-equivalent mass, above 0.
     """
-    low_m, high_m = (scaled * np.cbrt(charge_kg) for scaled in CURVES_SCALED_M)
-    distance_m = np.clip(distance_m, low_m, high_m)
-    return kingery_bulmash("reflected_overpressure", distance_m, charge_kg)
+    return within_curves("reflected_overpressure", distance_m, charge_kg, "hemispherical")
 
 
 def scaled_distance(distance_m: float | Numbers, charge_kg: float | Numbers) -> FloatArray:
