@@ -137,7 +137,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/engineers/screening.md
     "blast-env assess site.toml --screen --glazing window_laminated_6 --wall brick_215"
-    " --mass backpack --gas --cells coarse": "--cells uniform --cell 1",
+    " --mass backpack --gas --cells coarse": "--cells uniform --cell 0.5",
     "python -m studies.response angles": "--width 12",
     # docs/researchers/training.md
     "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
@@ -240,6 +240,7 @@ NOT_RUN: Final[dict[str, str]] = {
     ),
     "python -m studies.surrogate calibrate --surrogate surrogate.json --device cuda"
     " --processes 5": ("an hour without a GPU; tests/design/test_surrogate.py"),
+    "python -m studies.real_files FOLDER": "FOLDER is a placeholder for maps of your own",
     "python -m studies.blast_table FOLDER --out blasts.parquet": (
         "FOLDER is a placeholder; tests/studies/test_blast_table.py"
     ),

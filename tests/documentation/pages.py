@@ -68,7 +68,8 @@ class Command:
             return self.words[1:] == ("-m", "blast_env")
         if len(self.words) == 2:
             return not self.words[1].startswith("-")
-        return self.words[2:] in (("--run",), ("--export",), ("--cluster",))
+        named = ("--run", "--export", "--cluster", "--screen", "--capacity")
+        return self.words[2:] in [(name,) for name in named]
 
     def __str__(self) -> str:
         return f"{self.page}: {' '.join(self.words)}"
