@@ -116,7 +116,8 @@ class BlastStore:
         """
         loads = self._loads.get(key)
         if loads is not None:
-            self._loads.move_to_end(key)
+            with suppress(KeyError):  # another thread has displaced it
+                self._loads.move_to_end(key)
             return loads
         loads = self.read(json.dumps(key), _decoded)
         if loads is None or not (scenario is None or loads.are_for(scenario)):
@@ -149,10 +150,11 @@ class BlastStore:
     def remember(self, key: BlastKey, loads: BlastLoads) -> None:
         """Keep the loads of a blast in memory only."""
         loads.module_impulse.flags.writeable = False  # shared by several callers
+        self._loads.pop(key, None)
         self._loads[key] = loads
-        self._loads.move_to_end(key)
-        if len(self._loads) > self.size:
-            self._loads.popitem(last=False)
+        with suppress(KeyError):  # another thread has displaced it
+            if len(self._loads) > self.size:
+                self._loads.popitem(last=False)
 
     def items(self) -> Iterator[tuple[BlastKey, BlastLoads]]:
         """Yield all undamaged blasts of the file, always in the same order; else those in memory.

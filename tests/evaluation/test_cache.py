@@ -1,5 +1,6 @@
 """The cache keeps what was asked for last, and no more than it may; what its keys tell apart."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,6 +66,20 @@ def test_every_part_of_the_key_counts(other: BlastKey) -> None:
     cache = filled(3, 1)
     assert cache.get(key(0)) is not None
     assert cache.get(other) is None
+
+
+def test_threads_share_a_cache_of_few_loads() -> None:
+    cache = filled(2, 2)
+
+    def use(seed: int) -> bool:
+        loads = BlastLoads((), np.array([float(seed)]))
+        cache.add(key(seed), loads)
+        found = cache.get(key(seed))
+        return found is None or found.module_impulse.tolist() == [float(seed)]
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(use, [number % 7 for number in range(2000)]))
+    assert len(cache) <= 2
 
 
 def test_a_cache_of_size_zero_keeps_nothing() -> None:
