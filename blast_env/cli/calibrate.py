@@ -33,7 +33,11 @@ from blast_env.values import plain_number
 if TYPE_CHECKING:  # takes a third of a second to import
     from matplotlib.figure import Figure
 
-    from blast_env.evaluation.free_field import CalibrationReport, FreeFieldStudy, Reference
+    from blast_env.particles.calibration.free_field import (
+        CalibrationReport,
+        FreeFieldStudy,
+        Reference,
+    )
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
 Burst = Literal["hemispherical", "spherical"]
@@ -81,8 +85,8 @@ def calibrate(
     resumes from there.
     """
     # Here, because pandas and SciPy take a third of a second to import.
-    from blast_env.evaluation.free_field import FreeFieldStudy
-    from blast_env.evaluation.free_field import calibrate as fit_laws
+    from blast_env.particles.calibration.free_field import FreeFieldStudy
+    from blast_env.particles.calibration.free_field import calibrate as fit_laws
 
     distances_m = _parse_numbers("--distances", distances)
     tnt_range_kg = _parse_range(tnt_range)
@@ -131,7 +135,10 @@ def _parse_range(text: str | None) -> tuple[float, float] | None:
 
 
 def _reference(name: ReferenceName, study: "FreeFieldStudy", burst: Burst) -> "Reference":
-    from blast_env.evaluation.free_field import kingery_bulmash_reference, paper_reference
+    from blast_env.particles.calibration.free_field import (
+        kingery_bulmash_reference,
+        paper_reference,
+    )
 
     if name == "paper_ufc":
         return paper_reference(study.distances_m)

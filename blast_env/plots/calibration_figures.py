@@ -13,7 +13,7 @@ from blast_env.calibration import (
     ScalingLaw,
     paper_table,
 )
-from blast_env.evaluation.free_field import CalibrationReport
+from blast_env.particles.calibration.free_field import CalibrationReport
 from blast_env.particles.calibration.model import SimulatedQuantity
 from blast_env.particles.paper import PAPER_LAWS
 from blast_env.plots.plan import INK

@@ -24,9 +24,9 @@ from blast_env.app.session import Sessions
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastStore
-from blast_env.evaluation.free_field import FreeFieldStudy
 from blast_env.files import is_temporary
 from blast_env.layout import write_layout
+from blast_env.particles.calibration.free_field import FreeFieldStudy
 from blast_env.site import load_scenario, save_scenario
 from blast_env.store import Store
 from tests.agents.training_runs import (

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Final, Literal
 
@@ -26,6 +25,7 @@ from blast_env.particles.calibration.model import (
     scenario_calibration,
 )
 from blast_env.particles.run import BallStates, BlastRun, CollisionArray, EndReason
+from blast_env.particles.start import VERSIONS, start_event, start_pymunk
 from blast_env.provenance import versions
 from blast_env.site import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.site.scene import Scene
@@ -101,13 +101,11 @@ class PymunkEngine(ParticleEngine):
     """Runs scenes on pymunk (Chipmunk): the reference of the paper's model."""
 
     name: str = "pymunk"
-    version: str = f"pymunk {version('pymunk')}"
+    version: str = VERSIONS["pymunk"]
 
     def start(self, scene: Scene) -> "PymunkRun":
         """Return a run of the scene in a new space."""
-        from blast_env.particles.pymunk.engine import PymunkRun  # loads a compiled library
-
-        return PymunkRun(scene)
+        return start_pymunk(scene)
 
 
 @dataclass(frozen=True)
@@ -121,14 +119,12 @@ class EventEngine(ParticleEngine):
     step_name: ClassVar[str] = "events"
 
     name: str = "event"
-    version: str = f"event 1 (numba {version('numba')})"
+    version: str = VERSIONS["event"]
     cell_units: float | None = None
 
     def start(self, scene: Scene) -> "EventRun":
         """Return a run of the scene at time 0."""
-        from blast_env.particles.event.engine import EventRun  # Numba takes half a second to import
-
-        return EventRun(scene, self.cell_units)
+        return start_event(scene, self.cell_units)
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:

@@ -11,14 +11,14 @@ from blast_env import Charge, load_scenario, simulate
 from blast_env.calibration import PowerLaw, paper_table, shape_rms_percent
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines import CALIBRATED_ENGINES
-from blast_env.evaluation.free_field import (
+from blast_env.geometry import Rectangle
+from blast_env.particles.calibration.free_field import (
     FreeFieldStudy,
     calibrate,
     free_field,
     kingery_bulmash_reference,
     paper_reference,
 )
-from blast_env.geometry import Rectangle
 from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,

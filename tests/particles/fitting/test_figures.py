@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario
-from blast_env.evaluation.free_field import (
+from blast_env.particles.calibration.free_field import (
     CalibrationReport,
     FreeFieldStudy,
     calibrate,

@@ -8,8 +8,8 @@ from scipy import stats
 
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import free_field as study_module
-from blast_env.evaluation.free_field import (
+from blast_env.particles.calibration import free_field as study_module
+from blast_env.particles.calibration.free_field import (
     FreeFieldStudy,
     impulse_by_seed,
     summarise,

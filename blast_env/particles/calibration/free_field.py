@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter
 from scipy.special import stdtrit
 
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import find_engine, simulate
+from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.layout.build_scene import build_scene
 from blast_env.particles.calibration.laws import (
     Fit,
     FitMetrics,
@@ -33,6 +33,7 @@ from blast_env.particles.calibration.model import (
     SimulatedQuantity,
 )
 from blast_env.particles.calibration.references import kingery_bulmash, paper_ufc_column
+from blast_env.particles.start import STARTS, VERSIONS
 from blast_env.provenance import package_version
 from blast_env.runner import as_completed
 from blast_env.site import Scenario, load_scenario
@@ -92,13 +93,15 @@ class FreeFieldStudy:
 
         Raises:
             BlastEnvError: If distances do not ascend or are missing, or seeds are repeated or
-                missing.
+                missing, or there is no particle engine of that name.
         """
         for before, after in zip(self.distances_m, self.distances_m[1:], strict=False):
             if not before < after:
                 raise BlastEnvError(
                     f"distances: {after:g} m follows {before:g} m, must be ascending, none twice"
                 )
+        if self.engine not in VERSIONS:
+            raise UnknownNameError("engine", self.engine, VERSIONS)
         if not self.distances_m:
             raise BlastEnvError("distances: there are none, must be at least one")
         if not self.seeds or len(set(self.seeds)) < len(self.seeds):
@@ -124,9 +127,12 @@ class FreeFieldStudy:
         Raises:
             BlastEnvError: If the store is damaged or cannot be written.
         """
-        version = find_engine(self.engine).version
         wanted = {
-            f"{scenario.content_hash} {seed} {self.engine} {version}": (scenario, distance_m, seed)
+            f"{scenario.content_hash} {seed} {self.engine} {VERSIONS[self.engine]}": (
+                scenario,
+                distance_m,
+                seed,
+            )
             for distance_m in self.distances_m
             for scenario in (self.scenario.at_stand_off(distance_m),)
             for seed in self.seeds
@@ -202,8 +208,10 @@ def summarise(runs: pd.DataFrame, simulated: SimulatedQuantity = "impulse") -> p
 def _run_one(job: tuple[str, Scenario, float, int, str]) -> FreeFieldRun:
     """Run one blast, in a worker process."""
     key, scenario, distance_m, seed, engine = job
-    result = simulate(scenario, seed=seed, engine=engine)
-    (structure,) = result.obstacles
+    run = STARTS[engine](build_scene(scenario, (), seed))
+    while run.end_reason is None:
+        run.advance(np.inf)
+    (structure,) = run.obstacles
     return FreeFieldRun(
         key=key,
         distance_m=distance_m,
@@ -324,7 +332,7 @@ class CalibrationReport:
             preset=study.scenario.simulation.preset,
             parameters_digest=parameters_digest(study.scenario.parameters, study.engine),
             engine=study.engine,
-            engine_version=find_engine(study.engine).version,
+            engine_version=VERSIONS[study.engine],
             blast_env_version=package_version(),
             facade_width_m=structure.rectangle_m.top - structure.rectangle_m.bottom,
             ball_radius_m=study.scenario.parameters.air.radius_units / UNITS_PER_M,
