@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import typer
 
 from blast_env.cli.command import writes
-from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, running_on
+from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, numbers, running_on
 from blast_env.cli.output import (
     print_line,
     print_table,
@@ -128,10 +128,10 @@ def _parse_numbers(option: str, text: str) -> tuple[float, ...]:
 def _parse_range(text: str | None) -> tuple[float, float] | None:
     if text is None:
         return None
-    numbers = _parse_numbers("--tnt-range", text)
-    if len(numbers) != 2 or not 0.0 < numbers[0] <= numbers[1]:
+    low, high = numbers("--tnt-range", text, "LOW,HIGH")
+    if not 0.0 < low <= high:
         raise BlastEnvError(f"--tnt-range is {text!r}, must be LOW,HIGH in kg, e.g. 20,1000")
-    return numbers[0], numbers[1]
+    return low, high
 
 
 def _reference(name: ReferenceName, study: "FreeFieldStudy", burst: Burst) -> "Reference":

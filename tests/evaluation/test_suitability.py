@@ -1,4 +1,4 @@
-"""What `validate` says of a scenario that is sound."""
+"""Uses and limits of a sound scenario, as `draw` prints them."""
 
 import pytest
 
