@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
@@ -225,6 +225,31 @@ class ThreatOutcome:
     unprotected_load: float
     in_range: bool
 
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        layout: Layout,
+        threat: LoadCase,
+        loads: BlastLoads,
+        unprotected: BlastLoads,
+    ) -> Self:
+        """Return the outcome of a threat from its loads with a layout and without a barrier."""
+        charge, elsewhere = (threat.charge_against(scenario, each) for each in (layout, ()))
+        return cls(
+            threat=threat,
+            charge=charge,
+            stand_off_m=stand_off_m(scenario.structures, charge.position_m),
+            unprotected_stand_off_m=stand_off_m(scenario.structures, elsewhere.position_m),
+            impulse_pa_s=loads.protected_impulse_pa_s,
+            unprotected_impulse_pa_s=unprotected.protected_impulse_pa_s,
+            peak_pa=loads.protected_peak_pa,
+            unprotected_peak_pa=unprotected.protected_peak_pa,
+            load=loads.load(scenario.objective),
+            unprotected_load=unprotected.load(scenario.objective),
+            in_range=loads.in_range,
+        )
+
     @property
     def reduction(self) -> float:
         """Relative reduction of the load; NaN if the load without a barrier is 0."""
@@ -278,26 +303,8 @@ class LayoutEvaluation(Evaluation):
     @cached_property
     def outcomes(self) -> tuple[ThreatOutcome, ...]:
         """The loads under each threat."""
-        return tuple(map(self._outcome, self.threats, self.blasts, self.unprotected_blasts))
-
-    def _outcome(self, threat: LoadCase, load: BlastLoads, bare: BlastLoads) -> ThreatOutcome:
-        scenario = self.scenario
-        charge, unprotected = (
-            threat.charge_against(scenario, layout) for layout in (self.layout, ())
-        )
-        return ThreatOutcome(
-            threat=threat,
-            charge=charge,
-            stand_off_m=stand_off_m(scenario.structures, charge.position_m),
-            unprotected_stand_off_m=stand_off_m(scenario.structures, unprotected.position_m),
-            impulse_pa_s=load.protected_impulse_pa_s,
-            unprotected_impulse_pa_s=bare.protected_impulse_pa_s,
-            peak_pa=load.protected_peak_pa,
-            unprotected_peak_pa=bare.protected_peak_pa,
-            load=load.load(scenario.objective),
-            unprotected_load=bare.load(scenario.objective),
-            in_range=load.in_range,
-        )
+        of = partial(ThreatOutcome.of, self.scenario, self.layout)
+        return tuple(map(of, self.threats, self.blasts, self.unprotected_blasts))
 
     @property
     def load(self) -> float:

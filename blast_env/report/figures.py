@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.evaluation import LoadCase
+from blast_env.evaluation import LoadCase, ThreatOutcome
 from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout
 from blast_env.plots.facade import damage_view, facade_picture
@@ -38,7 +38,7 @@ from blast_env.plots.site_plan import (
 )
 from blast_env.plots.style import count_of, render_extra, unit_interval
 from blast_env.report.loads import MeasuredBlast, ReportedBuilding, UnitSystem
-from blast_env.report.outcomes import FrontPoint, ItemWorth, Outcome
+from blast_env.report.outcomes import FrontPoint, ItemWorth
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.site.worst_places import nearest_point_m
@@ -265,7 +265,7 @@ def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     return png(figure)
 
 
-def mass_figure(masses: dict[str, tuple[Outcome, ...]], units: UnitSystem) -> bytes:
+def mass_figure(masses: dict[str, tuple[ThreatOutcome, ...]], units: UnitSystem) -> bytes:
     """Return impulses without and with the layout for other masses, one panel per threat."""
     figure = Figure(figsize=(_WIDTH_IN, 3.2), layout="constrained")
     panels = figure.subplots(1, len(masses), squeeze=False, sharey=True)[0]
@@ -277,21 +277,21 @@ def mass_figure(masses: dict[str, tuple[Outcome, ...]], units: UnitSystem) -> by
     return png(figure)
 
 
-def _bars(axes: Axes, outcomes: Sequence[Outcome], units: UnitSystem) -> None:
+def _bars(axes: Axes, outcomes: Sequence[ThreatOutcome], units: UnitSystem) -> None:
     place = np.arange(len(outcomes))
     for shift, colour, label, values in (
-        (-0.2, _BARE, "no barrier", [each.bare_pa_s for each in outcomes]),
-        (0.2, _WALLED, "layout", [each.walled_pa_s for each in outcomes]),
+        (-0.2, _BARE, "no barrier", [each.unprotected_load for each in outcomes]),
+        (0.2, _WALLED, "layout", [each.load for each in outcomes]),
     ):
         heights = np.array(values) / units.pa_s_per_impulse
         axes.bar(place + shift, heights, 0.38, color=colour, label=label)
-    axes.set_xticks(place, [each.name for each in outcomes], fontsize=8)
+    axes.set_xticks(place, [each.threat.name for each in outcomes], fontsize=8)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", alpha=0.25)
 
 
 def place_figure(
-    scenario: Scenario, charges: Sequence[Charge], outcomes: Sequence[Outcome]
+    scenario: Scenario, charges: Sequence[Charge], outcomes: Sequence[ThreatOutcome]
 ) -> bytes:
     """Return the plan with the reduction for charges at other places.
 

@@ -137,28 +137,6 @@ class LoadErrors:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The weighted impulse on the protected structures under one charge or layout.
-
-    Attributes:
-        name: Name of the charge, or of the layout.
-        words: Further words on it.
-        bare_pa_s: Impulse without the layout.
-        walled_pa_s: Impulse with it.
-    """
-
-    name: str
-    words: str
-    bare_pa_s: float
-    walled_pa_s: float
-
-    @property
-    def reduction(self) -> float:
-        """Share of the impulse that is gone; NaN if there is none."""
-        return reductions(self.walled_pa_s, self.bare_pa_s).item()
-
-
-@dataclass(frozen=True)
 class ItemWorth:
     """The worth of one module or piece of the layout.
 

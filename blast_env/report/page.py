@@ -450,7 +450,7 @@ def _front(study: Study) -> bytes:
     """Return the figure of the front with the layout of the report, on the same cells."""
     weighted = []
     for threat in study.threats:
-        outcomes = {each.name: each for each in study.masses[threat.name]}
+        outcomes = {each.threat.name: each for each in study.masses[threat.name]}
         own = outcomes.get(f"{threat.charge.tnt_kg:g} kg")
         if own is not None:
             weighted.append(own.reduction)

@@ -12,7 +12,7 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.documents import parse_csv, read_text
 from blast_env.errors import BlastEnvError, shortened
-from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, ThreatOutcome
 from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.governing import Severity
@@ -46,7 +46,6 @@ from blast_env.report.outcomes import (
     Limit,
     LoadErrors,
     LoadPair,
-    Outcome,
     check_limits,
 )
 from blast_env.report.threats import (
@@ -200,8 +199,8 @@ class Study:
     pictures: dict[str, tuple[Picture, ...]]
     stills: tuple[Picture, ...]
     items: tuple[ItemWorth, ...]
-    masses: dict[str, tuple[Outcome, ...]]
-    places: tuple[Outcome, ...]
+    masses: dict[str, tuple[ThreatOutcome, ...]]
+    places: tuple[ThreatOutcome, ...]
     front: tuple[FrontPoint, ...]
     notes: tuple[str, ...]
     left_out: tuple[str, ...]
@@ -286,10 +285,10 @@ def run_study(
     front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, asked, progress)
-    masses: dict[str, tuple[Outcome, ...]] = {}
+    masses: dict[str, tuple[ThreatOutcome, ...]] = {}
     left_out: tuple[str, ...] = ()
     items: tuple[ItemWorth, ...] = ()
-    places: tuple[Outcome, ...] = ()
+    places: tuple[ThreatOutcome, ...] = ()
     points: tuple[FrontPoint, ...] = ()
     part = options.words[1]
     try:
@@ -570,7 +569,7 @@ class Runs:
         moments_s = np.linspace(0.5 * arrival_s, last_s, self.options.stills)
         return [float(moment_s) for moment_s in moments_s]
 
-    def other_masses(self) -> tuple[dict[str, tuple[Outcome, ...]], tuple[str, ...]]:
+    def other_masses(self) -> tuple[dict[str, tuple[ThreatOutcome, ...]], tuple[str, ...]]:
         """Return the outcomes of every threat with other masses, and notes on those left out."""
         found, left_out = {}, []
         for threat in self.threats:
@@ -581,7 +580,7 @@ class Runs:
             found[threat.name] = self._outcomes(f"{threat.name}, {_MASSES_PART}", ordered)
         return found, tuple(left_out)
 
-    def other_places(self) -> tuple[Outcome, ...]:
+    def other_places(self) -> tuple[ThreatOutcome, ...]:
         """Return the outcomes of the charges at other places."""
         places = other_places(self.scenario, self.options.places)
         return self._outcomes(_PLACES, places)
@@ -618,11 +617,11 @@ class Runs:
             self._evaluator.keep(*asked[index], blast.loads)
             self.progress(_PLACES, done / len(work))
 
-    def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[Outcome, ...]:
-        impulses = self._loads(label, self._layouts, charges)
+    def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[ThreatOutcome, ...]:
+        loads = self._blasts(label, self._layouts, charges)
+        bare, walled = loads[: len(charges)], loads[len(charges) :]
         return tuple(
-            Outcome(each.name, each.why, float(bare), float(walled))
-            for each, (bare, walled) in zip(charges, impulses.T, strict=True)
+            map(partial(ThreatOutcome.of, self.scenario, self.layout), charges, walled, bare)
         )
 
     def item_worths(self) -> tuple[ItemWorth, ...]:

@@ -112,8 +112,8 @@ def test_vehicles_outcomes_are_those_of_the_places_that_it_reaches() -> None:
         GasBlast(site, layout, charge=Charge((x_m, 4.0), 5.0)).run().impulse("hut").pa_s
         for layout, x_m in (((), 9.0), (POSTS, 3.0))
     )
-    assert outcome.bare_pa_s == pytest.approx(near)
-    assert outcome.walled_pa_s == pytest.approx(far)
+    assert outcome.unprotected_load == pytest.approx(near)
+    assert outcome.load == pytest.approx(far)
 
 
 def test_masses_that_the_scenario_cannot_have_are_left_out_by_name() -> None:

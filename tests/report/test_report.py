@@ -130,11 +130,11 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
 
 def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: Study) -> None:
     outcomes = study.masses["T1"]
-    assert [each.name for each in outcomes] == ["2.5 kg", "5 kg", "10 kg"]
-    bare = [each.bare_pa_s for each in outcomes]
+    assert [each.threat.name for each in outcomes] == ["2.5 kg", "5 kg", "10 kg"]
+    bare = [each.unprotected_load for each in outcomes]
     assert bare == sorted(bare)
     (place,) = study.places
-    assert place.walled_pa_s == outcomes[1].walled_pa_s
+    assert place.load == outcomes[1].load
     (point,) = study.front
     assert point.layout == ((2, 0), (3, 0))
     assert point.cost == 2.0
