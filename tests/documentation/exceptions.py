@@ -181,17 +181,17 @@ SMALLER: Final[dict[str, str]] = {
     # docs/paper
     # docs/researchers
     "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
-    " --envs 1 --steps 300 --set cases=1 --set cases_per_round=1 --set samples=4"
-    " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=300"
-    " --set updates=60 --set evaluation_interval=4 --set evaluation_cases=2 --run out/hotel": (
-        "--steps 20 --set first_updates=3 --set updates=2"
+    " --run out/hotel": (
+        "--steps 20 --envs 1 --set cases=1 --set cases_per_round=1 --set samples=4"
+        " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=3"
+        " --set updates=2 --set evaluation_interval=4 --set evaluation_cases=2"
     ),
     "python -m studies.surrogate fit --data docs/data/close_site_blasts.parquet"
     " --data out/hotel.parquet --out out/hotel.json": "--epochs 1",
     "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
-    " --threat hidden --envs 1 --steps 12288 --start-from out/hotel --set hidden_threats=2"
-    " --set learning_rate=5.0e-4 --set n_steps=512 --set evaluation_interval=8"
-    " --set evaluation_cases=2 --run out/hotel_ppo": _TRAIN,
+    " --threat hidden --start-from out/hotel --run out/hotel_ppo": (
+        f"{_TRAIN} --set hidden_threats=2"
+    ),
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5,12 --out out/search": (
         "--budget 8 --held-out 1"
     ),
