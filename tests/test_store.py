@@ -5,6 +5,8 @@ import pickle
 import sqlite3
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from itertools import count
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -156,3 +158,32 @@ def test_a_forked_process_opens_its_own_connection(tmp_path: Path) -> None:
     assert process.exitcode == 0
     store.put("parent", b"2")
     assert (store.get("child"), store.get("parent"), len(store)) == (b"1", b"2", 5)
+
+
+def _put_for_ever(store: Store, pipe: Connection) -> None:
+    for number in count():
+        store.put(str(number), bytes([number % 256]) * 3000)
+        pipe.send(number)
+
+
+@FORKING
+def test_a_killed_process_leaves_all_that_it_had_put_and_nothing_half_written(
+    tmp_path: Path,
+) -> None:
+    for most in (1, 17, 60):
+        store = Store(tmp_path / str(most))
+        receiver, sender = multiprocessing.Pipe(duplex=False)
+        process = multiprocessing.get_context("fork").Process(
+            target=_put_for_ever, args=(store, sender)
+        )
+        process.start()
+        last = 0
+        while last < most:
+            last = receiver.recv()
+        process.kill()
+        process.join()
+        while receiver.poll():
+            last = receiver.recv()
+        for number in range(last + 1):
+            assert store.get(str(number)) == bytes([number % 256]) * 3000
+        assert (len(store) - last, store.damaged) in ((1, 0), (2, 0))
