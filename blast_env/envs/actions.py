@@ -81,28 +81,15 @@ class RowAcrossSight:
     place of the charge to the protected structures. There are as many rows as the shorter side of
     the zone has cells. The same action again and again thus builds a straight wall, from the line
     of sight outwards. Little has to be learnt, but not every layout can be built.
-
-    Attributes:
-        parts: Number of parts of equal length of which each row consists; the action names one.
-
-    Raises:
-        BlastEnvError: If it is less than 1.
     """
-
-    parts: int = 1
-
-    def __post_init__(self) -> None:
-        whole_number("parts", self.parts, 1, 1000)
 
     def choices(self, scenario: Scenario) -> tuple[IntArray, ...]:
         """Return the only choice."""
         catalogue = scenario.zone.catalogue
         variant, *cells = np.indices((len(catalogue.variants), *catalogue.shape))
-        across = int(_sight(scenario, scenario.charge).is_along_x)
+        axis = int(_sight(scenario, scenario.charge).is_along_x)
         count = min(catalogue.shape)
-        row = cells[across] * count // max(catalogue.shape[across], 1)
-        part = cells[1 - across] * self.parts // max(catalogue.shape[1 - across], 1)
-        return ((variant * count + row) * self.parts + part,)
+        return (variant * count + cells[axis] * count // max(catalogue.shape[axis], 1),)
 
 
 @dataclass(frozen=True)
@@ -157,7 +144,6 @@ ACTIONS: Final[Mapping[str, Actions]] = MappingProxyType(
         "item_then_place": ItemThenPlace(),
         "item_then_block": ItemThenPlace(block_cells=8),
         "row": RowAcrossSight(),
-        "half_row": RowAcrossSight(parts=2),
     }
 )
 """The action spaces, by their names."""

@@ -61,7 +61,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     action finishes. `action_masks()` has the legal ones, `explain(element)` why a placement is not
     legal. With `action="item_then_place"` or `"item_then_block"` the variant comes before the cell.
     `action="row"` has few actions: a variant and a row across the line of sight, whose legal place
-    nearest to the line is taken; `"half_row"` takes that of a half of the row.
+    nearest to the line is taken.
     An illegal action places the same item on the nearest legal cell (`invalid_action="nearest"`).
 
     ## Observation space
@@ -146,8 +146,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
             observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts per charge),
                 `"features"`, or an `Observation`.
-            action: `"place"`, `"item_then_place"`, `"item_then_block"`, `"row"`, `"half_row"`, or
-                `Actions`.
+            action: `"place"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: Number of hidden charges per episode; default 16.
             realisations: Number of blasts per charge; default 2 for a visible charge, 1 for

@@ -54,7 +54,7 @@ def actions_for(actions: NumberedActions, placement: Placement, element: Element
 
 
 def test_there_are_as_many_actions_as_items_and_places() -> None:
-    counts = [4 * 84, 4 + 84, 4 + 2 + 48, 4 * 6, 4 * 6 * 2]
+    counts = [4 * 84, 4 + 84, 4 + 2 + 48, 4 * 6]
     assert [numbered(name, yard()).finish for name in ACTIONS] == counts
     assert yard_env(action="item_then_place").action_space == gym.spaces.Discrete(4 + 84 + 1)
     zone = yard().zone.model_copy(update={"rows": 112, "columns": 43})
@@ -64,10 +64,9 @@ def test_there_are_as_many_actions_as_items_and_places() -> None:
         4 + 4816,
         4 + 14 * 6 + 64,
         4 * 43,
-        4 * 43 * 2,
     ]
     # Without a catalogue there is no item to choose, and 8 x 5 cells are one block.
-    assert [numbered(name, small_scenario()).finish for name in ACTIONS] == [40, 40, 40, 5, 10]
+    assert [numbered(name, small_scenario()).finish for name in ACTIONS] == [40, 40, 40, 5]
 
 
 @pytest.mark.parametrize("scenario", [yard(), glazed_yard(), small_scenario()])
@@ -160,7 +159,7 @@ def test_a_measure_needs_no_place() -> None:
     )
 
 
-@pytest.mark.parametrize("name", [*BY_CHOICE, "half_row"])
+@pytest.mark.parametrize("name", [*BY_CHOICE, "row"])
 def test_it_is_a_sound_environment(name: str) -> None:
     env = make(action=name, observation="features")
     check_env(env, skip_render_check=True)
@@ -196,14 +195,6 @@ def test_the_same_row_again_builds_a_straight_wall_from_the_line_of_sight_outwar
         assert abs(rows[1] - rows[0]) == abs(rows[2] - rows[0]) == 1
         first.append(rows[0])
     assert first[1] < first[0]  # the line of sight has turned with the charge
-
-
-def test_a_half_of_a_row_is_filled_before_the_line_of_sight_is_crossed() -> None:
-    env = make(blocks_scenario(stock=6), action="half_row", observation="features")
-    env.reset(seed=0, options={"charge_position_m": (3.0, 9.0)})
-    for _ in range(5):
-        env.step(2 * 2 + 1)  # the upper half of the third row
-    assert sorted(env.placement.cells) == [(row, 2) for row in range(7, 12)]
 
 
 def test_a_row_of_pieces_has_no_gap() -> None:
