@@ -66,6 +66,8 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         if arguments.get("cache") is None:
             arguments["cache"] = BlastStore(size=_LOADS_EACH * self.num_envs)
         self.one = BlastBarrierEnv(**arguments)
+        evaluators = self.one.task.evaluators
+        evaluators.most = max(evaluators.most, self.num_envs)  # a site of its own each
         self.single_action_space = self.one.action_space
         self.single_observation_space = self.one.observation_space
         self.action_space = batch_space(self.single_action_space, self.num_envs)

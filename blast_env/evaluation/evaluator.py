@@ -253,6 +253,7 @@ class Evaluators:
 
     Attributes:
         engine: The engine.
+        most: Maximum number of evaluators.
 
     Raises:
         BlastEnvError: If the cache is not usable.
@@ -266,7 +267,7 @@ class Evaluators:
         most: int = _MOST_EVALUATORS,
     ) -> None:
         self.engine = find_engine(engine)
-        self._most = most
+        self.most = most
         self._store = BlastStore.of(cache)
         self._kept: OrderedDict[str, BlastEvaluator] = OrderedDict()
         self._gone_blasts = 0
@@ -291,7 +292,7 @@ class Evaluators:
     def coarser(self) -> "Evaluators | None":
         """Return evaluators with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
-        return None if engine is None else Evaluators(engine, self._store, self._most)
+        return None if engine is None else Evaluators(engine, self._store, self.most)
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
         """Return the evaluator of a scenario.
@@ -312,7 +313,7 @@ class Evaluators:
         if key not in self._kept:
             self._kept[key] = BlastEvaluator(found, self.engine, cache=self._store)
         self._kept.move_to_end(key)
-        if len(self._kept) > self._most:
+        if len(self._kept) > self.most:
             _, gone = self._kept.popitem(last=False)
             self._gone_blasts += gone.blasts
             self._gone_cache_hits += gone.cache_hits
