@@ -66,12 +66,10 @@ def _figures_are_laid_out_in_no_time() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="package")
-def laid_out() -> Iterator[None]:
+@pytest.fixture
+def laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lay figures out: for tests that look at where things come to lie."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ConstrainedLayoutEngine, "execute", LAY_OUT)
-        yield
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", LAY_OUT)
 
 
 @pytest.fixture(scope="package")

@@ -4,11 +4,6 @@ from blast_env.evaluation.engines import Blast, BlastResult
 from tests.plots.scenes import small_blast
 
 
-@pytest.fixture(autouse=True, scope="package")
-def _laid_out(laid_out: None) -> None:
-    """Lay all figures of these tests out."""
-
-
 @pytest.fixture(scope="session")
 def blast() -> Blast:
     return small_blast()

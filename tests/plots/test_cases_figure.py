@@ -130,6 +130,7 @@ def test_different_sites_have_their_names_and_their_own_scales(tmp_path: Path) -
     assert save_figure(figure, tmp_path / "cases.png").stat().st_size > 10_000
 
 
+@pytest.mark.usefixtures("laid_out")
 @pytest.mark.parametrize("count", [1, 2, 12])
 def test_no_text_covers_another_or_leaves_the_page(count: int) -> None:
     """Long names and masses: what a panel says stays within its own column."""

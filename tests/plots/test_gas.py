@@ -112,6 +112,7 @@ def test_the_ground_has_what_gauges_have(bare: GasResult) -> None:
         assert ground_values(bare, "peak")[x, y] == pytest.approx(row["peak_pa"], rel=0.03)
 
 
+@pytest.mark.usefixtures("laid_out")
 @pytest.mark.parametrize(
     ("quantity", "factor", "label"),
     [
@@ -162,6 +163,7 @@ def test_solids_are_no_ground(walled: GasResult) -> None:
     assert np.isnan(values[6:10, 12:16]).all()
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_a_map_names_what_stands_and_numbers_contours(walled: GasResult) -> None:
     figure = ground_map(walled, "impulse")
     words = {text.get_text() for text in figure.axes[0].texts}
@@ -192,6 +194,7 @@ def test_only_the_same_charge_can_stand_beside(bare: GasResult) -> None:
 # Facades.
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_walls_show_the_loads_on_their_faces(walled: GasResult) -> None:
     figure = facades(walled, "hut", "peak")
     images = images_of(figure)
@@ -232,6 +235,7 @@ def test_neighbouring_walls_share_a_corner(walled: GasResult) -> None:
     assert ends == [(5.0, 3.0), (6.0, 8.0), (3.0, 5.0), (8.0, 6.0)]
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_walls_with_and_without_a_barrier_have_one_scale(
     bare: GasResult, walled: GasResult
 ) -> None:
@@ -279,6 +283,7 @@ def test_a_wall_that_does_not_count_says_so(bare: GasResult) -> None:
 # Gauges.
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_a_history_ends_at_the_impulse_of_its_gauge(bare: GasResult, walled: GasResult) -> None:
     figure = gauge_history(walled, "behind", beside=bare)
     upper, lower = figure.axes
@@ -340,6 +345,7 @@ def test_colours_are_those_of_the_scale(shots: list[PressureShot]) -> None:
     assert painter.sheet.figure.axes[-1].get_xlabel().startswith("overpressure (kPa)")
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_frames_show_front_wall_and_time(shots: list[PressureShot]) -> None:
     painter = PressurePainter(shots, 200.0, 960)
     start, later = (painter.paint(time_s, "slow").astype(int) for time_s in (0.0, 0.006))

@@ -113,6 +113,7 @@ def test_charges_of_a_street_share_a_label_and_no_name_lies_on_another_building(
     assert float(x) - 60.0 > view.pixel(35.0, 0.0)[0]
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_no_label_of_a_crowded_site_lies_on_another_in_a_figure() -> None:
     figure = site_picture(office_park())
     figure.draw_without_rendering()

@@ -243,6 +243,7 @@ def test_the_command_draws_a_layout_from_a_file(tmp_path: Path) -> None:
     assert "no corner 'up'" in result.output
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_a_high_building_at_the_back_is_drawn_whole() -> None:
     """Its roof is the highest thing in the picture, and no name lies on a star."""
     figure = site_picture("hotel_forecourt")
