@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from blast_env import load_scenario
-from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.particles.parquet import read_frame, write_table
 from blast_env.site.scene import Charge
 from studies import blast_again
@@ -51,11 +51,12 @@ def test_the_new_table_has_the_loads_of_the_present_engine(
     """And a second call runs nothing."""
     table = tmp_path / "old_blasts.parquet"
     write_table(rows(["[]"]), COLUMNS, {}, table)
-    blast_again.main([table], tmp_path / "again", processes=1)
+    blast_again.main([table], tmp_path / "again", cells="coarse", processes=1)
     found = read_frame(tmp_path / "again" / table.name, COLUMNS)
-    blast = GasBlast(load_scenario(SITE), charge=Charge((10.0, 3.0), 20.0))
+    engine = GasEngine(cells="coarse")
+    blast = GasBlast(load_scenario(SITE), engine=engine, charge=Charge((10.0, 3.0), 20.0))
     loads = {each.name: each.impulse_pa_s for each in blast.run().loads().structures}
     assert dict(zip(found["structure"], found["impulse_pa_s"], strict=True)) == loads
     assert set(found["scenario"]) == {SITE}
     monkeypatch.setattr(GasBlast, "run", None)
-    blast_again.main([table], tmp_path / "again", processes=1)
+    blast_again.main([table], tmp_path / "again", cells="coarse", processes=1)

@@ -43,8 +43,8 @@ def test_it_trains_compares_and_films(tmp_path: Path) -> None:
         blasted=1,
         masses_kg=(0.5, 2.0),
         processes=1,
-        film_width_px=640,
-        frames_per_s=2.0,
+        film_width_px=480,
+        frames_per_s=0.5,
     )
     with redirect_stdout(StringIO()) as output:
         comparison = demonstrate(settings)
