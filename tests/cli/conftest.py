@@ -1,8 +1,23 @@
 """Settings for the tests of commands."""
 
+from collections.abc import Iterator
+from functools import partial
+
 import pytest
+
+from blast_env.cli import advise, assessment
+from blast_env.evaluation.probability import level_probability
 
 
 @pytest.fixture(scope="package", autouse=True)
 def _undrawn(undrawn: None) -> None:
     """Leave the figures of these tests empty, unless one asks for `drawn`."""
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _probabilities_of_few_draws() -> Iterator[None]:
+    """Draw a tenth of what commands draw."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (advise, assessment):
+            patch.setattr(module, "level_probability", partial(level_probability, draws=100))
+        yield

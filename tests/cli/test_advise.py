@@ -79,12 +79,12 @@ def test_the_verdict_comes_first_and_the_best_layout_is_written(tmp_path: Path) 
     site, out = tmp_path / "yard.toml", tmp_path / "best.json"
     blast_env.save_scenario(glazed_yard(charges="mean"), site)
     picture = tmp_path / "cost.svg"
-    options = ("--tnt-kg", "1", "--budget", "3", "--judge-cell", "0.5")
+    options = ("--tnt-kg", "1", "--budget", "2", "--rounds", "2", "--judge-cell", "0.5")
     files = ("--out", out, "--picture", picture)
     text = run(site, *options, *files, "--target", "low", "--budget-cost", "15")
     first, cost, verdict = text.splitlines()[:3]
-    assert cost.startswith("up to 48 blasts of gas")  # 4 kinds, 3 searches of 3, each judged once
-    assert first.startswith("4 kinds, at most 3 searches of 3 blasts each, gas, cells of 0.5 m; ")
+    assert cost.startswith("up to 24 blasts of gas")  # 4 kinds, 2 searches of 2, each judged once
+    assert first.startswith("4 kinds, at most 2 searches of 2 blasts each, gas, cells of 0.5 m; ")
     assert first.endswith("each result is judged with 1, gas, cells of 0.5 m")
     assert "walled_yard" in verdict
     assert all(

@@ -1,7 +1,7 @@
 """One small study for all tests of reports: a hut and a wall, a second or two a blast."""
 
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 
 import pytest
 
@@ -12,9 +12,9 @@ from tests.report.sites import LAYOUT, glazed_hut
 
 @pytest.fixture(scope="package", autouse=True)
 def _probabilities_are_drawn_once() -> Iterator[None]:
-    """Many pages show one study."""
+    """And a tenth of the draws: many pages show one study."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "level_probability", cache(level_probability))
+        patch.setattr(page, "level_probability", cache(partial(level_probability, draws=100)))
         yield
 
 

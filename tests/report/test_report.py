@@ -459,9 +459,8 @@ def test_measures_are_in_the_bill_without_sizes(study: Study) -> None:
 
 
 @pytest.mark.usefixtures("_without_pictures")
-@pytest.mark.parametrize("items", [False, True])
 def test_the_blasts_that_are_counted_before_are_those_that_are_run(
-    study: Study, items: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each part that is told of is one that was counted, and no blast runs twice."""
     told: list[str] = []
@@ -475,7 +474,7 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
         return run(self, *arguments)
 
     monkeypatch.setattr(GasBlast, "run", counted_run)
-    options = replace(study.options, front=None, items=items, stills=0, cache=tmp_path)
+    options = replace(study.options, front=None, stills=0, cache=tmp_path)
     run_study(small_hut(), LAYOUT, options, lambda label, _: told.append(label))
     parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
     assert set(told) == {each.label for each in parts if each.charges}
