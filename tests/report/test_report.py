@@ -479,7 +479,9 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
     assert set(told) == {each.label for each in parts if each.charges}
     assert Counter(charges) == Counter(charge for each in parts for charge in each.charges)
-    assert len(charges) == len(set(blasts)) == 4 + 4 + (len(LAYOUT) if items else 0)
+    assert len(charges) == len(set(blasts)) == 4 + 4 + len(LAYOUT)
+    fewer = blasts_of(small_hut(), LAYOUT, replace(options, items=False), study.threats)
+    assert sum(len(each.charges) for each in fewer) == 4 + 4
 
     threat = LoadCase(study.threats[0].charge, 0)
     kept = BlastEvaluator(small_hut(), options.coarse, cache=tmp_path)
