@@ -51,19 +51,20 @@ def trained(algorithm: str, action: str, steps: int, seed: int) -> Agent:
     return agent
 
 
-def reductions(env: BlastBarrierEnv, agent: Agent | None, seeds: Sequence[int]) -> FloatArray:
-    """Return the reduction in each held-out episode by an agent, or by random legal actions."""
+def reductions(env: BlastBarrierEnv, agent: Agent | int | None, seeds: Sequence[int]) -> FloatArray:
+    """Return the reduction in each episode by an agent, an action, or random legal actions."""
     found, rng = [], np.random.default_rng(0)
     for seed in seeds:
         observation, info = env.reset(seed=seed)
         ended = False
         while not ended:
+            action: Any = agent
             if agent is None:
                 action = rng.choice(np.flatnonzero(info["action_mask"]))
             elif isinstance(agent, MaskablePPO):
                 masks = env.action_masks()
                 action, _ = agent.predict(observation, deterministic=True, action_masks=masks)
-            else:
+            elif isinstance(agent, PPO):
                 action, _ = agent.predict(observation, deterministic=True)
             observation, _, ended, _, info = env.step(np.int64(action))
         found.append(info["reduction"])
@@ -103,7 +104,7 @@ def main(
     action: Annotated[str, typer.Option(help="Action space.")] = "row",
     seeds: Annotated[int, typer.Option(help="Trainings of each.")] = 3,
     threats: Annotated[int, typer.Option(help="Threats of the judgement.")] = len(HELD_OUT),
-    by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 16,
+    by_gas: Annotated[int, typer.Option(help="Threats that gas dynamics judges, too.")] = 12,
     cache: Annotated[str | None, typer.Option(help="Folder for the blasts of gas.")] = None,
 ) -> None:
     """Train, and judge on held-out threats; print one line for each rule and agent."""
@@ -122,6 +123,7 @@ def main(
             best = max(rules.values(), key=lambda each: float(each.mean()))
             for name, each in rules.items():
                 report(name, each)
+            report("the nearest row again and again", reductions(judge, 0, judged), best)
             if engine == "event":
                 report("random", reductions(environment("place"), None, judged))
             for name, agent in agents.items():
