@@ -11,6 +11,7 @@ import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -223,10 +224,9 @@ def _run_until(
 def in_process(job: Callable[[Path], None], folder: Path, kill_at: int = -1) -> Ending:
     """Do a job in a process of its own; it is killed at a step, unless that is negative."""
     folder.mkdir(parents=True, exist_ok=True)
-    context = multiprocessing.get_context("forkserver")
-    # What the main module imports is imported in each process again, unless it is there.
-    # Optimisers of torch import its compiler, which takes them a second and a half.
-    context.set_forkserver_preload([__name__, "tests.attack.formats", "torch._dynamo"])
+    # Optimisers of torch import its compiler, which would take each process a second and a half.
+    import_module("torch._dynamo")
+    context = multiprocessing.get_context("fork")
     steps, said = context.Value("i", 0, lock=False), context.SimpleQueue()
     process = context.Process(target=_run_until, args=(job, folder, kill_at, steps, said))
     process.start()

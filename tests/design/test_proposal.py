@@ -115,7 +115,9 @@ def test_an_interruption_ends_a_proposal_by_rules_without_a_traceback(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(GasEngine, "loads", interrupted)
-    options = ("--method", "package", "--verify", "--out", str(tmp_path / "out"))
+    save_scenario(wide_yard(), tmp_path / "yard.toml")
+    where = ("--scenario", str(tmp_path / "yard.toml"), "--out", str(tmp_path / "out"))
+    options = ("--method", "package", "--verify", *where)
     result = CliRunner().invoke(app, ["search", *options])
     assert result.exit_code == 130, result.output
     assert "interrupted: no file was left half-written" in result.stderr
