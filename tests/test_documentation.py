@@ -38,6 +38,7 @@ WITH_CODE = [page for page in CODE if CODE[page]]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("page", WITH_CODE)
 def test_the_code_of_a_page_runs(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

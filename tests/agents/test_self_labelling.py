@@ -323,7 +323,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
     chosen = run_settings(scenario, engine="surrogate", steps=21, evaluation_interval=100)
     result = train(chosen, small, tmp_path / "run")
     first, *_, last = result.progress.rollouts
-    assert first.reward > 0.1  # the best rule of each case
+    assert first.reward > 0.03  # the best rule of each case, at the safe end of its interval
     assert last.reward >= first.reward
     assert last.episodes <= 6
     (evaluation,) = result.progress.evaluations
