@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checke
     from blast_env.evaluation.engines.particles import Blast, BlastResult
     from blast_env.evaluation.engines.simulate import simulate, simulate_many
     from blast_env.evaluation.report import LayoutEvaluation, evaluate_layout
-    from blast_env.layout import Placement, load_layout, write_layout
+    from blast_env.layout import LayoutState, load_layout, write_layout
     from blast_env.site import Scenario, load_scenario, save_scenario
     from blast_env.site.scene import Charge
 
@@ -36,7 +36,7 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
         "GasBlast": "blast_env.evaluation.engines.gas",
         "GasResult": "blast_env.evaluation.engines.gas",
         "LayoutEvaluation": "blast_env.evaluation.report",
-        "Placement": "blast_env.layout",
+        "LayoutState": "blast_env.layout",
         "Scenario": "blast_env.site",
         "LoadCase": "blast_env.evaluation.cases",
         "evaluate_layout": "blast_env.evaluation.report",
@@ -61,8 +61,8 @@ __all__ = [
     "GasBlast",
     "GasResult",
     "LayoutEvaluation",
+    "LayoutState",
     "LoadCase",
-    "Placement",
     "Scenario",
     "bundled_scenarios",
     "evaluate_layout",

@@ -181,7 +181,7 @@ class ClusterBackend(ParallelBackendBase):
     def retrieve_result_callback(self, outcome: _Outcome) -> Any:
         """Return the result of a piece of work, or raise its error."""
         if outcome.error is not None:
-            raise _told(outcome.error)
+            raise _known(outcome.error)
         return outcome.result
 
     def abort_everything(self, ensure_ready: bool = True) -> None:  # noqa: ARG002
@@ -223,25 +223,25 @@ def _outcome(future: "Future") -> _Outcome:
         return _Outcome(error=error)
 
 
-def _told(error: BaseException) -> BaseException:
+def _known(error: BaseException) -> BaseException:
     """Return an error of the cluster as a `BlastEnvError` with the cause; any other unchanged."""
     from distributed import KilledWorker
     from distributed.comm import CommClosedError
 
     if isinstance(error, KilledWorker):
-        told = BlastEnvError(
+        reworded = BlastEnvError(
             f"cluster: one task has ended {error.allowed_failures + 1} workers, for lack "
             f"of memory or because they were killed; the last one was {error.last_worker.address}"
         )
     elif isinstance(error, CancelledError | CommClosedError):
-        told = BlastEnvError(
+        reworded = BlastEnvError(
             "cluster: the connection to the scheduler was lost; results so far are kept if the "
             "command has a folder for them, and the same command resumes"
         )
     else:
         return error
-    told.__cause__ = error
-    return told
+    reworded.__cause__ = error
+    return reworded
 
 
 def _do(work: Callable[[], Any], origin: str) -> Any:

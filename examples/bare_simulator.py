@@ -15,6 +15,6 @@ print({key: value for key, value in info.items() if isinstance(value, int | floa
 
 result = blast_env.simulate("courtyard", layout=WALL, engine="event")  # the same in one call
 print(result.collisions.head())
-bare = blast_env.simulate("courtyard", engine="event")
-walled_pa_s, bare_pa_s = (each.impulse("building").pa_s for each in (result, bare))
+unprotected = blast_env.simulate("courtyard", engine="event")
+walled_pa_s, bare_pa_s = (each.impulse("building").pa_s for each in (result, unprotected))
 print(f"two modules take {1.0 - walled_pa_s / bare_pa_s:.1%} off {bare_pa_s:.0f} Pa s")

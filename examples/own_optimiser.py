@@ -18,7 +18,7 @@ def climb(problem: BenchmarkProblem, seed: int) -> float:
     return best
 
 
-problem = make("control_room-told-v2", budget=5)
+problem = make("control_room-known-v2", budget=5)
 share = climb(problem, seed=0)
 print(f"{problem.blasts} blasts: {1.0 - share:.1%} of the load taken off")
 if problem.best is not None:

@@ -200,7 +200,7 @@ class SiteCost:
     Attributes:
         site: Name of the scenario.
         cells: Growth of its cells; see `GasSettings`.
-        told: Estimate of the cost before the run.
+        estimate: Estimate of the cost before the run.
         steps: Number of steps.
         cell_updates: Cell updates; a step counts as two.
         cpu_s: Processor time, from scenario to loads.
@@ -209,7 +209,7 @@ class SiteCost:
 
     site: str
     cells: str
-    told: CostGuess
+    estimate: CostGuess
     steps: int
     cell_updates: int
     cpu_s: float
@@ -230,7 +230,7 @@ def _site_cost(scenario: Scenario, engine: GasEngine) -> SiteCost:
     return SiteCost(
         site=scenario.name,
         cells=engine.cells,
-        told=result.run.cost,
+        estimate=result.run.cost,
         steps=result.steps,
         cell_updates=result.run.solver.cell_updates,
         cpu_s=cpu_s,
@@ -425,13 +425,13 @@ def _print_sites(sites: Sequence[Scenario], cells: Sequence[str]) -> None:
                 (
                     each.site,
                     each.cells,
-                    f"{each.told.cells:,}",
-                    f"{each.told.steps:,}",
+                    f"{each.estimate.cells:,}",
+                    f"{each.estimate.steps:,}",
                     f"{each.steps:,}",
-                    f"{each.told.seconds:.1f}",
+                    f"{each.estimate.seconds:.1f}",
                     f"{each.cpu_s:.1f}",
                     f"{1e-6 * each.cell_updates / each.cpu_s:.1f}",
-                    f"{1e-6 * each.told.memory_bytes:.0f}",
+                    f"{1e-6 * each.estimate.memory_bytes:.0f}",
                     f"{each.memory_mb:.0f}",
                 )
             )

@@ -28,7 +28,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, Case, draw_threats
 from blast_env.evaluation.engines.contract import Engine, find_engine
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import INK, STANDING, Feature, Kinds, site_features, without
 from blast_env.plots.site_plan import draw_plan, legend_of, write_legend
@@ -130,15 +130,15 @@ def measured(
     ruled = rule_layouts(site)
     drawn = draw_threats(site, range(threats))
     problem = DesignProblem(BlastEvaluator(site, engine), Case(site, drawn))
-    bare = problem.load(())
+    unprotected = problem.load(())
     reduction = {
-        layout: 1.0 - problem.load(layout) / bare for layout in (*layouts, *ruled.values())
+        layout: 1.0 - problem.load(layout) / unprotected for layout in (*layouts, *ruled.values())
     }
     return MeasuredSite(
         accepted=(criterion or VisibilityCriterion()).objection(site) is None,
         shares=SiteMeasures.of(site),
         unprotected_pa_s=problem.evaluator.loads((), drawn[0]).protected_impulse_pa_s,
-        cut=np.array([cut_share_of(lines, Placement(site, layout)) for layout in layouts]),
+        cut=np.array([cut_share_of(lines, LayoutState(site, layout)) for layout in layouts]),
         reduction=np.array([reduction[layout] for layout in layouts]),
         rules={name: reduction[layout] for name, layout in ruled.items()},
         has_vehicle=bool(site.vehicles),

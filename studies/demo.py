@@ -39,7 +39,7 @@ from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_layouts
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.figures import save_figure
 from blast_env.plots.gas import facades
 from blast_env.plots.pressure_film import write_pressure_film
@@ -297,7 +297,7 @@ class AgentComparison:
             f"{lead.value:+.1f} points ({lead.low:+.1f} to {lead.high:+.1f})" for lead in leads
         )
         scenario, reduction = self.agent.cases[0].scenario, self.agent.reduction
-        cost = Placement(scenario, self.agent.layouts[0]).cost
+        cost = LayoutState(scenario, self.agent.layouts[0]).cost
         budget = "" if scenario.zone.budget is None else f" of {scenario.zone.budget:g}"
         ahead = "is ahead" if self.is_ahead else "is not shown to be ahead"
         return (
@@ -330,7 +330,7 @@ def unseen_charges(settings: DemoSettings, scenario: Scenario) -> list[Case]:
     for index, tnt_kg in enumerate(settings.masses_kg):
         charge = tuple(each.model_copy(update={"tnt_kg": tnt_kg}) for each in scenario.charge)
         site = scenario.model_copy(update={"charge": charge})
-        threats = draw_threats(site, SeedRange.JUDGEMENT.seeds(count * index, count))
+        threats = draw_threats(site, SeedRange.TEST.seeds(count * index, count))
         cases.append(Case(site, threats, name=f"{tnt_kg:g} kg", seed=index))
     return cases
 
@@ -410,7 +410,7 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
     blasts = [GasBlast(scenario, each, threat.seed, charge=threat.charge) for each in ((), layout)]
     film = out / "side_by_side.mp4"
     with progress_bar("film") as progress:
-        bare, protected = write_pressure_film(
+        unprotected, protected = write_pressure_film(
             blasts[1],
             film,
             beside=blasts[0],
@@ -422,7 +422,7 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
     plan = LayoutPlan(scenario, layout, charge, {"agent": AGENT, "seed": str(settings.seed)})
     return [
         film,
-        save_figure(facades(protected, beside=bare), out / "facade.png"),
+        save_figure(facades(protected, beside=unprotected), out / "facade.png"),
         save_figure(site_picture(scenario, layout), out / "site.png"),
         protected.to_excel(out / "loads.xlsx"),
         *export_layouts({"layout": plan}, out),

@@ -22,9 +22,9 @@ from blast_env.response.facade import (
     Bay,
     FacadeResponse,
     FilledBay,
+    peak_corrected,
     peak_factor,
     respond,
-    sharpened,
 )
 from blast_env.response.glass import Pane, glazing_responses
 from blast_env.response.sdof import Resistance, System, impulses, responses
@@ -230,7 +230,7 @@ def component_rows(found: dict[float, FacadeResponse], tnt_kg: float) -> Iterato
             bays = filled_with([each.bay for each in facade.bays], name)
             histories = facade.time_s, facade.pressure_pa
             own = respond(bays, *histories).level_of_protection
-            sharper = sharpened(*histories, peak_factor(cell_m, tnt_kg))
+            sharper = peak_corrected(*histories, peak_factor(cell_m, tnt_kg))
             worse = min(own, respond(bays, *sharper).level_of_protection)
             levels.append(own.label if worse == own else f"{own.label} ({worse.label})")
         yield name, *levels

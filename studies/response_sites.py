@@ -12,7 +12,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.files import make_folder
 from blast_env.geometry import layout_words
-from blast_env.layout import Placement, load_layout
+from blast_env.layout import LayoutState, load_layout
 from blast_env.layout.build_scene import charge_against
 from blast_env.plots.facade import LEVEL_COLOURS
 from blast_env.plots.figures import save_figure
@@ -67,7 +67,7 @@ def damage_figure(scenario: Scenario) -> Figure:
     layouts = {"no layout": (), **layouts_by_rule(scenario), "found": found}
     threats, evaluator = _threats(scenario), BlastEvaluator(scenario, "gas")
     damages = {
-        f"{name}, cost {Placement(scenario, layout).cost:g}": worst(
+        f"{name}, cost {LayoutState(scenario, layout).cost:g}": worst(
             load.worst_damage or 0.0
             for threat in threats
             for load in evaluator.loads(layout, threat).protected
@@ -88,7 +88,7 @@ def damage_figure(scenario: Scenario) -> Figure:
     draw_plan(plan, features)
     _draw_damages(chart, damages, _target(scenario))
     write_legend(figure, legend_of(features))
-    cost, budget = Placement(scenario, found).cost, scenario.zone.budget
+    cost, budget = LayoutState(scenario, found).cost, scenario.zone.budget
     write_heading(
         figure,
         f"{scenario.name}: {_target(scenario).label} costs {cost:g} of {budget:g}",

@@ -443,7 +443,7 @@ def judge(
         for name in scenarios:
             scenario = load_scenario(name)
             evaluator = BlastEvaluator(scenario, "gas", cache=cache)
-            threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, charges))
+            threats = draw_threats(scenario, SeedRange.TEST.seeds(0, charges))
             found = []
             with progress_bar(scenario.name) as progress:
                 for done, threat in enumerate(threats, start=1):
@@ -456,8 +456,8 @@ def judge(
 
 def promise(surrogate: Surrogate, layout: Layout, case: Case) -> float:
     """Return the share by which a layout lowers the case's load, as a surrogate predicts it."""
-    bare, guessed = Guesses.of(surrogate, case).loads([(), layout])
-    return float(1.0 - guessed / bare)
+    unprotected, guessed = Guesses.of(surrogate, case).loads([(), layout])
+    return float(1.0 - guessed / unprotected)
 
 
 def reductions_of(
@@ -467,8 +467,8 @@ def reductions_of(
     asked = [(each, threat) for each in ((), *layouts) for threat in case.threats]
     loads = evaluator.loads_of_many(asked, processes)
     values = np.array([each.load(case.scenario.objective) for each in loads])
-    bare, *own = (case.combined(each) for each in values.reshape(-1, len(case.threats)))
-    return [float(each) for each in reductions(np.array(own), np.full(len(own), bare))]
+    unprotected, *own = (case.combined(each) for each in values.reshape(-1, len(case.threats)))
+    return [float(each) for each in reductions(np.array(own), np.full(len(own), unprotected))]
 
 
 if __name__ == "__main__":

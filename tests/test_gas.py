@@ -23,95 +23,98 @@ HUT = hut()
 
 
 @pytest.fixture(scope="module")
-def bare() -> GasResult:
+def unprotected() -> GasResult:
     return blast_env.simulate(HUT, engine="gas")
 
 
 @pytest.fixture(scope="module")
-def walled() -> GasResult:
+def protected() -> GasResult:
     return blast_env.simulate(HUT, WALL, engine="gas")
 
 
-def test_faces_modules_and_structures_add_up(bare: GasResult) -> None:
+def test_faces_modules_and_structures_add_up(unprotected: GasResult) -> None:
     """The same momentum, however it is cut up; all four walls, not the roof."""
-    faces = bare.faces[bare.faces["face"] != "roof"]
+    faces = unprotected.faces[unprotected.faces["face"] != "roof"]
     area_m2 = 0.5**2
     total = float((faces["impulse_pa_s"] * area_m2).sum())
-    walls = bare.modules[bare.modules["face"] != "roof"]
+    walls = unprotected.modules[unprotected.modules["face"] != "roof"]
     of_modules = float((walls["impulse_pa_s"] * walls["area_m2"]).sum())
-    (row,) = bare.structures.to_dict("records")
+    (row,) = unprotected.structures.to_dict("records")
     assert of_modules == pytest.approx(total)
     assert row["impulse_pa_s"] * row["area_m2"] == pytest.approx(total)
-    assert bare.module_impulse_n_s.sum() == pytest.approx(total)
+    assert unprotected.module_impulse_n_s.sum() == pytest.approx(total)
     assert row["area_m2"] == 4 * 2.0 * 2.0
-    assert bare.impulse("hut").pa_s == pytest.approx(row["impulse_pa_s"])
+    assert unprotected.impulse("hut").pa_s == pytest.approx(row["impulse_pa_s"])
 
 
-def test_the_wall_that_sees_the_charge_takes_most(bare: GasResult) -> None:
-    (row,) = bare.structures.to_dict("records")
+def test_the_wall_that_sees_the_charge_takes_most(unprotected: GasResult) -> None:
+    (row,) = unprotected.structures.to_dict("records")
     assert row["most_loaded_face"] == "west"
-    of_walls = bare.faces.groupby("face")["impulse_pa_s"].mean()
+    of_walls = unprotected.faces.groupby("face")["impulse_pa_s"].mean()
     assert of_walls["west"] > 2.0 * of_walls["north"] > 2.0 * of_walls["east"] > 0.0
     assert row["roof_impulse_pa_s"] == pytest.approx(of_walls["roof"])
 
 
-def test_a_site_with_a_mirror_has_loads_with_a_mirror(bare: GasResult) -> None:
+def test_a_site_with_a_mirror_has_loads_with_a_mirror(unprotected: GasResult) -> None:
     """The charge is in the middle: north and south are the same up to rounding."""
-    loads = bare.faces.set_index(["face", "x_m", "z_m"])["impulse_pa_s"]
+    loads = unprotected.faces.set_index(["face", "x_m", "z_m"])["impulse_pa_s"]
     south, north = loads["south"].sort_index(), loads["north"].sort_index()
     np.testing.assert_allclose(south.to_numpy(), north.to_numpy(), rtol=1e-4)
 
 
-def test_a_named_wall_is_the_one_that_counts(bare: GasResult) -> None:
+def test_a_named_wall_is_the_one_that_counts(unprotected: GasResult) -> None:
     document = HUT.model_dump(mode="json", exclude_none=True)
     document["structures"][0]["faces"] = ["west"]
     west = blast_env.simulate(blast_env.Scenario.from_document(document, "west"), engine="gas")
-    mean = bare.faces[bare.faces["face"] == "west"]["impulse_pa_s"].mean()
+    mean = unprotected.faces[unprotected.faces["face"] == "west"]["impulse_pa_s"].mean()
     assert west.impulse("hut").pa_s == pytest.approx(float(mean))
 
 
-def test_a_wall_protects_and_is_itself_loaded(bare: GasResult, walled: GasResult) -> None:
-    assert walled.impulse("hut").pa_s < 0.95 * bare.impulse("hut").pa_s
-    barrier = walled.modules[walled.modules["structure"] == "barrier"]
-    assert barrier["impulse_pa_s"].max() > bare.modules["impulse_pa_s"].max()
-    assert set(walled.structures["structure"]) == {"hut"}
+def test_a_wall_protects_and_is_itself_loaded(unprotected: GasResult, protected: GasResult) -> None:
+    assert protected.impulse("hut").pa_s < 0.95 * unprotected.impulse("hut").pa_s
+    barrier = protected.modules[protected.modules["structure"] == "barrier"]
+    assert barrier["impulse_pa_s"].max() > unprotected.modules["impulse_pa_s"].max()
+    assert set(protected.structures["structure"]) == {"hut"}
 
 
-def test_gauges_integrate_their_histories(bare: GasResult) -> None:
-    for row in bare.gauges.to_dict("records"):
-        history = bare.history(row["name"])
+def test_gauges_integrate_their_histories(unprotected: GasResult) -> None:
+    for row in unprotected.gauges.to_dict("records"):
+        history = unprotected.history(row["name"])
         steps = np.diff(history["time_s"], prepend=history["time_s"][0])
         assert row["peak_pa"] == pytest.approx(history["overpressure_pa"].max())
         running = np.cumsum(history["overpressure_pa"] * steps)
         assert row["impulse_pa_s"] == pytest.approx(float(running.max()), rel=0.1)
-    front, behind = bare.gauges.to_dict("records")
+    front, behind = unprotected.gauges.to_dict("records")
     assert front["peak_pa"] > 3.0 * behind["peak_pa"]
     assert front["arrival_s"] < behind["arrival_s"]
 
 
-def test_a_run_is_a_function_of_its_arguments(bare: GasResult) -> None:
+def test_a_run_is_a_function_of_its_arguments(unprotected: GasResult) -> None:
     """Not of the seed, where the charge is fixed; and of the cells."""
     again = blast_env.simulate(HUT, seed=5, engine="gas")
-    assert again.digest == bare.digest
-    assert replace(GasEngine(), threads=2).start_on(bare.run.site).grid.shape == bare.run.grid.shape
+    assert again.digest == unprotected.digest
+    assert (
+        replace(GasEngine(), threads=2).start_on(unprotected.run.site).grid.shape
+        == unprotected.run.grid.shape
+    )
     finer = GasBlast(HUT, engine=GasEngine(cell_m=0.25, until=0.03)).run()
     coarse = GasBlast(HUT, engine=GasEngine(until=0.03)).run()
     assert finer.impulse("hut").pa_s == pytest.approx(coarse.impulse("hut").pa_s, rel=0.1)
 
 
-def test_threads_change_no_bit(bare: GasResult) -> None:
+def test_threads_change_no_bit(unprotected: GasResult) -> None:
     two = GasBlast(HUT, engine=GasEngine(threads=2)).run()
-    assert two.digest == bare.digest
+    assert two.digest == unprotected.digest
 
 
-def test_a_run_ends_when_its_loads_are_known(bare: GasResult) -> None:
+def test_a_run_ends_when_its_loads_are_known(unprotected: GasResult) -> None:
     """Four times as long they are the same."""
-    assert bare.end_reason is EndReason.LOADS_KNOWN
-    assert bare.structures["known"].all()
-    late = blast_env.simulate(HUT, engine="gas", until=4.0 * bare.time_s)
+    assert unprotected.end_reason is EndReason.LOADS_KNOWN
+    assert unprotected.structures["known"].all()
+    late = blast_env.simulate(HUT, engine="gas", until=4.0 * unprotected.time_s)
     assert late.end_reason is EndReason.TIME_ASKED
-    assert late.time_s >= 4.0 * bare.time_s
-    assert late.impulse("hut").pa_s == pytest.approx(bare.impulse("hut").pa_s, rel=0.003)
+    assert late.time_s >= 4.0 * unprotected.time_s
+    assert late.impulse("hut").pa_s == pytest.approx(unprotected.impulse("hut").pa_s, rel=0.003)
     assert not any(NOT_KNOWN in note for note in late.impulse("hut").notes)
     cut = blast_env.simulate(HUT, engine="gas", until=0.01)
     assert any(NOT_KNOWN in note for note in cut.impulse("hut").notes)
@@ -200,8 +203,8 @@ def test_all_layouts_take_a_charge_over_at_one_radius(charge: Charge, radius_m: 
     for layout in layouts:
         blast = GasBlast(HUT, layout, charge=charge)
         runs.append(blast.engine.start_on(blast.site))
-    assert runs[0].handover_radius_m == pytest.approx(radius_m)
-    assert len({(run.handover_radius_m, run.time_s) for run in runs}) == 1
+    assert runs[0].remap_radius_m == pytest.approx(radius_m)
+    assert len({(run.remap_radius_m, run.time_s) for run in runs}) == 1
 
 
 def test_a_charge_that_hangs_or_lies_close_is_flagged_or_runs() -> None:
@@ -235,31 +238,31 @@ def test_particles_say_that_they_know_no_heights() -> None:
     assert any("no heights" in note for note in evaluation.notes)
 
 
-def test_files_have_the_tables(bare: GasResult, tmp_path: Path) -> None:
-    workbook = openpyxl.load_workbook(bare.to_excel(tmp_path / "gas.xlsx"))
+def test_files_have_the_tables(unprotected: GasResult, tmp_path: Path) -> None:
+    workbook = openpyxl.load_workbook(unprotected.to_excel(tmp_path / "gas.xlsx"))
     assert workbook.sheetnames == ["Run", "Structures", "Walls", "Modules", "Gauges", "Columns"]
     assert workbook["Structures"].max_row == 2
-    assert workbook["Modules"].max_row == len(bare.modules) + 1
-    table, record = read_parquet(bare.to_parquet(tmp_path / "gas.parquet"))
+    assert workbook["Modules"].max_row == len(unprotected.modules) + 1
+    table, record = read_parquet(unprotected.to_parquet(tmp_path / "gas.parquet"))
     assert list(table.columns) == [column.name for column in FACE_COLUMNS]
-    assert record["digest"] == bare.digest
+    assert record["digest"] == unprotected.digest
 
 
-def test_bad_input_is_named(bare: GasResult) -> None:
+def test_bad_input_is_named(unprotected: GasResult) -> None:
     with pytest.raises(UnknownNameError, match="'front'"):
-        bare.history("frnt")
+        unprotected.history("frnt")
     with pytest.raises(UnknownNameError, match="'hut'"):
-        bare.impulse("hat")
+        unprotected.impulse("hat")
     with pytest.raises(BlastEnvError, match=r"cell_m is 0.3, must be 0.5 m, .* whole number"):
         blast_env.simulate(HUT, engine="gas", cell_m=0.3)
     with pytest.raises(BlastEnvError, match=r"cell_m is 0\.5, but engine 'event' has no cells"):
         evaluate_layout(HUT, WALL, engine="event", cell_m=0.5)
     with pytest.raises(BlastEnvError, match="inside a solid cell"):
-        GasEngine().start_on(replace(bare.run.site, charge=Charge((7.0, 4.0), 5.0)))
+        GasEngine().start_on(replace(unprotected.run.site, charge=Charge((7.0, 4.0), 5.0)))
     with pytest.raises(BlastEnvError, match=r"would need .* GiB, must be at most 8"):
-        GasEngine(cell_m=0.5 / 64).start_on(bare.run.site)
+        GasEngine(cell_m=0.5 / 64).start_on(unprotected.run.site)
     with pytest.raises(BlastEnvError, match=r"would take .* h of a core, must be at most 6: take"):
-        GasEngine(until=1e5).start_on(bare.run.site)
+        GasEngine(until=1e5).start_on(unprotected.run.site)
     with pytest.raises(BlastEnvError, match=r"cells is 'large', must be one of 'uniform', 'coarse"):
         blast_env.simulate(HUT, engine="gas", cells="large")
 
@@ -269,10 +272,10 @@ def test_bad_input_is_named(bare: GasResult) -> None:
     [(0.0, 0.0, 4.0), (1.5, 0.0, 4.0), (5.0, 0.0, 5.0), (0.0, 3.0, 5.0)],
 )
 def test_scaled_distance_is_that_of_the_nearest_point(
-    bare: GasResult, charge_m: float, base_m: float, away_m: float
+    unprotected: GasResult, charge_m: float, base_m: float, away_m: float
 ) -> None:
     """4 m away in plan; a charge beside a wall is no farther off than its height in plan."""
-    site = bare.run.site
+    site = unprotected.run.site
     hut = replace(site.structures[0], base_m=base_m, height_m=base_m + 2.0)
     raised = replace(site, charge=site.charge._replace(height_m=charge_m))
     found = scaled_distance(raised, hut)

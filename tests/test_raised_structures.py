@@ -13,7 +13,7 @@ from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.oblique import ObliqueView, boxes_of, painted_order
 from blast_env.plots.plan import structure_features
 from blast_env.site import Scenario, load_scenario, save_scenario
@@ -174,7 +174,7 @@ def test_vehicles_and_people_pass_below_what_is_high_enough() -> None:
     zone = {"corner_m": (3.5, 2.0), "rows": 8, "columns": 4, "stock": 4, "height_m": 1.5}
     zone["access_way"] = {"width_m": 1.0, "between": "left_right"}
     bridge = raised(2.5, 3.5, (4.0, 2.0), rows=8)
-    over = Placement.empty(hut_with(bridge, build_zone=zone))
+    over = LayoutState.empty(hut_with(bridge, build_zone=zone))
     assert not over.legal[0][:, 1].any()  # nothing is built below it
     assert over.legal.any()  # and the way goes on below it
 

@@ -58,13 +58,16 @@ def test_progress_does_not_change_a_blast_and_ends_at_one_or_below() -> None:
 
 
 def test_the_layout_shifts_neither_charge_nor_fan_nor_air() -> None:
-    bare, protected = (Blast(COURTYARD, layout, seed=3).scene for layout in ((), LAYOUT))
-    assert bare.charge == protected.charge
+    unprotected, protected = (Blast(COURTYARD, layout, seed=3).scene for layout in ((), LAYOUT))
+    assert unprotected.charge == protected.charge
     fans = [
-        s.balls.position[s.balls.kind == CollisionType.ExplosionBall] for s in (bare, protected)
+        s.balls.position[s.balls.kind == CollisionType.ExplosionBall]
+        for s in (unprotected, protected)
     ]
     assert (fans[0] == fans[1]).all()
-    air = [s.balls.position[s.balls.kind == CollisionType.AirBall] for s in (bare, protected)]
+    air = [
+        s.balls.position[s.balls.kind == CollisionType.AirBall] for s in (unprotected, protected)
+    ]
     kept = {tuple(position) for position in air[1].tolist()}
     assert kept < {tuple(position) for position in air[0].tolist()}
 
@@ -120,13 +123,13 @@ def test_a_wall_in_front_takes_load_off_the_building(
     site = load_scenario(scenario) if isinstance(scenario, str) else scenario
     rows = [(row, 0) for row in range(22, 32)]
     charge = Charge((5.0, 20.0), 100.0)
-    bare, walled = (
+    unprotected, protected = (
         np.mean(
             [simulate(site, cells, s, engine, charge).impulse_sim("building") for s in range(3)]
         )
         for cells in ((), rows)
     )
-    assert 0.0 < walled < share * bare
+    assert 0.0 < protected < share * unprotected
 
 
 def test_more_tnt_gives_more_impulse() -> None:

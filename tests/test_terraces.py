@@ -20,7 +20,7 @@ from blast_env.geometry import Layout, Piece, Rectangle
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import drawing
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import build_site, vehicle_drive
 from blast_env.plots.oblique import boxes_of, draw_oblique
 from blast_env.plots.plan import Kinds, on_levels, site_features
@@ -112,7 +112,7 @@ def faces_of(result: GasResult, structure: str) -> NDArray[np.float64]:
 
 
 @pytest.fixture(scope="module")
-def walled() -> GasResult:
+def protected() -> GasResult:
     return blast(terraced(), WALL)
 
 
@@ -130,23 +130,23 @@ def walled() -> GasResult:
     ids=["a structure on the terrace", "a structure of 2 m beside it"],
 )
 def test_a_wall_of_1_m_on_1_m_of_ground_is_a_wall_of_2_m(
-    walled: GasResult, structures: tuple[dict[str, Any], ...]
+    protected: GasResult, structures: tuple[dict[str, Any], ...]
 ) -> None:
     """Bit for bit: the same air, whatever the solids are called."""
     other = blast(terraced(*structures))
-    assert np.array_equal(faces_of(walled, "hall"), faces_of(other, "hall"))
-    assert walled.impulse("hall") == other.impulse("hall")
-    assert len(walled.faces) == len(other.faces)
+    assert np.array_equal(faces_of(protected, "hall"), faces_of(other, "hall"))
+    assert protected.impulse("hall") == other.impulse("hall")
+    assert len(protected.faces) == len(other.faces)
 
 
-def test_a_wall_protects_more_on_the_terrace_than_before_it(walled: GasResult) -> None:
+def test_a_wall_protects_more_on_the_terrace_than_before_it(protected: GasResult) -> None:
     below = (Piece(3, 3, "wall", True), Piece(7, 3, "wall", True))
     loads = [blast(terraced(), layout).impulse("hall").pa_s for layout in ((), below)]
-    assert walled.impulse("hall").pa_s < 0.97 * min(loads)
+    assert protected.impulse("hall").pa_s < 0.97 * min(loads)
 
 
-def test_faces_belong_to_what_stands_there(walled: GasResult) -> None:
-    faces = walled.faces
+def test_faces_belong_to_what_stands_there(protected: GasResult) -> None:
+    faces = protected.faces
     assert (faces[faces["structure"] == "barrier"]["z_m"] > 1.0).all()
     assert (faces[faces["structure"] == "podium"]["z_m"] <= 1.0).all()
     roof = faces[(faces["structure"] == "podium") & (faces["face"] == "roof")]
@@ -181,8 +181,8 @@ def test_there_is_no_gap_below_what_stands_on_a_terrace(height_m: float, own_m: 
         assert loads.recorder.faces[west] == way.faces
 
 
-def test_pieces_are_pushed_by_what_their_sides_took(walled: GasResult) -> None:
-    faces, loads = net_on_modules(walled), walled.piece_loads
+def test_pieces_are_pushed_by_what_their_sides_took(protected: GasResult) -> None:
+    faces, loads = net_on_modules(protected), protected.piece_loads
     assert loads is not None
     for row, way in enumerate(loads.ways):
         own = faces[faces["piece"] == loads.names[way.piece]]
@@ -190,7 +190,7 @@ def test_pieces_are_pushed_by_what_their_sides_took(walled: GasResult) -> None:
         west, east = (whole[own["face"] == side].mean() for side in ("west", "east"))
         net = float(loads.pushes[row] @ loads.recorder.step_s)
         assert net == pytest.approx(west - east, rel=1e-3)
-    assert set(walled.pieces["height_m"]) == {1.0}
+    assert set(protected.pieces["height_m"]) == {1.0}
 
 
 def test_modules_without_a_catalogue_stand_on_it_too() -> None:
@@ -244,7 +244,7 @@ def test_the_air_is_as_high_as_what_can_stand_there_needs(
 
 
 def test_the_zone_has_two_levels_and_no_piece_is_on_both() -> None:
-    placement = Placement.empty(terraced())
+    placement = LayoutState.empty(terraced())
     assert placement.usable.all()
     assert placement.ground_m.tolist() == [[0.0] * 4 + [1.0] * 4] * 14
     across, along, post = placement.legal
@@ -258,7 +258,7 @@ def test_the_zone_has_two_levels_and_no_piece_is_on_both() -> None:
 
 
 def test_a_cell_on_the_edge_takes_nothing() -> None:
-    placement = Placement.empty(terraced(TERRACE | {"corner_m": [6.25, 2.0], "columns": 13}))
+    placement = LayoutState.empty(terraced(TERRACE | {"corner_m": [6.25, 2.0], "columns": 13}))
     assert np.flatnonzero(~placement.usable.any(axis=0)).tolist() == [4]
     words = "would stand on cell (0, 4), which lies only partly on the terrace 'podium'"
     assert placement.explain(Piece(0, 4, "post", False)) == f"'post' at cell (0, 4) {words}"
@@ -270,7 +270,7 @@ def test_terraces_of_one_height_side_by_side_are_one() -> None:
         TERRACE | {"name": "rest", "corner_m": [7.5, 2.0], "columns": 11},
     )
     assert np.array_equal(
-        Placement.empty(terraced(*halves)).legal, Placement.empty(terraced()).legal
+        LayoutState.empty(terraced(*halves)).legal, LayoutState.empty(terraced()).legal
     )
 
 
@@ -278,7 +278,7 @@ def test_a_terrace_of_any_outline_carries_what_lies_wholly_on_it() -> None:
     disc = column("mound", 6.0, 6.0, 4.0)
     flat = {key: each for key, each in HALL.items() if key != "base_m"}
     scenario = terraced(structures=[flat, disc | {"height_m": 1.0, "carries": True}])
-    ground = Placement.empty(scenario).ground_m
+    ground = LayoutState.empty(scenario).ground_m
     modules = sum(each.modules for each in scenario.structures if each.carries)
     assert int(ground.sum()) == modules
 
@@ -286,7 +286,7 @@ def test_a_terrace_of_any_outline_carries_what_lies_wholly_on_it() -> None:
 def test_clearance_is_kept_from_the_wall_of_a_terrace_but_not_on_it() -> None:
     document = site_document()
     document["build_zone"]["clearance_m"] = 1.0
-    usable = Placement.empty(Scenario.from_document(document, "clear")).usable
+    usable = LayoutState.empty(Scenario.from_document(document, "clear")).usable
     assert np.flatnonzero(usable.any(axis=0)).tolist() == [0, 1, 4, 5, 6]  # 7 is 0.5 m off the hall
 
 
@@ -311,8 +311,8 @@ def test_vehicles_stop_at_it_and_meet_nothing_on_it(rated: bool) -> None:
     ground = scenario.vehicle_ground(vehicle)
     assert strip["corner_m"][0] in [each.left for each in ground.standing_m]
     layout = tuple(Piece(row, 2, "post", False) for row in range(0, 12, 2))
-    placed, drive = Placement.of(scenario, layout), vehicle_drive(scenario, vehicle, layout)
-    assert placed.explain_vehicles() == Placement.empty(scenario).explain_vehicles()
+    placed, drive = LayoutState.of(scenario, layout), vehicle_drive(scenario, vehicle, layout)
+    assert placed.explain_vehicles() == LayoutState.empty(scenario).explain_vehicles()
     assert drive.held == drive.broken == ()
 
 
@@ -488,7 +488,7 @@ def test_text_shows_the_cells_on_it() -> None:
 def test_planes_show_tops_of_structures_and_heights_of_pieces() -> None:
     env = gym.make("BlastBarrierGas-v0", scenario=terraced(), observation="grid")
     env.reset(seed=0)
-    catalogue = Placement.empty(terraced()).catalogue
+    catalogue = LayoutState.empty(terraced()).catalogue
     planes = env.step(catalogue.action(WALL[0]))[0]
     channels = GridObservation().channels_of(terraced())
     height, barrier = (

@@ -40,7 +40,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import charge_against
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout.placement import load_relevant
 from blast_env.particles.calibration.model import CalibrationError
 from blast_env.plots.canvas import Frame
 from blast_env.plots.figures import save_figure
@@ -120,7 +120,7 @@ def run_blasts(task: BlastTask, tell: Tell) -> None:
         BlastEnvError: If a blast cannot be run.
     """
     scenario = task.site
-    layout = met_by_blasts(placing.layout_from(scenario, task.layout))
+    layout = load_relevant(placing.layout_from(scenario, task.layout))
     work: list[tuple[LoadCase, Layout]] = []
     for threat in task.threats:
         # Gas needs the scale of the blast without a barrier; particles show the layout first.
@@ -191,15 +191,15 @@ def _particles(
     task: BlastTask, scenario: Scenario, layout: Layout, charge: AnyCharge, folder: Path, tell: Tell
 ) -> dict[str, Any]:
     blast = Blast(scenario, layout, 0, "event", charge)
-    bare = Blast(scenario, (), 0, "event", charge).run()
-    unit = bare.load_unit
+    unprotected = Blast(scenario, (), 0, "event", charge).run()
+    unit = unprotected.load_unit
     painter = FramePainter(
         blast,
         width_px=_FILM_PX,
-        full_impulse=scale_end([bare], unit),
+        full_impulse=scale_end([unprotected], unit),
         unit=unit.with_loads_of(blast.run().load_unit) if layout else unit,
     )
-    plan = plan_film(bare)
+    plan = plan_film(unprotected)
     times_s = np.linspace(0.0, plan.end_s, FRAMES).tolist()
     run = blast.start()
     frames = (paint_at(run, painter, time_s, plan.real_time_factor) for time_s in times_s)
@@ -247,8 +247,8 @@ def _gas(
     blast = GasBlast(scenario, layout, 0, task.engine.gas, charge)
     section = default_section(blast.site)
     height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
-    told = share_of(tell, 0, 100, 60)
-    shot = record_planes(blast, height_m, section, told, ground_recorders)
+    recording = share_of(tell, 0, 100, 60)
+    shot = record_planes(blast, height_m, section, recording, ground_recorders)
     result = shot.result
     bare_charge = charge_against(scenario, (), charge)
     bare_key = blast_key(scenario, (), bare_charge, task.engine)

@@ -7,7 +7,7 @@ from typing import Any, Final
 from blast_env.app import placing
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 
 SLOTS: Final = ("A", "B", "C", "D")
@@ -43,7 +43,7 @@ class Design:
         if not 0 <= self.active < len(SLOTS):
             raise BlastEnvError(f"active is {self.active}, must be 0 to {len(SLOTS) - 1}")
         for layout in self.layouts:
-            Placement.of(self.scenario.without_budget, layout)
+            LayoutState.of(self.scenario.without_budget, layout)
 
     @property
     def layout(self) -> Layout:
@@ -58,7 +58,7 @@ class Design:
         """
         number = self.active if slot is None else slot
         layouts = [*self.layouts]
-        layouts[number] = Placement.of(self.scenario.without_budget, layout).layout
+        layouts[number] = LayoutState.of(self.scenario.without_budget, layout).layout
         return replace(self, layouts=tuple(layouts))
 
     def with_scenario(self, scenario: Scenario) -> tuple["Design", tuple[str, ...]]:

@@ -1,6 +1,6 @@
 """Edits of a scenario: each returns another valid scenario, or raises the library's reasons.
 
-All positions snap to the grid of the modules. Placement rules are not repeated here: a changed
+All positions snap to the grid of the modules. LayoutState rules are not repeated here: a changed
 scenario goes through `Scenario.from_document`, which reports all its faults.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.plan import rectangles_of
 from blast_env.response.facade import STOREY_M
 from blast_env.site import (
@@ -408,7 +408,7 @@ def roads_in_zone(scenario: Scenario) -> tuple[Rectangle, ...]:
     for source in scenario.charge:
         if isinstance(source, SegmentSource):
             road |= _from_line_m(source.segment_m, x_m, y_m) <= _HALF_ROAD_M
-    return tuple(rectangles_of(road & Placement.empty(scenario).usable, zone.corner_m))
+    return tuple(rectangles_of(road & LayoutState.empty(scenario).usable, zone.corner_m))
 
 
 def with_roads_free(scenario: Scenario) -> Scenario:

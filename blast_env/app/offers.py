@@ -73,8 +73,8 @@ def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Lay
         raise BlastEnvError("threats: there are none, must be at least one")
     rule = find_proposer(name)
     assert isinstance(rule, RuleProposer)
-    told = charges[0] if len(charges) == 1 else None
+    known_charge = charges[0] if len(charges) == 1 else None
     sources = tuple(source_of(each) for each in charges)
     if Need.VEHICLE in proposer_row(name).needs:  # it plans for all vehicles of the site
-        return rule.rule(scenario, told)
-    return rule.rule(scenario.model_copy(update={"charge": sources}), told)
+        return rule.rule(scenario, known_charge)
+    return rule.rule(scenario.model_copy(update={"charge": sources}), known_charge)

@@ -1,6 +1,6 @@
 """The elements that can be placed on a site, and those of a layout, for editing and drawing.
 
-Only this module of the page handles the elements of a layout; `Placement` decides whether one may
+Only this module of the page handles the elements of a layout; `LayoutState` decides whether one may
 stand at a place. A layout may cost more than the budget, which its words say.
 """
 
@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell, Element, Layout, Measure, Piece, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario
-from blast_env.site.catalogue import AnyMeasure, Removable
+from blast_env.site.catalogue import AnyMeasure, Demolition
 from blast_env.site.facade import Components
 from blast_env.site.scene import WALLS
 from blast_env.units import MODULE_SIDE_M
@@ -76,7 +76,7 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
     zone = scenario.build_zone
     if zone is None:
         return ()
-    placement = Placement.of(scenario.without_budget, layout)
+    placement = LayoutState.of(scenario.without_budget, layout)
     if not zone.items:
         height = "" if zone.height_m is None else f", {zone.height_m:g} m high"
         return (Placeable("", f"module of 0.5 m{height}", False, placement.stock_left),)
@@ -110,7 +110,7 @@ def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
 
 def _words_of(measure: AnyMeasure, known: Components) -> str:
     """Return a measure in words: `window, 12 mm laminated on office, west, storeys 1`."""
-    if isinstance(measure, Removable):
+    if isinstance(measure, Demolition):
         return f"removes {', '.join(measure.structures)}: needs a new blast"
     names = [each for each in (measure.glazing, measure.wall) if each]
     what = " and ".join(known[name].title or name for name in names)
@@ -163,7 +163,7 @@ def moved_to(old: Element, cell: Cell) -> Element:
 
 def reason_against(scenario: Scenario, layout: Layout, new: Element) -> str | None:
     """Return the reason why an element cannot stand beside a layout, or `None` if it can."""
-    return Placement.of(scenario.without_budget, layout).explain(new)
+    return LayoutState.of(scenario.without_budget, layout).explain(new)
 
 
 def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple[str, ...]]:
@@ -173,9 +173,9 @@ def what_still_stands(scenario: Scenario, layout: Layout) -> tuple[Layout, tuple
         The layout, and one reason for each element removed.
     """
     try:
-        return Placement.of(scenario.without_budget, layout).layout, ()
+        return LayoutState.of(scenario.without_budget, layout).layout, ()
     except LayoutError:
-        placement, reasons = Placement.empty(scenario.without_budget), []
+        placement, reasons = LayoutState.empty(scenario.without_budget), []
     for each in layout:
         try:
             placement = placement.place(each)
@@ -189,7 +189,7 @@ def counted(scenario: Scenario, layout: Layout) -> str:
     zone = scenario.build_zone
     if zone is None:
         return "no build zone"
-    placement = Placement.of(scenario.without_budget, layout)
+    placement = LayoutState.of(scenario.without_budget, layout)
     what = "pieces" if zone.items else "modules"
     words = f"{len(layout)} of {zone.stock} {what}, cost {placement.cost:g}"
     if zone.budget is None:
@@ -200,4 +200,4 @@ def counted(scenario: Scenario, layout: Layout) -> str:
 
 def cost_of(scenario: Scenario, layout: Layout) -> float:
     """Return the cost of a layout."""
-    return Placement.of(scenario.without_budget, layout).cost
+    return LayoutState.of(scenario.without_budget, layout).cost

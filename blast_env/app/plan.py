@@ -13,7 +13,7 @@ from blast_env.app import edits
 from blast_env.app.editor import Ghost
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.geometry import Cell, Layout, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
     FAINT,
@@ -156,7 +156,7 @@ def _features(scenario: Scenario, layout: Layout) -> tuple[Feature, ...]:
     """Return everything that the plan shows, the lowest first."""
     found = [*site_features(scenario, layout), *vehicle_features(scenario, layout)]
     if scenario.build_zone is not None:
-        usable = Placement.of(scenario.without_budget, layout).usable
+        usable = LayoutState.of(scenario.without_budget, layout).usable
         found += cell_features(scenario.build_zone, usable)
     return in_order(found)
 

@@ -27,7 +27,7 @@ from blast_env.evaluation.grid_error import CellErrors, points
 from blast_env.files import write_atomically
 from blast_env.gas.settings import UNIFORM
 from blast_env.geometry import Layout
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout.placement import load_relevant
 from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.scene import Charge
 from blast_env.statistics import counted_parts, reductions
@@ -295,7 +295,7 @@ def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: Engine
     depends = (
         scenario.content_hash,
         divided,
-        sorted(map(tuple, met_by_blasts(layout))),
+        sorted(map(tuple, load_relevant(layout))),
         tuple(charge),
         engine.name,
         engine.gas.smallest_m if engine.cells == UNIFORM else engine.cells,
@@ -359,7 +359,7 @@ class VerdictRow(Kept):
 
 def comparison(
     records: Sequence[tuple[str, float, BlastRecord]],
-    bare: Mapping[str, BlastRecord],
+    without: Mapping[str, BlastRecord],
     scenario: Scenario,
     coarse: Mapping[str, CoarseLoads] = MappingProxyType({}),
 ) -> list[Row]:
@@ -370,15 +370,15 @@ def comparison(
 
     Args:
         records: Name, cost and blast of each layout.
-        bare: The blast without a barrier, by the name of the threat.
+        without: The blast without a barrier, by the name of the threat.
         scenario: The site.
         coarse: Loads on the coarser cells, by the key of the blast.
     """
     objective = scenario.objective
-    errors = _errors(records, bare, objective, coarse)
+    errors = _errors(records, without, objective, coarse)
     rows = []
     for name, cost, record in records:
-        unprotected, error = bare.get(record.threat), errors.get(name)
+        unprotected, error = without.get(record.threat), errors.get(name)
         for title, names in _shown(record):
             load_of, impulse_of = partial(_load, objective, names), partial(_impulse, names)
             loads = blast_loads(record)
@@ -426,14 +426,14 @@ def load_text(objective: ObjectiveSection, load: float) -> str:
 
 def _errors(
     records: Sequence[tuple[str, float, BlastRecord]],
-    bare: Mapping[str, BlastRecord],
+    without: Mapping[str, BlastRecord],
     objective: ObjectiveSection,
     coarse: Mapping[str, CoarseLoads],
 ) -> dict[str, CellErrors]:
     """Return the errors of the cells by the name of the layout, from its largest load."""
     found: dict[str, CellErrors] = {}
     for name, _, record in sorted(records, key=lambda each: -worst_first(objective, each[2])):
-        unprotected = bare.get(record.threat)
+        unprotected = without.get(record.threat)
         if unprotected is None or name in found:
             continue
         if record.key in coarse and unprotected.key in coarse:

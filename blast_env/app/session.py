@@ -412,21 +412,21 @@ class Session:
     def comparison(self) -> list[Row]:
         """Return the table of all blasts of the current design."""
         records: list[tuple[str, float, BlastRecord]] = []
-        bare: dict[str, BlastRecord] = {}
+        without: dict[str, BlastRecord] = {}
         for threat in self.chosen_threats():
             for each in self.shown(threat):
                 record = self.folder.record_of(each.key)
                 if record is None:
                     continue
                 if each.name == BARE:
-                    bare[record.threat] = record
+                    without[record.threat] = record
                 records.append((each.name, placing.cost_of(self.scenario, each.layout), record))
         coarse = {
             record.key: loads
             for _, _, record in records
             if (loads := self.folder.coarse_of(record.key)) is not None
         }
-        return comparison(records, bare, self.scenario, coarse)
+        return comparison(records, without, self.scenario, coarse)
 
     def verdicts(self) -> list[VerdictRow]:
         """Return the verdicts on the buildings in all blasts of the current design."""

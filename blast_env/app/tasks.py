@@ -129,7 +129,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
     method = find_proposer(task.method, (begin_with,) if begin_with else ())
     engine = task.engine.found
     problem = DesignProblem(
-        BlastEvaluator(scenario, engine, cache=task.cache), practice_case(scenario, task)
+        BlastEvaluator(scenario, engine, cache=task.cache), search_case(scenario, task)
     )
     teller.tell(text="blasts without a barrier")
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
@@ -159,7 +159,7 @@ def _search(task: SearchTask, teller: Teller) -> None:
     teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
 
 
-def practice_case(scenario: Scenario, task: SearchTask) -> Case:
+def search_case(scenario: Scenario, task: SearchTask) -> Case:
     """Return the load cases of a search: the threats, with several seeds each for particles."""
     charges = [each.charge for each in task.threats]
     noisy = task.engine.is_first_look
@@ -173,13 +173,13 @@ def _film(task: FilmTask, teller: Teller) -> None:
     scenario, charge = task.site, task.threats[0].charge
     layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
     engine = task.engine.found
-    bare, own = (engine.blast(scenario, each, 0, charge) for each in ((), layout))
+    unprotected, own = (engine.blast(scenario, each, 0, charge) for each in ((), layout))
     write: Callable[..., object]
     if task.engine.is_first_look:
         from blast_env.plots.film import write_film as write
     else:
         from blast_env.plots.pressure_film import write_pressure_film as write
-    write(own, path, beside=bare if layout else None, progress=teller.share)
+    write(own, path, beside=unprotected if layout else None, progress=teller.share)
     teller.tell(state="done", share=1.0, text=f"wrote {path.name}", file=str(path))
 
 

@@ -19,7 +19,7 @@ from blast_env.evaluation.probability import Uncertainty, level_probability, pro
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout.placement import load_relevant
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import peak_factor, respond
 from blast_env.site import AnyCharge, Scenario
@@ -72,7 +72,7 @@ def stored_consequences(
     if not rows:
         return None
     bays = [known[names[row]] for row in rows]
-    site = build_site(scenario, met_by_blasts(layout), 0, charge)
+    site = build_site(scenario, load_relevant(layout), 0, charge)
     found = respond(bays, time_s, pressure[rows].astype(np.float64))
     factor = peak_factor(cell_m, site.charge.tnt_kg)
     return Consequences(tuple(by_building(scenario, found, site, factor)))

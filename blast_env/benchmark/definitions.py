@@ -14,9 +14,9 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import Case, LoadCase, SeedRange, draw_threats
 from blast_env.evaluation.cases import (
     fixed_charges,
+    hidden_search_set,
+    known_search_set,
     one_of_each_charge,
-    practice_hidden,
-    practice_visible,
     visible_case,
 )
 from blast_env.layout.build_scene import draw_threat
@@ -24,7 +24,7 @@ from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
 from blast_env.sites import FAMILIES, generate_site
 from blast_env.values import whole_number
 
-Family = Literal["told", "hidden", "vehicle", "unseen", "response"]
+Family = Literal["known", "hidden", "vehicle", "unseen", "response"]
 
 BUDGETS: Final = (0, 50, 200, 1000)
 """Gas blasts that a method may spend on a problem."""
@@ -63,7 +63,7 @@ class Definition:
     Attributes:
         site: Bundled name, path, or `site_SEED` for a generated site with heights and a catalogue.
         family: Knowledge of the charge.
-        place: Number of the charge in the family `told`, from 1: one of each of the site's sources
+        place: Number of the charge in the family `known`, from 1: one of each of the site's sources
             in turn, then another of each.
         version: Version; 1 had the sum of positive phases as load.
     """
@@ -75,7 +75,7 @@ class Definition:
 
     @property
     def name(self) -> str:
-        """Name, such as `control_room-told-v2`; with another place, `control_room-told_2-v2`."""
+        """Name, such as `control_room-known-v2`; with another place, `control_room-known_2-v2`."""
         place = "" if self.place == 1 else f"_{self.place}"
         return f"{Path(self.site).stem}-{self.family}{place}-v{self.version}"
 
@@ -88,37 +88,37 @@ class Definition:
 
     @cached_property
     def case(self) -> Case:
-        """The case of the judge; its `practice` is the case of `evaluate`.
+        """The case of the judge; its `search_set` is the case of `evaluate`.
 
-        Both have the same charge in the family `told`. Otherwise each draws a few charges, at
+        Both have the same charge in the family `known`. Otherwise each draws a few charges, at
         different places unless the site has only a few places.
         """
-        case = self._told() if self.family == "told" else self._hidden()
+        case = self._known() if self.family == "known" else self._hidden()
         return replace(case, name=self.name)
 
     @cached_property
     def digest(self) -> str:
         """Digest of site, charges and budgets, 16 hexadecimal digits."""
-        practice = self.case.practice
-        assert practice is not None
+        search_set = self.case.search_set
+        assert search_set is not None
         says = {
             "name": self.name,
             "scenario": self.scenario.content_hash,
             "budgets": BUDGETS,
             "judged": [_charge(each) for each in self.case.threats],
-            "practice": [_charge(each) for each in practice.threats],
+            "search_set": [_charge(each) for each in search_set.threats],
         }
         return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
 
-    def _told(self) -> Case:
+    def _known(self) -> Case:
         scenario = self.scenario
         drawn, number = divmod(self.place - 1, len(scenario.charge))
-        seed = SeedRange.JUDGEMENT.seeds(drawn * _STRIDE, 1)[0]
+        seed = SeedRange.TEST.seeds(drawn * _STRIDE, 1)[0]
         source = scenario.charge[number]
         alone = scenario.model_copy(update={"charge": (source,)})
         charge = draw_threat(alone, seed)
         judged = visible_case(scenario, charge, [seed])
-        return replace(judged, practice=practice_visible(scenario, charge, 1, 0))
+        return replace(judged, search_set=known_search_set(scenario, charge, 1, 0))
 
     def _hidden(self) -> Case:
         scenario = self.scenario
@@ -127,10 +127,10 @@ class Definition:
         )
         own = _JUDGED_UNSEEN if self.family == "unseen" else _JUDGED_CHARGES
         judged, met = (_DRAWS, _DRAWS) if few else (own, _PRACTICE_CHARGES)
-        threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, judged))
-        practice = practice_hidden(scenario, met, 1, 0)
-        practice = replace(practice, threats=one_of_each_charge(practice.threats))
-        return Case(scenario, one_of_each_charge(threats), practice=practice)
+        threats = draw_threats(scenario, SeedRange.TEST.seeds(0, judged))
+        search_set = hidden_search_set(scenario, met, 1, 0)
+        search_set = replace(search_set, threats=one_of_each_charge(search_set.threats))
+        return Case(scenario, one_of_each_charge(threats), search_set=search_set)
 
 
 def _charge(threat: LoadCase) -> object:
@@ -151,8 +151,8 @@ _FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
 
 def _definitions() -> tuple[Definition, ...]:
     return (
-        *(Definition(site, "told", place) for site in _STREETS for place in (1, 2, 3)),
-        *(Definition(site, "told") for site in _OPEN),
+        *(Definition(site, "known", place) for site in _STREETS for place in (1, 2, 3)),
+        *(Definition(site, "known") for site in _OPEN),
         *(Definition(site, "hidden") for site in _STREETS),
         *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
         *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
@@ -166,7 +166,11 @@ DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
 )
 """All public problems by name."""
 
-SMALL: Final = ("visitor_entrance-told_2-v2", "control_room-told-v2", "school_and_clinic-told-v2")
+SMALL: Final = (
+    "visitor_entrance-known_2-v2",
+    "control_room-known-v2",
+    "school_and_clinic-known-v2",
+)
 """A few problems with one blast per layout, for a first look and for methods with many seeds."""
 
 
@@ -195,13 +199,13 @@ def site_problems(
         BlastEnvError: If the file is invalid, it has no build zone, or `most` is out of bounds.
     """
     site = str(scenario)
-    found = Definition(site, "vehicle" if is_hidden else "told")
+    found = Definition(site, "vehicle" if is_hidden else "known")
     found.scenario.zone  # noqa: B018  # refuses a scenario without one
     if is_hidden:
         return (found if found.scenario.vehicles else Definition(site, "hidden"),)
     count = whole_number("cases", most, 1, MOST_PLACES)
     count = min(count, len(fixed_charges(found.scenario)) or count)
-    return tuple(Definition(site, "told", place) for place in range(1, count + 1))
+    return tuple(Definition(site, "known", place) for place in range(1, count + 1))
 
 
 @cache

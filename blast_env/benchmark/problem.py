@@ -69,7 +69,7 @@ class BenchmarkProblem(DesignProblem):
 
     @property
     def family(self) -> str:
-        """The family: `told`, `hidden`, `vehicle`, `unseen` or `response`."""
+        """The family: `known_charge`, `hidden`, `vehicle`, `unseen` or `response`."""
         return self.definition.family
 
     @property
@@ -182,7 +182,7 @@ def shares_of(
         each.load(case.scenario.objective) for each in evaluator.loads_of_many(pairs, processes)
     ]
     of_layout = [
-        case.counted(own, layout)
+        case.objective_value(own, layout)
         for layout, own in zip(
             ((), *layouts), np.reshape(loads, (-1, len(case.threats))), strict=True
         )
@@ -202,7 +202,7 @@ def make(
     """Return a problem of the benchmark.
 
     Args:
-        problem: Its name, such as `control_room-told-v2`, or its definition.
+        problem: Its name, such as `control_room-known-v2`, or its definition.
         budget: Most gas blasts.
         cell_m: Side of the cells, m; 0.5 unless given.
         engine: Another engine than gas dynamics, for tests.
@@ -220,10 +220,10 @@ def make(
             f"{definition.name}: the site or its charges have changed (digest {definition.digest}, "
             f"must be {known.digest}): a version never changes its content"
         )
-    practice = definition.case.practice
-    assert practice is not None
+    search_set = definition.case.search_set
+    assert search_set is not None
     whole_number("budget", budget, 0, BUDGETS[-1])
-    most = budget + len(practice.threats)
+    most = budget + len(search_set.threats)
     found = find_engine(engine, cell_m)
     evaluator = BlastEvaluator(definition.scenario, found, cache_size=most, cache=cache)
-    return BenchmarkProblem(evaluator, practice, budget=budget, definition=definition)
+    return BenchmarkProblem(evaluator, search_set, budget=budget, definition=definition)

@@ -9,7 +9,7 @@ import numpy as np
 from blast_env.arrays import IntArray
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Cell, Element, Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 
 KEYS_PER_PIECE = 3
@@ -37,8 +37,8 @@ class LayoutSpace:
     scenario: Scenario
 
     @cached_property
-    def _empty(self) -> Placement:
-        return Placement.empty(self.scenario)
+    def _empty(self) -> LayoutState:
+        return LayoutState.empty(self.scenario)
 
     @cached_property
     def options(self) -> tuple[tuple[Element, ...], ...]:
@@ -93,7 +93,7 @@ class LayoutSpace:
             LayoutError: If it is not legal.
         """
         choices = np.zeros(len(self.options), dtype=np.int64)
-        for element in Placement.of(self.scenario, layout).layout:
+        for element in LayoutState.of(self.scenario, layout).layout:
             place, choice = self._place_of[element]
             choices[place] = choice
         return choices

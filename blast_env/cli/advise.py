@@ -56,8 +56,8 @@ from blast_env.evaluation.probability import (
     probability_text,
 )
 from blast_env.geometry import Layout, layout_words
-from blast_env.layout import Placement, write_layout
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout import LayoutState, write_layout
+from blast_env.layout.placement import load_relevant
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
@@ -223,13 +223,13 @@ class _Judge:
 
         The search's blasts serve it if their cells are twice as large as the judge's.
         """
-        fine, bare = self.judged[layout], self.judged[()]
+        fine, unprotected = self.judged[layout], self.judged[()]
         threat = self.problem.threats[fine.worst_number]
-        of_both = fine.loads[fine.worst_number], bare.loads[fine.worst_number]
+        of_both = fine.loads[fine.worst_number], unprotected.loads[fine.worst_number]
         coarser: BlastEvaluator | None = self.problem.evaluator
         if self.engine.coarser != self.problem.evaluator.engine:
             coarser = BlastEvaluator(self.scenario, self.engine).coarser()
-        return grid_error(coarser, self.problem.case, met_by_blasts(layout), threat, of_both)
+        return grid_error(coarser, self.problem.case, load_relevant(layout), threat, of_both)
 
 
 def _draw(judge: _Judge, found: Sequence[Advice]) -> "Figure":
@@ -264,7 +264,7 @@ def _print(judge: _Judge, best: Advice, found: Sequence[Advice]) -> None:
             (
                 each.kind,
                 layout_words(each.layout),
-                f"{Placement(scenario, each.layout).cost:g}",
+                f"{LayoutState(scenario, each.layout).cost:g}",
                 str(each.blasts),
                 min(seen.level(building) for building in seen.buildings).label,
                 "yes" if each.passes else "no",
@@ -285,7 +285,7 @@ def _answer(judge: _Judge, best: Advice, found: Sequence[Advice]) -> str:
     """Return the answer in a line or two: the cost to pass, and whether walls help."""
     scenario, target = judge.scenario, judge.target
     by_kind = {each.kind: each for each in found}
-    cost = Placement(scenario, best.layout).cost
+    cost = LayoutState(scenario, best.layout).cost
     flagged = " (flagged)" if judge.judged[best.layout].is_flagged else ""
     wanted = scenario.objective.target_probability
     likely = probability_text(judge.shares[best.layout], DRAWS)
@@ -303,7 +303,7 @@ def _answer(judge: _Judge, best: Advice, found: Sequence[Advice]) -> str:
     shield, nothing = by_kind.get(MeasureKind.SHIELD), by_kind[MeasureKind.NOTHING]
     if shield is None or judge.judged[shield.layout].passes(target):
         return answer
-    barrier = set(met_by_blasts(best.layout))
+    barrier = set(load_relevant(best.layout))
     gain = 1.0 - (shield.worth - 1.0) / (nothing.worth - 1.0) if nothing.worth > 1.0 else 0.0
     if best.passes and not barrier:
         return f"Walls are worth nothing here: better components alone are cheaper. {answer}"

@@ -241,7 +241,9 @@ def _overlap(settings: TrainingSettings, seeds: range) -> str:
     """Return a note if the weights were selected by some of the threats; else an empty text."""
     if settings.scenario in FAMILIES:  # other sites, whatever the seeds
         return ""
-    chosen_by = SeedRange.SELECTION.seeds(settings.evaluation_first_seed, settings.evaluation_cases)
+    chosen_by = SeedRange.VALIDATION.seeds(
+        settings.evaluation_first_seed, settings.evaluation_cases
+    )
     both = range(max(seeds[0], chosen_by[0]), min(seeds[-1], chosen_by[-1]) + 1)
     if not both:
         return ""

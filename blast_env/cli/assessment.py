@@ -89,15 +89,15 @@ class Assessed:
         """The error of the cells under the worst charge; `None` without coarser cells."""
         if self.coarser is None:
             return None
-        number, bare = self.judged.worst_number, next(iter(self.found))
+        number, unprotected = self.judged.worst_number, next(iter(self.found))
         threat = LoadCase(self.judged.barriers[number].charge)
         return GridError(
             case=Case(self.scenario, (threat,)),
             layout=self.layouts[self.name],
             threat=threat,
             coarser=self.coarser,
-            fine=(self.judged.loads[number], self.found[bare].loads[number]),
-            coarse=(self.coarse[self.name].loads[0], self.coarse[bare].loads[0]),
+            fine=(self.judged.loads[number], self.found[unprotected].loads[number]),
+            coarse=(self.coarse[self.name].loads[0], self.coarse[unprotected].loads[0]),
         )
 
     @property

@@ -9,7 +9,7 @@ from blast_env.cli.output import print_line
 from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.suitability import suitability
-from blast_env.layout import Placement, load_layout
+from blast_env.layout import LayoutState, load_layout
 from blast_env.site import find_problems, load_scenario
 
 
@@ -64,7 +64,7 @@ def _draw(name: str, layout: Path | None, view: str, corner: str | None, out: Pa
     from blast_env.plots.figures import save_figure
     from blast_env.plots.site_picture import site_picture
 
-    for sentence in Placement.of(scenario, elements).explain_vehicles():
+    for sentence in LayoutState.of(scenario, elements).explain_vehicles():
         print_line(sentence)
     figure = site_picture(scenario, elements, view, corner)
     print_line(f"wrote {save_figure(figure, out or Path(f'{scenario.name}.png'))}")

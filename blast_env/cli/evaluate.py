@@ -89,7 +89,7 @@ def evaluate(
     """
     check_cvar_level(cvar_level)
     if first_seed is None:
-        drawn = SeedRange.JUDGEMENT.seeds(0, seeds)
+        drawn = SeedRange.TEST.seeds(0, seeds)
     else:
         drawn = range(first_seed, first_seed + seeds)
     options = EvaluateOptions(

@@ -316,13 +316,18 @@ def impulse_text(error: GridError) -> str:
         pa_s = impulse_of(error.fine[number])
         return with_errors(f"{pa_s:,.0f} Pa s", "" if isnan(share) else f"{share * pa_s:,.0f}")
 
-    walled, bare = text(0, error.of_load(impulse_of)), text(1, error.of_unprotected(impulse_of))
+    protected, unprotected = (
+        text(0, error.of_load(impulse_of)),
+        text(1, error.of_unprotected(impulse_of)),
+    )
     words = "impulse on the protected structures under the worst charge"
     if not error.layout:
-        return f"{words}: {walled}"
+        return f"{words}: {protected}"
     gone = reductions(*map(impulse_of, error.fine)).item()
     share = with_errors(percent(gone), points(error.of_reduction(impulse_of)))
-    return f"{words}: {bare} without barrier, {walled} with, reduction {share}{worse(gone)}"
+    return (
+        f"{words}: {unprotected} without barrier, {protected} with, reduction {share}{worse(gone)}"
+    )
 
 
 def _number(load: float, error: float) -> str:

@@ -247,13 +247,13 @@ def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> 
 
 def _progress_lines(console: Console, label: str) -> Callable[..., None]:
     """Return a function that writes the completed share, at most every half minute."""
-    began = told = perf_counter()
+    began = printed_s = perf_counter()
 
     def show(share: float, words: str = "") -> None:
-        nonlocal told
+        nonlocal printed_s
         now = perf_counter()
-        if now - told >= _LINE_EVERY_S:
-            told = now
+        if now - printed_s >= _LINE_EVERY_S:
+            printed_s = now
             text = f"{label}: {share:.0%} after {now - began:,.0f} s"
             console.print(f"{text}, {words}" if words else text)
 

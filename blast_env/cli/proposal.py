@@ -30,7 +30,7 @@ from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.evaluation.grid_error import final_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout, layout_counts
-from blast_env.layout import Placement, write_layout
+from blast_env.layout import LayoutState, write_layout
 from blast_env.provenance import command, versions
 from blast_env.runner import share_of
 from blast_env.site import Scenario
@@ -90,7 +90,7 @@ def _words(scenario: Scenario, result: SearchResult) -> str:
     """Return the proposal in words, with its cost and its expected gain."""
     if not result.layout:
         return "nothing is proposed"
-    placement = Placement.of(scenario, result.layout)
+    placement = LayoutState.of(scenario, result.layout)
     cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"
     gain = result.expectation
     return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
@@ -114,7 +114,7 @@ def verify_proposal(
     """
     if budget is not None and budget < 2:
         raise BlastEnvError(f"--budget is {budget}, must be at least 2 with --verify")
-    case, rules = problem.case, layouts_by_rule(problem.scenario, problem.told)
+    case, rules = problem.case, layouts_by_rule(problem.scenario, problem.known_charge)
     layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
     if budget is not None:
         case = replace(case, threats=case.threats[: budget // 2])
@@ -156,7 +156,9 @@ def _print_verdict(found: Mapping[str, Evaluation], case: Case) -> None:
     """Print one row per layout: no barrier, the rules with the best last, and the proposal."""
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     objective = case.scenario.objective
-    loads = {name: case.counted(each.loads[0], each.layouts[0]) for name, each in found.items()}
+    loads = {
+        name: case.objective_value(each.loads[0], each.layouts[0]) for name, each in found.items()
+    }
     rules = sorted(loads.keys() - {_NOTHING, _PROPOSAL}, key=lambda name: -loads[name])
     rows = []
     for name in (_NOTHING, *rules, _PROPOSAL):

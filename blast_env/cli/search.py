@@ -63,7 +63,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_against,
 )
-from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
+from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
@@ -173,11 +173,11 @@ def search(
             refuse_given(
                 context, ("charge", "tnt_kg"), "is for a visible threat: a hidden one is drawn"
             )
-            case = practice_hidden(site, model.threats, repeats, seed, measure)
+            case = hidden_search_set(site, model.threats, repeats, seed, measure)
         else:
             # The known charge is always drawn by the seed of the search.
             drawn = given.fixed(site, site.sample_charge(np.random.default_rng(seed)))
-            case = practice_visible(site, drawn, repeats, seed, measure)
+            case = known_search_set(site, drawn, repeats, seed, measure)
         problem = DesignProblem(BlastEvaluator(site, used, cache=cache), case, processes)
         run = _run(proposer, problem, DEFAULT_BUDGET if budget is None else budget, seed)
         if run.result.interrupted and not run.result.history:
@@ -259,7 +259,7 @@ def _check(
 
     Without noise a charge is one blast: a charge used by the search is not held out.
     """
-    problem, seeds = run.problem, SeedRange.JUDGEMENT.seeds(0, held_out)
+    problem, seeds = run.problem, SeedRange.TEST.seeds(0, held_out)
     if is_hidden:
         threats = draw_threats(problem.scenario, seeds)
     else:
@@ -283,12 +283,15 @@ def _check(
 def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
     """Print the effect of the layout on the search's threats and on others, and the cost."""
     result, problem = run.result, run.problem
-    bare, load = problem.case.counted(problem.unprotected), problem.load(result.layout)
+    unprotected, load = (
+        problem.case.objective_value(problem.unprotected),
+        problem.load(result.layout),
+    )
     text = problem.scenario.objective.text
     rows = [
         (
-            *("of the search", str(len(problem.threats)), text(bare), text(load)),
-            *(percent(reductions(load, bare).item()), "-"),
+            *("of the search", str(len(problem.threats)), text(unprotected), text(load)),
+            *(percent(reductions(load, unprotected).item()), "-"),
         )
     ]
     if checked is not None:

@@ -21,7 +21,7 @@ from blast_env.evaluation import (
     SeedRange,
     draw_threats,
 )
-from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
+from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
@@ -74,7 +74,7 @@ class Chosen:
         """
         result = self.proposer.propose(problem, 0, seed, report)
         by, guesses = self.by, _guesses(problem)
-        rules = layouts_by_rule(problem.scenario, problem.told)
+        rules = layouts_by_rule(problem.scenario, problem.known_charge)
         layout = worth_its_pieces(guesses, result.layout, rules.values())
         gain = reductions(*guesses.loads([layout, ()])).item()
         if not gain >= LEAST_GAIN:  # NaN: nothing arrives
@@ -110,7 +110,7 @@ def _guesses(problem: DesignProblem) -> "Guesses":
     from blast_env.design.surrogate import packaged_surrogate
     from blast_env.design.surrogate.search import Guesses, case_for
 
-    return Guesses.of(packaged_surrogate(), case_for(problem.scenario, problem.told))
+    return Guesses.of(packaged_surrogate(), case_for(problem.scenario, problem.known_charge))
 
 
 def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]) -> Layout:
@@ -129,11 +129,11 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
     def load(each: Layout) -> float:
         return guesses.loads([each]).item()
 
-    bare, ruled = load(()), [tuple(sorted(each)) for each in rules]
+    unprotected, ruled = load(()), [tuple(sorted(each)) for each in rules]
     best = min([layout, *ruled], key=load)
-    most = min(map(load, ruled), default=bare)
-    if load(best) <= (1.0 - LEAST_GAIN) * bare:
-        most = min(most, (1.0 - LEAST_GAIN) * bare)
+    most = min(map(load, ruled), default=unprotected)
+    if load(best) <= (1.0 - LEAST_GAIN) * unprotected:
+        most = min(most, (1.0 - LEAST_GAIN) * unprotected)
 
     def without(piece: Element) -> Layout:
         return tuple(each for each in best if each != piece)
@@ -143,7 +143,7 @@ def worth_its_pieces(guesses: "Guesses", layout: Layout, rules: Iterable[Layout]
     guesses.loads([without(piece) for piece in pieces])  # all at once
     for piece in sorted(pieces, key=lambda each: load(without(each))):
         fewer = without(piece)
-        if load(fewer) <= min(load(best) + LEAST_PIECE_GAIN * bare, most):
+        if load(fewer) <= min(load(best) + LEAST_PIECE_GAIN * unprotected, most):
             best = fewer
     return best
 
@@ -239,10 +239,10 @@ def search(
     found = find_scenario(scenario)
     evaluator = BlastEvaluator(found, engine, cache=cache)
     if charge is None:
-        case = practice_hidden(found, threats, 1, seed)
+        case = hidden_search_set(found, threats, 1, seed)
     else:
         realisations = find_realisations(None, "visible", evaluator.engine)
-        case = practice_visible(found, charge, realisations, seed)
+        case = known_search_set(found, charge, realisations, seed)
     problem = DesignProblem(evaluator, case, processes)
     proposer = find_proposer(method, tuple(tuple(each) for each in initial))
     blasts = proposer_row(method).budget if budget is None else budget
@@ -263,7 +263,7 @@ def problem_of(
     only = found.charge[0]
     if charge is None and len(found.charge) == 1 and isinstance(only, PointSource):
         charge = Charge(only.position_m, only.tnt_kg, only.height_m)
-    first = SeedRange.JUDGEMENT.value.start
+    first = SeedRange.TEST.value.start
     if charge is not None:
         case = Case(found, (LoadCase(charge, first),), charge=charge)
     else:

@@ -16,7 +16,7 @@ import numpy as np
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, VehicleSource, find_scenario
 from blast_env.site.catalogue import Variant
 from blast_env.site.scene import Charge
@@ -63,7 +63,7 @@ def line_of_sight_wall(
     (`"long"`), until its stock or the budget is used up; then of the next one. Items of a single
     module, such as posts, stay in stock if there are others.
 
-    `Placement` checks every module: budget, access way and all other conditions hold.
+    `LayoutState` checks every module: budget, access way and all other conditions hold.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone.
@@ -81,19 +81,19 @@ def line_of_sight_wall(
         BlastEnvError: If the scenario has no build zone, `share` is not from 0 to 1, or the charge
             is at the centre of the protected structures.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     return wall_added_to(placement, _place_m(placement, charge), share, kind).layout
 
 
-def _place_m(placement: Placement, charge: AnyCharge | None) -> PointM:
+def _place_m(placement: LayoutState, charge: AnyCharge | None) -> PointM:
     """Return the place of a charge: the mean of its possible places."""
     sources = placement.scenario.charge if charge is None else (source_of(charge),)
     return expected_charge(sources).position_m
 
 
 def wall_added_to(
-    placement: Placement, charge_m: PointM, share: float, kind: WallKind = "high"
-) -> Placement:
+    placement: LayoutState, charge_m: PointM, share: float, kind: WallKind = "high"
+) -> LayoutState:
     """Return a placement with an additional wall; see `line_of_sight_wall`.
 
     Args:
@@ -127,7 +127,7 @@ def wall_added_to(
     return placement
 
 
-def _preferred(placement: Placement, lies_along: BoolArray, kind: WallKind) -> list[int]:
+def _preferred(placement: LayoutState, lies_along: BoolArray, kind: WallKind) -> list[int]:
     """Return the indices of the variants for a wall, in order of preference.
 
     Args:
@@ -188,7 +188,7 @@ def ring_around_charge(scenario: AnyScenario, charge: AnyCharge | None) -> Layou
     Raises:
         BlastEnvError: As for `line_of_sight_wall`.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     (x_m, y_m), radius_m = _place_m(placement, charge), placement.scenario.charge_radius_m
     around = Rectangle(x_m, y_m, x_m, y_m).grown(radius_m)
     return _ring(placement, around, _protected_middle_m(placement.scenario))
@@ -202,7 +202,7 @@ def ring_around_building(scenario: AnyScenario, charge: AnyCharge | None) -> Lay
     Raises:
         BlastEnvError: As for `line_of_sight_wall`.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     protected = [each.rectangle_m for each in placement.scenario.structures if each.protected]
     place_m = _place_m(placement, charge)
     nearest = min(protected, key=lambda rectangle: rectangle.distance_to(place_m))
@@ -284,7 +284,7 @@ class _View:
     between: BoolArray
 
     @classmethod
-    def of(cls, placement: Placement, charge_m: PointM) -> "_View":
+    def of(cls, placement: LayoutState, charge_m: PointM) -> "_View":
         scenario = placement.scenario
         x_m, y_m = scenario.zone.centres_m
         target_x_m, target_y_m = _protected_middle_m(scenario)
@@ -374,7 +374,7 @@ _RING_START_RAD: Final = 0.2
 """Pieces within this angle beyond the first possible one determine the distance of a ring."""
 
 
-def _ring(placement: Placement, around: Rectangle, start_m: PointM) -> Layout:
+def _ring(placement: LayoutState, around: Rectangle, start_m: PointM) -> Layout:
     """Return a wall around a rectangle, as near to it as pieces can stand.
 
     Pieces lie along the adjacent side of the rectangle. The first one stands on the line from the
@@ -410,7 +410,7 @@ def _ring(placement: Placement, around: Rectangle, start_m: PointM) -> Layout:
 
 
 def _around(
-    placement: Placement, around: Rectangle, start_m: PointM
+    placement: LayoutState, around: Rectangle, start_m: PointM
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Return the positions of pieces relative to a rectangle (variants, rows, columns).
 
@@ -470,13 +470,13 @@ def random_layout(scenario: AnyScenario, rng: np.random.Generator) -> Layout:
     Returns:
         The modules or pieces in the order of their placement; none without a build zone.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     while not placement.is_full:
         placement = placement.place(random_element(placement, rng))
     return placement.layout
 
 
-def random_element(placement: Placement, rng: np.random.Generator) -> Element:
+def random_element(placement: LayoutState, rng: np.random.Generator) -> Element:
     """Return a random legal module, or a piece of a random item.
 
     Args:

@@ -42,7 +42,7 @@ from blast_env.evaluation.engines import Engine, default_engine, find_engine
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnyScenario
 from blast_env.statistics import CVAR_LEVEL, Risk
 from blast_env.values import real_number, whole_number
@@ -86,7 +86,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
 
     ## Episode end
     Terminated when the agent finishes, nothing more can be placed, an illegal action that changed
-    nothing is repeated at once, or after `illegal_action_limit` of them. At the end `info` has the
+    nothing is repeated at once, or after `invalid_action_limit` of them. At the end `info` has the
     impulses with and without the barrier, `reduction`, `layout`, charges and seeds of the blasts.
 
     ## Arguments
@@ -130,8 +130,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         risk: str | Risk | None = None,
         cvar_level: float = CVAR_LEVEL,
         invalid_action: str = "nearest",
-        illegal_action_cost: float = 0.001,
-        illegal_action_limit: int = 100,
+        invalid_action_cost: float = 0.001,
+        invalid_action_limit: int = 100,
         engine: str | Engine | None = None,
         cell_m: float | None = None,
         cache: str | Path | BlastStore | None = None,
@@ -156,9 +156,9 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             cvar_level: The CVaR is the mean over the worst share 1 - `cvar_level` of the charges.
             invalid_action: `"nearest"` or `"penalty"`: whether the nearest legal place of the same
                 item takes the place of an illegal one.
-            illegal_action_cost: Cost of an illegal action without effect, in the unit of the
+            invalid_action_cost: Cost of an illegal action without effect, in the unit of the
                 reward; 0.001 psi s are 6.9 Pa s.
-            illegal_action_limit: Number of illegal actions without effect that ends the episode.
+            invalid_action_limit: Number of illegal actions without effect that ends the episode.
             engine: Name of an engine, or an engine; by default `"event"`, and `"gas"` for sites
                 that state heights. `"event"` and `"pymunk"` run the particle model: for studying
                 it, for cheap tests of learning methods, for a first look. `"gas"` is the basis for
@@ -185,8 +185,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         check_names("invalid_action", [invalid_action], INVALID_ACTIONS)
         self.illegal = IllegalActions(
             invalid_action == "nearest",
-            real_number("illegal_action_cost", illegal_action_cost, 0.0, 1e6),
-            whole_number("illegal_action_limit", illegal_action_limit, 1, 1_000_000),
+            real_number("invalid_action_cost", invalid_action_cost, 0.0, 1e6),
+            whole_number("invalid_action_limit", invalid_action_limit, 1, 1_000_000),
         )
         self.task = Task(
             source=source,
@@ -301,7 +301,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         return self.placement.explain_vehicles()
 
     @property
-    def placement(self) -> Placement:
+    def placement(self) -> LayoutState:
         """The modules or pieces placed so far."""
         return self._episode.placement
 

@@ -13,7 +13,7 @@ from blast_env.envs.observations import VehicleView
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnySource, PointSource, Scenario
 from blast_env.site.zone import distances_m
 from blast_env.units import MODULE_SIDE_M
@@ -36,7 +36,7 @@ _LEGEND: Final = {
 
 
 def placing_text(
-    placement: Placement, sources: Sequence[AnySource], lines: Sequence[str] = ()
+    placement: LayoutState, sources: Sequence[AnySource], lines: Sequence[str] = ()
 ) -> str:
     """Return the site as text: one character per square of 0.5 m, a frame and a legend.
 
@@ -55,7 +55,7 @@ def placing_text(
 
 
 def _map(
-    scenario: Scenario, placement: Placement, sources: Sequence[AnySource]
+    scenario: Scenario, placement: LayoutState, sources: Sequence[AnySource]
 ) -> NDArray[np.str_]:
     """Return the characters, (rows, columns), the lower edge of the site first."""
     rows, columns = (
@@ -251,7 +251,7 @@ def _state_lines(episode: Episode) -> list[str]:
     vehicles = VehicleView.of(placement.scenario, episode.observable.sources)
     if vehicles.vehicles:
         extras.append(f"stand-off {vehicles.stand_off_m(placement.layout):.1f} m")
-    if episode.illegal_actions:
-        plural = "" if episode.illegal_actions == 1 else "s"
-        extras.append(f"{episode.illegal_actions} illegal action{plural}")
+    if episode.invalid_actions:
+        plural = "" if episode.invalid_actions == 1 else "s"
+        extras.append(f"{episode.invalid_actions} illegal action{plural}")
     return [*lines, ", ".join(extras)] if extras else lines

@@ -34,12 +34,12 @@ from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.evaluation.problem import DesignProblem
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnySource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
 
-ILLEGAL_TERM: Final = "illegal_actions"
+ILLEGAL_TERM: Final = "invalid_actions"
 """The name of the reward term for illegal actions."""
 
 
@@ -75,7 +75,7 @@ class Episode:
         placement: The modules placed so far.
         actions: The numbered actions.
         chosen: The choices so far for the next module or piece; `None` before the first.
-        illegal_actions: Number of illegal actions so far.
+        invalid_actions: Number of illegal actions so far.
         without_effect: Number of those that changed nothing.
         repeated: The last action if it changed nothing; `None` otherwise.
         before: The modules placed before the last action.
@@ -89,13 +89,13 @@ class Episode:
     problem: DesignProblem
     observation: EpisodeObservation
     initial: Layout
-    placement: Placement
+    placement: LayoutState
     actions: NumberedActions
     chosen: ActionChoice | None = None
-    illegal_actions: int = 0
+    invalid_actions: int = 0
     without_effect: int = 0
     repeated: int | None = None
-    before: Placement = field(init=False)
+    before: LayoutState = field(init=False)
     has_effect: bool = True
     stops: bool = False
     begun: bool = False
@@ -118,7 +118,7 @@ class Episode:
         return mask
 
     @property
-    def shown(self) -> Placement:
+    def shown(self) -> LayoutState:
         """The placement to observe: the choices so far limit the cells that it shows as free."""
         if self.chosen is None:
             return self.placement
@@ -151,7 +151,7 @@ class Episode:
         finishes = action == self.actions.finish and choice.choices == 0
         found = None if finishes else self.actions.narrowed(choice, action)
         if found is None and not finishes:
-            self.illegal_actions += 1
+            self.invalid_actions += 1
             nearest = self.actions.nearest(choice, action) if illegal.moves else None
             found = None if nearest is None else self.actions.narrowed(choice, nearest)
         if isinstance(found, ActionChoice):
@@ -208,7 +208,7 @@ class Episode:
     def information(self) -> dict[str, Any]:
         """Return the information after every action and after `reset`."""
         mask = self.action_mask().astype(np.int8)  # the type for `sample(mask=...)` of a space
-        return {"action_mask": mask, "illegal_actions": self.illegal_actions}
+        return {"action_mask": mask, "invalid_actions": self.invalid_actions}
 
     def final_information(self, evaluators: Evaluators) -> dict[str, Any]:
         """Return the information after the charge has gone off.
@@ -282,7 +282,7 @@ class _Prepared:
         observations: Observations by the places of the charge as shown to the agent.
     """
 
-    empty: Placement
+    empty: LayoutState
     actions: NumberedActions
     observations: dict[tuple[AnySource, ...], EpisodeObservation] = field(default_factory=dict)
 
@@ -348,7 +348,7 @@ class Task:
         )
         placement = prepared.empty
         if possible is not scenario or len(options.layout):
-            placement = Placement.of(possible, options.layout)
+            placement = LayoutState.of(possible, options.layout)
         return Episode(
             observable=observable,
             problem=DesignProblem(evaluator, self._case(scenario, charges, seeds)),
@@ -367,7 +367,7 @@ class Task:
         if not self.prepared or self.prepared[0].empty.scenario is not scenario:
             check_size(scenario, self.source.representative)
             actions = NumberedActions.of(self.actions, scenario)
-            self.prepared[:] = [_Prepared(Placement.empty(scenario), actions)]
+            self.prepared[:] = [_Prepared(LayoutState.empty(scenario), actions)]
         return self.prepared[0]
 
     def _case(

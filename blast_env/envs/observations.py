@@ -17,7 +17,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import draw_threats
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import vehicle_reach, worst_places
 from blast_env.site import (
     AnySource,
@@ -157,7 +157,7 @@ class VehicleView:
 class EpisodeObservation(Protocol):
     """Observes one episode."""
 
-    def observe(self, placement: Placement) -> Any:
+    def observe(self, placement: LayoutState) -> Any:
         """Return a new element of the space, for the modules placed so far."""
 
 
@@ -166,7 +166,7 @@ class BatchedObservation(ABC):
 
     @staticmethod
     @abstractmethod
-    def observe_many(episodes: Sequence[Any], placements: Sequence[Placement]) -> Any:
+    def observe_many(episodes: Sequence[Any], placements: Sequence[LayoutState]) -> Any:
         """Return the observations of episodes of this class, with a leading axis (episodes, ...).
 
         Args:
@@ -174,7 +174,7 @@ class BatchedObservation(ABC):
             placements: The modules placed so far in each of them.
         """
 
-    def observe(self, placement: Placement) -> Any:
+    def observe(self, placement: LayoutState) -> Any:
         """Return a new element of the space, for the modules placed so far."""
         return one_of(self.observe_many([self], [placement]), 0)
 
@@ -217,7 +217,7 @@ def height_share(height_m: float | None) -> float:
     return 1.0 if height_m is None else min(height_m / FULL_HEIGHT_M, 1.0)
 
 
-def stock_shares(placements: Sequence[Placement]) -> FloatArray:
+def stock_shares(placements: Sequence[LayoutState]) -> FloatArray:
     """Return the remaining stock and budget as values from 0 to 1 (placements, 3).
 
     They are the share of the stock, the number of modules or pieces as a share of 100 (at most 1),
@@ -233,16 +233,16 @@ def stock_shares(placements: Sequence[Placement]) -> FloatArray:
 
 def cost_shares(scenario: Scenario) -> FloatArray:
     """Return the cost of building on each cell as a share of the highest, (rows, columns)."""
-    costs = Placement.empty(scenario).module_costs
+    costs = LayoutState.empty(scenario).module_costs
     return np.asarray(costs / costs.max())
 
 
-def cells_shown(placements: Sequence[Placement], legal: BoolArray) -> BoolArray:
+def cells_shown(placements: Sequence[LayoutState], legal: BoolArray) -> BoolArray:
     """Return where modules stand and where some may be placed (placements, 2, rows, columns).
 
     Args:
         placements: The placements.
-        legal: `Placement.legal` of each (placements, variants, rows, columns).
+        legal: `LayoutState.legal` of each (placements, variants, rows, columns).
     """
     occupied = np.array([each.standing for each in placements]) > 0
     return np.stack((occupied, legal.any(axis=1)), axis=1)
@@ -261,7 +261,7 @@ def item_values(zone: BuildZone) -> tuple[FloatArray, FloatArray]:
     return np.array([height_share(each.height_m) for each in everything]), np.asarray(shares)
 
 
-def items_placed(placements: Sequence[Placement], legal: BoolArray) -> tuple[FloatArray, Plane]:
+def items_placed(placements: Sequence[LayoutState], legal: BoolArray) -> tuple[FloatArray, Plane]:
     """Return the values of a catalogue that change with the layouts.
 
     Args:
@@ -284,7 +284,7 @@ def items_placed(placements: Sequence[Placement], legal: BoolArray) -> tuple[Flo
     return items_left(placements), on_cells
 
 
-def items_left(placements: Sequence[Placement]) -> FloatArray:
+def items_left(placements: Sequence[LayoutState]) -> FloatArray:
     """Return the remaining share of the pieces of each item (placements, items)."""
     stocks = np.array([each.catalogue.stocks for each in placements])
     left: FloatArray = np.array([each.stocks_left for each in placements]) / np.maximum(stocks, 1)
@@ -604,7 +604,7 @@ class GridEpisode(BatchedObservation):
     vehicles: VehicleView
 
     @staticmethod
-    def observe_many(episodes: Sequence["GridEpisode"], placements: Sequence[Placement]) -> Plane:
+    def observe_many(episodes: Sequence["GridEpisode"], placements: Sequence[LayoutState]) -> Plane:
         """Return the planes of several episodes (episodes, channels, rows, columns)."""
         planes = np.array([each.static for each in episodes])
         GridEpisode.draw(episodes, placements, planes)
@@ -613,7 +613,7 @@ class GridEpisode(BatchedObservation):
     @staticmethod
     def draw(
         episodes: Sequence["GridEpisode"],
-        placements: Sequence[Placement],
+        placements: Sequence[LayoutState],
         planes: NDArray[np.uint8],
     ) -> None:
         """Draw the planes that change over the constant ones, 255 for 1.
@@ -753,7 +753,7 @@ class ImageEpisode(BatchedObservation):
 
     @staticmethod
     def observe_many(
-        episodes: Sequence["ImageEpisode"], placements: Sequence[Placement]
+        episodes: Sequence["ImageEpisode"], placements: Sequence[LayoutState]
     ) -> NDArray[np.uint8]:
         """Return the images of several episodes (episodes, height, width, channels)."""
         images = np.array([each.static for each in episodes])
@@ -859,7 +859,7 @@ class FeaturesEpisode(BatchedObservation):
 
     @staticmethod
     def observe_many(
-        episodes: Sequence["FeaturesEpisode"], placements: Sequence[Placement]
+        episodes: Sequence["FeaturesEpisode"], placements: Sequence[LayoutState]
     ) -> Array:
         """Return the vectors of several episodes (episodes, features)."""
         legal = np.array([each.legal for each in placements])
@@ -975,7 +975,7 @@ class DictEpisode(BatchedObservation):
 
     @staticmethod
     def observe_many(
-        episodes: Sequence["DictEpisode"], placements: Sequence[Placement]
+        episodes: Sequence["DictEpisode"], placements: Sequence[LayoutState]
     ) -> dict[str, Array]:
         """Return planes and vectors of several episodes, with a leading axis (episodes, ...)."""
         parts = [stock_shares(placements), np.array([each.site for each in episodes])]

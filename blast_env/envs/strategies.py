@@ -205,7 +205,7 @@ class Reward(Protocol):
         """Return the terms; the reward is their sum.
 
         The names are always the same, without that reserved for the environment
-        (`illegal_actions`).
+        (`invalid_actions`).
         """
 
 
@@ -230,12 +230,12 @@ class TerminalReward:
         The term of the load is named `impulse` (psi s), `peak` (psi) or `load` (both, without a
         unit).
         """
-        paid = transition.problem.paid
+        reward_value = transition.problem.reward_value
         load = deposit = 0.0
         if transition.begins != transition.ended:
-            deposit = DEPOSIT * paid(())
+            deposit = DEPOSIT * reward_value(())
         if transition.ended:
-            load = -paid(transition.after)
+            load = -reward_value(transition.after)
         return {transition.term: load, "deposit": deposit if transition.ended else -deposit}
 
 
@@ -252,11 +252,11 @@ class IncrementalReward:
     def __call__(self, transition: Transition) -> Mapping[str, float]:
         """Return the term of the load, named as by `TerminalReward`."""
         load = 0.0
-        paid = transition.problem.paid
+        reward_value = transition.problem.reward_value
         if transition.after != transition.before:
-            load += paid(transition.before) - paid(transition.after)
+            load += reward_value(transition.before) - reward_value(transition.after)
         if transition.begins:
-            load -= paid(transition.initial)
+            load -= reward_value(transition.initial)
         return {transition.term: load}
 
 

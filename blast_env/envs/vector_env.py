@@ -235,9 +235,9 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
         illegal, known = np.zeros(self.num_envs, dtype=int), np.zeros(self.num_envs, dtype=bool)
         for index in chosen:
             masks[index] = self._episodes[index].action_mask()
-            illegal[index] = self._episodes[index].illegal_actions
+            illegal[index] = self._episodes[index].invalid_actions
             known[index] = True
-        arrays = {"action_mask": masks, "illegal_actions": illegal}
+        arrays = {"action_mask": masks, "invalid_actions": illegal}
         return arrays | {f"_{name}": known.copy() for name in arrays}
 
     def _observe(self, episodes: Sequence[Episode]) -> Any:

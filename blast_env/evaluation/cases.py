@@ -12,7 +12,7 @@ from pydantic import ConfigDict
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.geometry import Element
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import charge_against, draw_threat
 from blast_env.site import (
     AnyCharge,
@@ -154,11 +154,11 @@ class SeedRange(Enum):
 
     TRAINING = range(2**31)
     """Episodes of the environments, and seeds given by users."""
-    JUDGEMENT = range(2**31, 2**33)
+    TEST = range(2**31, 2**33)
     """Final judgement of layouts and agents: benchmark, evaluation, checks of a search."""
     SEARCH = range(2**33, 2**33 + 2**31)
     """Blasts of searches."""
-    SELECTION = range(2**33 + 2**31, 2**34)
+    VALIDATION = range(2**33 + 2**31, 2**34)
     """Choice of the best weights of a training."""
 
     def seeds(self, first: int, count: int) -> range:
@@ -204,11 +204,11 @@ class Case:
         charge: The charge, if it is known when a layout is proposed; `None` if it is hidden.
         name: Name for display.
         seed: Seed of the random numbers of a search or a random layout.
-        practice: Case for the blasts of a search, without any of `threats`.
+        search_set: Case for the blasts of a search, without any of `threats`.
 
     Raises:
         BlastEnvError: If there are no threats, they are not as many for each charge, or one of
-            `practice` is among them.
+            `search_set` is among them.
     """
 
     scenario: ScenarioField = ScenarioField()
@@ -218,7 +218,7 @@ class Case:
     charge: AnyCharge | None = None
     name: str = ""
     seed: int = 0
-    practice: "Case | None" = None
+    search_set: "Case | None" = None
 
     def __post_init__(self) -> None:
         if not self.threats:
@@ -233,8 +233,8 @@ class Case:
                     f"threats[{index}] is {threat}, must be one of {self.realisations} "
                     f"realisations of each charge, in the order of the charges"
                 )
-        if self.practice is not None:
-            both = set(self.threats) & set(self.practice.threats)
+        if self.search_set is not None:
+            both = set(self.threats) & set(self.search_set.threats)
             if both:
                 raise BlastEnvError(f"a search may not use {both.pop()}: layouts are judged on it")
 
@@ -267,7 +267,9 @@ class Case:
         risk = self.risk or self.scenario.objective.risk
         return risk(values)
 
-    def counted(self, loads: Sequence[float] | FloatArray, layout: Sequence[Element] = ()) -> float:
+    def objective_value(
+        self, loads: Sequence[float] | FloatArray, layout: Sequence[Element] = ()
+    ) -> float:
         """Return the objective value of a layout, which may include its cost.
 
         Args:
@@ -279,8 +281,8 @@ class Case:
             return combined
         zone = self.scenario.build_zone
         budget = None if zone is None else zone.budget
-        cost = Placement(self.scenario, tuple(layout)).cost
-        return objective.counted(combined, cost / budget if budget else 0.0)
+        cost = LayoutState(self.scenario, tuple(layout)).cost
+        return objective.objective_value(combined, cost / budget if budget else 0.0)
 
 
 def visible_case(
@@ -291,7 +293,7 @@ def visible_case(
     return Case(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
 
 
-def practice_visible(
+def known_search_set(
     scenario: AnyScenario,
     charge: AnyCharge,
     realisations: int,
@@ -315,7 +317,7 @@ def practice_visible(
     return replace(visible_case(scenario, charge, drawn, risk), seed=seed)
 
 
-def practice_hidden(
+def hidden_search_set(
     scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk | None = None
 ) -> Case:
     """Return the case for the blasts of a search with a hidden charge.

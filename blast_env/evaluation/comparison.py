@@ -76,7 +76,7 @@ class Assessment:
             impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
             impulse_sim=combined(sums) if len(sums) == len(loads) else None,
             peak_pa=combined([each.protected_peak_pa for each in loads]),
-            load=case.counted([each.load(counts) for each in loads], layout),
+            load=case.objective_value([each.load(counts) for each in loads], layout),
             level=min(each.level for each in loads) if counts.kind == "response" else None,
             in_range=all(each.in_range for each in loads),
         )
@@ -146,8 +146,8 @@ class Evaluation:
     @cached_property
     def case_reductions(self) -> FloatArray:
         """The reduction in each case (cases,)."""
-        bare = self._of_cases(self.unprotected, [()] * len(self.cases))
-        return reductions(self._of_cases(self.loads, self.layouts), bare)
+        unprotected = self._of_cases(self.unprotected, [()] * len(self.cases))
+        return reductions(self._of_cases(self.loads, self.layouts), unprotected)
 
     @cached_property
     def reduction(self) -> Estimate:
@@ -167,9 +167,9 @@ class Evaluation:
         """
         if self.has_one_case and self._is_mean:
             # The reduction of the load without a barrier if it fell by the difference of loads.
-            bare = self.unprotected[0]
-            left = bare + self.loads[0] - other.loads[0]
-            return reduction_estimate(left, bare)
+            unprotected = self.unprotected[0]
+            left = unprotected + self.loads[0] - other.loads[0]
+            return reduction_estimate(left, unprotected)
         return mean_estimate(self.case_reductions - other.case_reductions)
 
     @property
@@ -193,8 +193,10 @@ class Evaluation:
         error, case = self.grid_error, self.cases[0]
         if error is None:
             return np.nan
-        share = error.of_load(lambda each: case.counted([error.objective(each)], self.layouts[0]))
-        return share * case.counted(self.loads[0], self.layouts[0])
+        share = error.of_load(
+            lambda each: case.objective_value([error.objective(each)], self.layouts[0])
+        )
+        return share * case.objective_value(self.loads[0], self.layouts[0])
 
     @property
     def mean_error(self) -> float:
@@ -229,7 +231,7 @@ class Evaluation:
     def _of_cases(self, loads: FloatArray, layouts: Sequence[Layout]) -> FloatArray:
         """Return the objective values of layouts in each case (cases,)."""
         rows = zip(self.cases, loads, layouts, strict=True)
-        return np.array([case.counted(row, layout) for case, row, layout in rows])
+        return np.array([case.objective_value(row, layout) for case, row, layout in rows])
 
 
 def compare(
@@ -272,15 +274,15 @@ def compare(
     error = None
     if coarser is not None:
         number, worst = (int(each) for each in np.unravel_index(loads.argmax(), loads.shape))
-        case, (walled, bare) = cases[number], blasts[number]
-        fine = walled[worst], bare[worst]
+        case, (protected, unprotected) = cases[number], blasts[number]
+        fine = protected[worst], unprotected[worst]
         threat, there = case.threats[worst], coarser.of(case.scenario)
         error = grid_error(there, case, cells[number], threat, fine, processes)
     return Evaluation(
         cases=tuple(cases),
         layouts=tuple(cells),
         loads=loads,
-        unprotected=_counted(cases, [bare for _, bare in blasts]),
+        unprotected=_counted(cases, [unprotected for _, unprotected in blasts]),
         within=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
         cvar_level=cvar_level,
         grid_error=error,
@@ -330,9 +332,9 @@ def loads_of_both(
             for threat in case.threats
             for cells in (layout, ())
         ]
-        told = share_of(progress, done, len(cases), len(together))
+        known_charge = share_of(progress, done, len(cases), len(together))
         evaluator = evaluator_of(together[0][0].scenario)
-        loads = iter(evaluator.loads_of_many(pairs, processes, told))
+        loads = iter(evaluator.loads_of_many(pairs, processes, known_charge))
         for case, _ in together:
             own = list(islice(loads, 2 * len(case.threats)))
             yield tuple(own[0::2]), tuple(own[1::2])
@@ -385,8 +387,8 @@ def case_table(comparison: Evaluation) -> "pd.DataFrame":
                 "seed": threat.seed,
                 **charge_values(threat.charge_against(case.scenario, layout)),
                 "modules": len(layout),
-                "load": case.counted(comparison.loads[index], layout),
-                "unprotected_load": case.counted(comparison.unprotected[index]),
+                "load": case.objective_value(comparison.loads[index], layout),
+                "unprotected_load": case.objective_value(comparison.unprotected[index]),
                 "unit": case.scenario.objective.unit,
                 "reduction": float(comparison.case_reductions[index]),
                 "in_range": bool(comparison.within[index].all()),

@@ -52,9 +52,9 @@ from blast_env.response.facade import (
     FacadeResponse,
     cells_of,
     force_words,
+    peak_corrected,
     peak_factor,
     respond,
-    sharpened,
 )
 from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
@@ -161,7 +161,7 @@ class BuildingResponse:
         found = self.on_cells
         if self.peak_factor <= 1.0:
             return found
-        histories = sharpened(found.time_s, found.pressure_pa, self.peak_factor)
+        histories = peak_corrected(found.time_s, found.pressure_pa, self.peak_factor)
         return found.or_worse(respond(found.bays, *histories))
 
     @cached_property

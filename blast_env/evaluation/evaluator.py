@@ -12,7 +12,7 @@ from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout.placement import load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
@@ -169,7 +169,7 @@ class BlastEvaluator:
 
     def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
-        cells = tuple(sorted(met_by_blasts(check_layout(self.scenario, layout))))
+        cells = tuple(sorted(load_relevant(check_layout(self.scenario, layout))))
         # Without noise the seed has no effect: a charge has one realisation.
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)

@@ -112,8 +112,8 @@ class CellErrors:
             bare_of: Selects that without a barrier, if it is another.
         """
         fine, coarse = (
-            reductions(load_of(walled), (bare_of or load_of)(bare)).item()
-            for walled, bare in (self.fine, self.coarse)
+            reductions(load_of(protected), (bare_of or load_of)(unprotected)).item()
+            for protected, unprotected in (self.fine, self.coarse)
         )
         return convergence_index(fine, coarse)
 
@@ -151,8 +151,8 @@ class GridError(CellErrors):
         """Error of the reduction in the objective, as an absolute share; NaN without one."""
         case = self.case
         return self.of_reduction(
-            lambda loads: case.counted([self.objective(loads)], self.layout),
-            lambda loads: case.counted([self.objective(loads)]),
+            lambda loads: case.objective_value([self.objective(loads)], self.layout),
+            lambda loads: case.objective_value([self.objective(loads)]),
         )
 
     def objective(self, loads: BlastLoads) -> float:
@@ -188,14 +188,14 @@ def grid_error(
     """
     if coarser is None:
         return None
-    walled, bare = coarser.loads_of_many([(layout, threat), ((), threat)], processes)
+    protected, unprotected = coarser.loads_of_many([(layout, threat), ((), threat)], processes)
     return GridError(
         case=case,
         layout=layout,
         threat=threat,
         coarser=coarser.engine,
         fine=fine,
-        coarse=(walled, bare),
+        coarse=(protected, unprotected),
     )
 
 

@@ -12,8 +12,8 @@ from blast_env.evaluation.comparison import Assessment, check_something_arrives
 from blast_env.evaluation.engines import BlastLoads
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError
 from blast_env.geometry import Element, Layout
-from blast_env.layout import Placement
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout import LayoutState
+from blast_env.layout.placement import load_relevant
 from blast_env.runner import check_workers
 from blast_env.site import AnyCharge, Scenario
 
@@ -70,10 +70,10 @@ class DesignProblem:
 
     def cost(self, layout: Layout) -> float:
         """Return the cost of a legal layout, in the unit of the zone's budget."""
-        return Placement(self.scenario, layout).cost
+        return LayoutState(self.scenario, layout).cost
 
     @property
-    def told(self) -> AnyCharge | None:
+    def known_charge(self) -> AnyCharge | None:
         """The charge if it is known, that is, the same in all threats; otherwise `None`."""
         known = set(self.case.charges)
         return known.pop() if len(known) == 1 else None
@@ -89,7 +89,7 @@ class DesignProblem:
         Raises:
             BudgetError: If the total would exceed the budget; none is counted then.
         """
-        asked = {(tuple(sorted(met_by_blasts(layout))), threat) for layout, threat in pairs}
+        asked = {(tuple(sorted(load_relevant(layout))), threat) for layout, threat in pairs}
         asked |= self._asked
         if self.budget is not None and len(asked) > self.budget:
             raise BudgetError(
@@ -136,9 +136,9 @@ class DesignProblem:
             self._assessed[key] = Assessment.of(self.case, layout, loads)
         return self._assessed[key]
 
-    def paid(self, layout: Sequence[Element]) -> float:
+    def reward_value(self, layout: Sequence[Element]) -> float:
         """Return the objective value in the unit of rewards: psi s, psi, or dimensionless."""
-        return self.scenario.objective.paid(self.assess(layout).load)
+        return self.scenario.objective.reward_value(self.assess(layout).load)
 
     def load(self, layout: Sequence[Element]) -> float:
         """Return the load of a layout over all threats, in the unit of the objective.
@@ -148,7 +148,7 @@ class DesignProblem:
             LayoutError: If the layout does not fit the build zone.
         """
         pairs = [(tuple(layout), threat) for threat in self.threats]
-        return self.case.counted(self.loads(pairs), layout)
+        return self.case.objective_value(self.loads(pairs), layout)
 
     @cached_property
     def unprotected(self) -> tuple[float, ...]:
@@ -159,6 +159,6 @@ class DesignProblem:
         Raises:
             BlastEnvError: If nothing arrives: there is nothing to reduce.
         """
-        bare = self._free([((), threat) for threat in self.threats])
-        check_something_arrives([self.case], np.array(bare))
-        return tuple(bare)
+        unprotected = self._free([((), threat) for threat in self.threats])
+        check_something_arrives([self.case], np.array(unprotected))
+        return tuple(unprotected)

@@ -115,12 +115,12 @@ THREAT_COLUMNS: Final = (
 
 def _structure_row(
     loads: Sequence[StructureLoad],
-    bare: Sequence[StructureLoad],
+    without: Sequence[StructureLoad],
     error: GridError | None,
     impulse_of: LoadOf,
 ) -> dict[str, object]:
     first = loads[0]
-    pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, bare))
+    pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, without))
     reduction = reduction_estimate(pa_s, bare_pa_s)
     row: dict[str, object] = {
         "structure": first.name,
@@ -133,7 +133,7 @@ def _structure_row(
     }
     sums = SIM_NAMES if isinstance(first, ParticleLoad) else ()
     for name in ("impulse_pa_s", *sums):
-        for column, each in ((name, loads), (f"unprotected_{name}", bare)):
+        for column, each in ((name, loads), (f"unprotected_{name}", without)):
             row[column] = float(np.mean([getattr(load, name) for load in each]))
     off, walled_off, bare_off = np.nan, np.nan, np.nan
     if error is not None:
@@ -144,7 +144,7 @@ def _structure_row(
     row["unprotected_impulse_error_pa_s"] = bare_off * float(bare_pa_s.mean())
     row["impulse_psi_s"] = float(pa_s.mean()) / PA_PER_PSI
     row["unprotected_impulse_psi_s"] = float(bare_pa_s.mean()) / PA_PER_PSI
-    for column, each in (("peak_pa", loads), ("unprotected_peak_pa", bare)):
+    for column, each in (("peak_pa", loads), ("unprotected_peak_pa", without)):
         peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
         row[column] = float(np.mean(peaks))
     return row
@@ -309,12 +309,12 @@ class LayoutEvaluation(Evaluation):
     @property
     def load(self) -> float:
         """The objective value over all threats with the barrier, in the objective's unit."""
-        return self.case.counted(self.loads[0], self.layout)
+        return self.case.objective_value(self.loads[0], self.layout)
 
     @property
     def unprotected_load(self) -> float:
         """The same without the barrier."""
-        return self.case.counted(self.unprotected[0])
+        return self.case.objective_value(self.unprotected[0])
 
     @property
     def mean_reduction(self) -> float:
@@ -367,7 +367,7 @@ class LayoutEvaluation(Evaluation):
 
     def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
         """Return one row per load in the result of `loads_of`."""
-        loads, bare = (
+        loads, without = (
             zip(*map(loads_of, blasts), strict=True)
             for blasts in (self.blasts, self.unprotected_blasts)
         )
@@ -377,7 +377,7 @@ class LayoutEvaluation(Evaluation):
 
         rows = [
             _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
-            for number, both in enumerate(zip(loads, bare, strict=True))
+            for number, both in enumerate(zip(loads, without, strict=True))
         ]
         absent = () if self.blasts[0].has_particles else _OF_PARTICLES
         return table_of(rows, [each for each in STRUCTURE_COLUMNS if each.name not in absent])
@@ -389,12 +389,14 @@ class LayoutEvaluation(Evaluation):
 
         threat = self.threats[0]
         scene = build_site(self.scenario, (), threat.seed, threat.charge)
-        impulse, bare = (
+        impulse, without = (
             np.mean([load.module_impulse for load in loads], axis=0)
             for loads in (self.blasts, self.unprotected_blasts)
         )
         names = [column.name for column in module_columns(self.blasts[0].has_particles)]
-        values = dict(zip(names[-3:], (impulse, bare, reductions(impulse, bare)), strict=True))
+        values = dict(
+            zip(names[-3:], (impulse, without, reductions(impulse, without)), strict=True)
+        )
         return module_table(scene.obstacles()).assign(**values)[names]
 
     @cached_property

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
+from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
 from blast_env.gas.cost import cost_of_run
-from blast_env.gas.doubling import DoublingSolver, shape_to_double
 from blast_env.gas.ending import (
     AREA,
     corners_m,
@@ -28,7 +28,6 @@ from blast_env.gas.ending import (
 )
 from blast_env.gas.faces import Faces, exposed_faces
 from blast_env.gas.grid import GasGrid, layers_to
-from blast_env.gas.opening import opening_of
 from blast_env.gas.probes import FaceLoads, Gauges
 from blast_env.gas.settings import CHECKED_CELLS, FACE_NAMES, GasSettings
 from blast_env.gas.solver import Gas, GasSolver, Recorder, Settling
@@ -39,6 +38,7 @@ from blast_env.gas.source import (
     least_clearance_m,
     set_charge,
 )
+from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.particles.run import EndReason
 from blast_env.site.scene import OUTWARDS, WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
@@ -93,7 +93,7 @@ class GasRun:
         grid: The grid.
         solver: The solver.
         charge: The charge.
-        handover_radius_m: Radius of the front at which the grid takes over: the distance to the
+        remap_radius_m: Radius of the front at which the grid takes over: the distance to the
             first structure, to the ground below a charge in the air, or to the build zone, with or
             without a barrier in it; at least `least_clearance_m`. It is the same for all layouts
             of a scenario with the same charge.
@@ -121,7 +121,7 @@ class GasRun:
         self.grid = _grid(settings, site)
         self.charge = GasCharge(site.charge.tnt_kg, (*site.charge.position_m, site.charge.height_m))
         reserved = None if site.build_zone is None else _cells_of(site.build_zone, self.grid, site)
-        self.handover_radius_m = largest_radius_m(self.grid, self.charge, reserved)
+        self.remap_radius_m = largest_radius_m(self.grid, self.charge, reserved)
         self.notes = self._notes()
         self.table = face_table_of(self.grid, site)
         self.loads = FaceLoads(len(self.table.faces))
@@ -137,11 +137,11 @@ class GasRun:
             settling=Settling(settings.settled_s * scale, _HOTTEST),
             threads=settings.threads,
         )
-        set_charge(solver, self.charge, self.handover_radius_m)
+        set_charge(solver, self.charge, self.remap_radius_m)
         doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
-        self.solver: Gas = DoublingSolver(solver, doubled_s) if doubled_s else solver
+        self.solver: Gas = CoarseningSolver(solver, doubled_s) if doubled_s else solver
         if self.gauges is not None:
-            _add_opening(self.gauges, self.grid, self.charge, self.handover_radius_m)
+            _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
         self.end_reason: EndReason | None = None
         self._groups = _groups(self.table, site, settings.until, watched)
         self._watches_gauges = settings.until == "gauges" and self.gauges is not None
@@ -265,14 +265,14 @@ def _grid(settings: GasSettings, site: BlastSite) -> GasGrid:
     high = np.array([site.site_m.right, site.site_m.top])
     plan = np.ceil(np.round((high - low) / cell_m, 9)).astype(int) + 2 * margin
     shape = (int(plan[0]), int(plan[1]), ceil(round(site.air_height_m / cell_m, 9)))
-    skirt = layers_to(settings.border_m / cell_m)
-    shape = shape_to_double(shape, skirt, len(settings.doubled_m))
+    buffer_layers = layers_to(settings.border_m / cell_m)
+    shape = shape_to_double(shape, buffer_layers, len(settings.doubled_m))
     origin = low - margin * cell_m
     grid = GasGrid(
         cell_m,
         np.broadcast_to(np.False_, shape),
         (float(origin[0]), float(origin[1]), 0.0),
-        skirt=skirt,
+        buffer_layers=buffer_layers,
     )
     grid = replace(grid, solid=np.zeros(shape, dtype=bool))
     z_m = grid.centres_m(2)
@@ -394,7 +394,7 @@ def _add_opening(gauges: Gauges, grid: GasGrid, charge: GasCharge, radius_m: flo
     centre_m = np.array([x_m, y_m, 0.0 if charge.on_ground else z_m])
     distance_m = np.sqrt(((centres_m - centre_m) ** 2).sum(axis=1))
     if distance_m.min() < radius_m:
-        opening = opening_of(charge, radius_m)
+        opening = spherical_stage(charge, radius_m)
         gauges.add_before(opening.time_s, opening.overpressures_pa(distance_m))
 
 

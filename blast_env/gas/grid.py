@@ -19,14 +19,14 @@ from blast_env.gas.state import AIR, MARGIN, MIRROR, OPEN
 
 FACE_NAMES: Final = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
 
-SKIRT_GROWTH: Final = 2.0
+BUFFER_GROWTH: Final = 2.0
 """Ratio of the thickness of a layer of the skirt to that of the one before."""
 
 
 def layers_to(cells: float) -> int:
     """Return the number of layers of a skirt at least as thick as a number of cells."""
-    inner = 1.0 + cells * (SKIRT_GROWTH - 1.0) / SKIRT_GROWTH
-    return ceil(round(log(inner) / log(SKIRT_GROWTH), 9))
+    inner = 1.0 + cells * (BUFFER_GROWTH - 1.0) / BUFFER_GROWTH
+    return ceil(round(log(inner) / log(BUFFER_GROWTH), 9))
 
 
 class FaceKind(StrEnum):
@@ -50,8 +50,8 @@ class GasGrid:
         y_high: Boundary at the high end of y.
         z_low: Boundary at the low end of z, by default the ground.
         z_high: Boundary at the high end of z.
-        skirt: Layers of growing cells beyond each open face; solids at the face extend through
-            them, and the rest is air.
+        buffer_layers: Layers of growing cells beyond each open face; solids at the face extend
+            through them, and the rest is air.
 
     Raises:
         BlastEnvError: If one of them is out of bounds.
@@ -66,7 +66,7 @@ class GasGrid:
     y_high: FaceKind = FaceKind.OPEN
     z_low: FaceKind = FaceKind.MIRROR
     z_high: FaceKind = FaceKind.OPEN
-    skirt: int = 0
+    buffer_layers: int = 0
 
     def __post_init__(self) -> None:
         if not (isfinite(self.cell_m) and self.cell_m > 0.0):
@@ -85,8 +85,8 @@ class GasGrid:
             if kind not in tuple(FaceKind):
                 known = ", ".join(repr(str(known)) for known in FaceKind)
                 raise BlastEnvError(f"{name} is {kind!r}, but must be one of {known}")
-        if self.skirt < 0:
-            raise BlastEnvError(f"skirt is {self.skirt}, but must be at least 0")
+        if self.buffer_layers < 0:
+            raise BlastEnvError(f"skirt is {self.buffer_layers}, but must be at least 0")
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -118,28 +118,28 @@ class GasGrid:
         return index[0], index[1], index[2]
 
     @property
-    def skirts(self) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+    def buffer_layers_by_axis(self) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
         """Layers of the skirt at the low and the high end of x, y and z; 0 at a mirror."""
         x, y, z = (
-            (self._skirt(FACE_NAMES[2 * axis]), self._skirt(FACE_NAMES[2 * axis + 1]))
+            (self._layers_at(FACE_NAMES[2 * axis]), self._layers_at(FACE_NAMES[2 * axis + 1]))
             for axis in range(3)
         )
         return x, y, z
 
-    def _skirt(self, face: str) -> int:
-        return self.skirt if getattr(self, face) == FaceKind.OPEN else 0
+    def _layers_at(self, face: str) -> int:
+        return self.buffer_layers if getattr(self, face) == FaceKind.OPEN else 0
 
     @property
     def lead(self) -> NDArray[np.int64]:
         """First cell of the grid in the arrays of the kernels, along x, y and z (3,)."""
-        return np.array([MARGIN + low for low, _ in self.skirts])
+        return np.array([MARGIN + low for low, _ in self.buffer_layers_by_axis])
 
     @property
     def array_shape(self) -> tuple[int, int, int]:
         """Cells of the kernels' arrays along x, y and z, with the skirt and the margin."""
         nx, ny, nz = (
             n + low + high + 2 * MARGIN
-            for n, (low, high) in zip(self.shape, self.skirts, strict=True)
+            for n, (low, high) in zip(self.shape, self.buffer_layers_by_axis, strict=True)
         )
         return nx, ny, nz
 
@@ -153,9 +153,9 @@ class GasGrid:
 
     def narrowness(self, axis: int) -> NDArray[np.float64]:
         """Return the ratio of the cell side to the width of each array cell along an axis (n,)."""
-        low, high = self.skirts[axis]
+        low, high = self.buffer_layers_by_axis[axis]
         own = np.ones(self.shape[axis] + 2 * MARGIN)
-        grown = SKIRT_GROWTH ** -np.arange(1.0, self.skirt + 1.0)
+        grown = BUFFER_GROWTH ** -np.arange(1.0, self.buffer_layers + 1.0)
         wide = np.concatenate((grown[:low][::-1], own[MARGIN:-MARGIN], grown[:high]))
         return np.pad(wide, MARGIN, mode="edge")
 
@@ -163,7 +163,7 @@ class GasGrid:
         """Return the codes of the cells for the kernels, with skirt and margin (z, y, x)."""
         codes = np.full(self.array_shape, OPEN, dtype=np.int8)
         inner = slice(MARGIN, -MARGIN)
-        solid = np.pad(self.solid, self.skirts, mode="edge")
+        solid = np.pad(self.solid, self.buffer_layers_by_axis, mode="edge")
         codes[inner, inner, inner] = np.where(solid, MIRROR, AIR)
         for axis in range(3):
             kinds = [getattr(self, name) for name in FACE_NAMES[2 * axis : 2 * axis + 2]]

@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from blast_env.gas.lanes import get, larger, put, root, select, smaller
+from blast_env.gas.simd import get, larger, put, root, select, smaller
 from blast_env.gas.state import (
     DENSITY,
     ENERGY,
@@ -580,7 +580,7 @@ def advance_planes(
     count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
-    lifted = 0
+    floored_cells = 0
     for z in range(z_from, z_to):
         for tile in range(tiles):
             xa = x0 + (x1 - x0) * tile // tiles
@@ -591,7 +591,7 @@ def advance_planes(
                 # Rows up to y are loaded, those up to y - 1 have states at the faces, and those
                 # up to y - 2 are finished.
                 _shift_rows(work, count, n)
-                lifted += _load_row(state, code, work, z, y, xa - MARGIN, n)
+                floored_cells += _load_row(state, code, work, z, y, xa - MARGIN, n)
                 _join_tiles(work, edges, y, tile, xb - xa)
                 if y < y0:
                     continue
@@ -644,7 +644,7 @@ def advance_planes(
                                 get(work, _ALONG + at + 1) - get(work, _ALONG + at),
                             )
             notes[0] = max(notes[0], _fastest(work, n))
-    notes[1] += lifted
+    notes[1] += floored_cells
 
 
 @njit(forceinline=True, error_model="numpy", fastmath=FUSED)
@@ -725,7 +725,7 @@ def advance_columns(
     count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
-    lifted = 0
+    floored_cells = 0
     for y in range(y_from, y_to):
         for tile in range(tiles):
             x = x0 + (x1 - x0) * tile // tiles
@@ -733,7 +733,7 @@ def advance_columns(
             _forget_signals(work)
             for z in range(z0 - 2, z1 + 2):
                 _shift_rows(work, count, n)
-                lifted += _load_row(state, code, work, z, y, x, n)
+                floored_cells += _load_row(state, code, work, z, y, x, n)
                 if z < z0:
                     continue
                 own_ratio = ratio * upright[z - 1]
@@ -751,4 +751,4 @@ def advance_columns(
                 if z > z0 + 1:
                     _update_column_row(state, work, z - 2, y, x, n, ratio * upright[z - 2])
             notes[0] = max(notes[0], _fastest(work, n))
-    notes[1] += lifted
+    notes[1] += floored_cells

@@ -100,7 +100,7 @@ class Gas(Protocol):
         """Number of cell updates."""
 
     @property
-    def lifted(self) -> int:
+    def floored_cells(self) -> int:
         """Number of cells raised to the floor."""
 
     @property
@@ -226,12 +226,12 @@ class GasSolver:
         self.box = self._empty_box() if skip_still_air else self._whole.copy()
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
         self._signal = 0.0
-        self._lifted = 0
+        self._floored_cells = 0
 
     @property
-    def lifted(self) -> int:
+    def floored_cells(self) -> int:
         """Number of cells raised to the floor of density or pressure."""
-        return self._lifted
+        return self._floored_cells
 
     def set_state(
         self,
@@ -308,7 +308,7 @@ class GasSolver:
         if self._burning is not None:
             self._burn(self._burning, step_s)
         self._signal = max(float(self._notes[:, 0].max()), sqrt(GAMMA))
-        self._lifted += int(self._notes[:, 1].sum())
+        self._floored_cells += int(self._notes[:, 1].sum())
         self.steps += 1
         self.time_s = self.time_s + step_s
         if self._settling is not None and self.time_s >= self._settling.time_s:
@@ -338,14 +338,14 @@ class GasSolver:
         )
         starts = []
         for axis in range(3):
-            low, high = self.grid.skirts[axis]
+            low, high = self.grid.buffer_layers_by_axis[axis]
             first, end = MARGIN + low, MARGIN + low + self.grid.shape[axis]
             pairs = np.arange(first, end, 2)
             starts.append(np.concatenate((np.arange(first), pairs, np.arange(end, end + high + 3))))
         x, y, z = starts
         state.merge(self.state, self._code, other.state, other._code, z, y, x)
         other.time_s, other.steps = self.time_s, self.steps
-        other.cell_updates, other._lifted = self.cell_updates, self._lifted
+        other.cell_updates, other._floored_cells = self.cell_updates, self._floored_cells
         other._signal = self._signal
         if self._skip:
             other.box = other._whole.copy()

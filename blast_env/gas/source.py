@@ -247,7 +247,7 @@ def largest_radius_m(
         clear = min(clear, _distance_to(kept_clear, grid, (x, y, z)))
     if not charge.on_ground:
         clear = min(clear, max(z, least))
-    if grid.skirt > 0:
+    if grid.buffer_layers > 0:
         clear = min(clear, _nearest_face(grid, (x, y, z)))  # a skirt must begin with still air
     return min(max(clear, least), _farthest_corner(grid, (x, y, z)))
 
@@ -336,7 +336,7 @@ def _nearest_face(grid: GasGrid, point: tuple[float, float, float]) -> float:
     """Return the distance to the nearest open face with a skirt."""
     low = np.array(grid.origin_m)
     ways = np.stack((point - low, low + grid.cell_m * np.array(grid.shape) - point), axis=1)
-    return float(np.where(np.array(grid.skirts) > 0, ways, inf).min())
+    return float(np.where(np.array(grid.buffer_layers_by_axis) > 0, ways, inf).min())
 
 
 def _farthest_corner(grid: GasGrid, point: tuple[float, float, float]) -> float:

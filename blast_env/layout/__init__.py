@@ -1,11 +1,11 @@
 """Layouts of barriers: legality, and layout files."""
 
 from blast_env.layout.files import LayoutFile, load_layout, write_layout
-from blast_env.layout.placement import Placement, check_layout, usable_cells
+from blast_env.layout.placement import LayoutState, check_layout, usable_cells
 
 __all__ = [
     "LayoutFile",
-    "Placement",
+    "LayoutState",
     "check_layout",
     "load_layout",
     "usable_cells",

@@ -7,7 +7,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout, Rectangle, standing
-from blast_env.layout import Placement, check_layout, usable_cells
+from blast_env.layout import LayoutState, check_layout, usable_cells
 from blast_env.site import (
     AnyCharge,
     PointSource,
@@ -133,7 +133,7 @@ def build_site(
         ScenarioError: If the charge is not clear of a structure or the border.
         ValueError: If the seed is negative.
     """
-    placement = Placement.of(scenario, layout)
+    placement = LayoutState.of(scenario, layout)
     if isinstance(charge, Charge):  # a vehicle keeps clear of all obstacles
         _check_clear(scenario.with_charge(charge), placement)
     drawn = draw_threat(scenario, seed) if charge is None else charge
@@ -203,7 +203,7 @@ def build_scene(
     )
 
 
-def _check_clear(scenario: Scenario, placement: Placement) -> None:
+def _check_clear(scenario: Scenario, placement: LayoutState) -> None:
     """Refuse a layout with a module on the charge, the only condition that a charge can break.
 
     Raises:

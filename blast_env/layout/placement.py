@@ -1,4 +1,4 @@
-"""Placement of modules or pieces: legal places and legal layouts."""
+"""LayoutState of modules or pieces: legal places and legal layouts."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -31,7 +31,7 @@ from blast_env.site.zone import (
 class CheckedLayout(tuple[Element, ...]):
     """A layout that was checked against all conditions of a build zone.
 
-    It equals the plain tuple; see `Placement.checked`.
+    It equals the plain tuple; see `LayoutState.checked`.
 
     Attributes:
         scenario: The scenario against which it was checked.
@@ -41,12 +41,12 @@ class CheckedLayout(tuple[Element, ...]):
 
 
 @dataclass(frozen=True)
-class Placement:
+class LayoutState:
     """An immutable partial layout; placing an element returns another placement.
 
     The elements are single modules on cells or, if the build zone has a catalogue, pieces.
 
-    `Placement.empty`, `Placement.of` and `place` ensure all conditions of the build zone; the
+    `LayoutState.empty`, `LayoutState.of` and `place` ensure all conditions of the build zone; the
     constructor itself checks nothing. Legality does not depend on the order of the elements, and
     every subset of a legal layout is legal.
 
@@ -59,7 +59,7 @@ class Placement:
     layout: Layout
 
     @classmethod
-    def empty(cls, scenario: AnyScenario) -> "Placement":
+    def empty(cls, scenario: AnyScenario) -> "LayoutState":
         """Return the empty placement.
 
         Args:
@@ -68,7 +68,7 @@ class Placement:
         return cls(find_scenario(scenario), ())
 
     @classmethod
-    def of(cls, scenario: AnyScenario, layout: Sequence[Element]) -> "Placement":
+    def of(cls, scenario: AnyScenario, layout: Sequence[Element]) -> "LayoutState":
         """Return the placement of a whole layout.
 
         Args:
@@ -91,7 +91,7 @@ class Placement:
         layout.scenario = self.scenario
         return layout
 
-    def place(self, element: Element) -> "Placement":
+    def place(self, element: Element) -> "LayoutState":
         """Return the placement with one more module or piece.
 
         Args:
@@ -105,7 +105,7 @@ class Placement:
             reason = self.explain(element)
             if reason is not None:
                 raise LayoutError(reason)
-        placed = Placement(self.scenario, (*self.layout, element))
+        placed = LayoutState(self.scenario, (*self.layout, element))
         # Deriving them anew would double the time of a step of the environment.
         standing = self.standing.copy()
         self._stand(standing, element)
@@ -197,13 +197,13 @@ class Placement:
         ground.flags.writeable = False
         return ground
 
-    def limited_to(self, possible: BoolArray) -> "Placement":
+    def limited_to(self, possible: BoolArray) -> "LayoutState":
         """Return the placement with `legal` restricted to a subset.
 
         Args:
             possible: A subset of `legal`, of the same shape.
         """
-        limited = Placement(self.scenario, self.layout)
+        limited = LayoutState(self.scenario, self.layout)
         vars(limited).update(_empty_zone=self._empty_zone, standing=self.standing, legal=possible)
         return limited
 
@@ -429,14 +429,14 @@ class Placement:
             return None
         return f"would close the {way.description}"
 
-    def __reduce__(self) -> tuple[Callable[..., "Placement"], tuple[Any, ...]]:
+    def __reduce__(self) -> tuple[Callable[..., "LayoutState"], tuple[Any, ...]]:
         """Pickle scenario and layout alone: cached arrays would come back writeable."""
-        return Placement, (self.scenario, self.layout)
+        return LayoutState, (self.scenario, self.layout)
 
 
-def find_legal(placements: Iterable[Placement]) -> None:
-    """Compute `Placement.legal` of placements, of those on one site in one array."""
-    of_sites: dict[int, list[Placement]] = {}
+def find_legal(placements: Iterable[LayoutState]) -> None:
+    """Compute `LayoutState.legal` of placements, of those on one site in one array."""
+    of_sites: dict[int, list[LayoutState]] = {}
     for each in placements:
         if "legal" not in vars(each):
             of_sites.setdefault(id(each.scenario), []).append(each)
@@ -445,8 +445,8 @@ def find_legal(placements: Iterable[Placement]) -> None:
             vars(placement)["legal"] = legal
 
 
-def _legal_of(placements: Sequence[Placement]) -> BoolArray:
-    """Return `Placement.legal` of placements on one site (placements, variants, rows, columns)."""
+def _legal_of(placements: Sequence[LayoutState]) -> BoolArray:
+    """Return `LayoutState.legal` of states of one site (states, variants, rows, columns)."""
     cells, catalogue = placements[0]._empty_zone, placements[0].catalogue
     taken = np.array([each.standing for each in placements]) > 0
     legal = cells.places(cells.usable & ~taken)
@@ -463,7 +463,7 @@ def _legal_of(placements: Sequence[Placement]) -> BoolArray:
     return legal
 
 
-def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
+def _placed_one_by_one(empty: LayoutState, layout: Layout) -> LayoutState:
     """Place a layout in order, or raise the error of the first illegal element."""
     placement = empty
     for element in layout:
@@ -475,7 +475,7 @@ def _placed_one_by_one(empty: Placement, layout: Layout) -> Placement:
     return placement
 
 
-def _check_stock(placement: Placement, layout: Layout, element: Element) -> None:
+def _check_stock(placement: LayoutState, layout: Layout, element: Element) -> None:
     """Refuse an element beyond the stock (`LayoutError`)."""
     catalogue, what = placement.catalogue, "modules"
     asked, most = len(layout), len(placement.layout)
@@ -506,8 +506,8 @@ def _counted(count: int, word: str, plural: str = "s") -> str:
 def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
     """Return whether each cell may have a module on the empty site.
 
-    No-build areas, structures, their clearance and the charge exclude cells. `Placement` checks the
-    conditions that depend on the layout (stock, budget, access way).
+    No-build areas, structures, their clearance and the charge exclude cells. `LayoutState` checks
+    the conditions that depend on the layout (stock, budget, access way).
 
     Args:
         scenario: The scenario, or its bundled name or path.
@@ -515,10 +515,10 @@ def usable_cells(scenario: AnyScenario) -> NDArray[np.bool_]:
     Returns:
         An array of shape (rows, columns), read-only; (0, 0) without a build zone.
     """
-    return Placement.empty(scenario).usable
+    return LayoutState.empty(scenario).usable
 
 
-def met_by_blasts(layout: Iterable[Element]) -> Layout:
+def load_relevant(layout: Iterable[Element]) -> Layout:
     """Return the elements that affect loads: all but the measures that harden facades."""
     return tuple(element for element in layout if type(element) is not Measure)
 
@@ -531,10 +531,10 @@ def check_layout(scenario: AnyScenario, layout: Sequence[Element]) -> Layout:
         layout: (row, column) of each module, or pieces. NumPy integers and arrays are accepted.
 
     Raises:
-        LayoutError: As `Placement.of`, if an element cannot be placed.
+        LayoutError: As `LayoutState.of`, if an element cannot be placed.
     """
     if isinstance(layout, CheckedLayout) and layout.scenario is scenario:
         return layout
     if isinstance(layout, tuple) and not layout:
         return ()
-    return Placement.of(scenario, layout).layout
+    return LayoutState.of(scenario, layout).layout

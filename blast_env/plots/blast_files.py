@@ -90,7 +90,7 @@ class BlastFiles:
             progress: Called with the finished share.
         """
         *beside, blast = blasts
-        bare = beside[0] if beside else None
+        unprotected = beside[0] if beside else None
         is_gas = not isinstance(blast, Blast)
         if self.film is None:
             recorders = (self._recorders(),) if is_gas else ()
@@ -106,7 +106,7 @@ class BlastFiles:
             return write_pressure_film(
                 blast,
                 self.film,
-                beside=bare,
+                beside=unprotected,
                 height_m=PLAN_HEIGHT_M if self.film_height_m is None else self.film_height_m,
                 section=self._section(),
                 further=self._recorders(),
@@ -114,7 +114,7 @@ class BlastFiles:
             )
         from blast_env.plots.film import write_film
 
-        return write_film(blast, self.film, beside=bare, progress=progress)
+        return write_film(blast, self.film, beside=unprotected, progress=progress)
 
     def draw(self, results: Sequence[Any]) -> list[Path]:
         """Draw the pictures of the results of `run`; return their files.
@@ -148,7 +148,7 @@ class BlastFiles:
             written.append(figures.save_figure(figure, self.velocities))
         return written
 
-    def _draw_gas(self, result: "GasResult", bare: "GasResult | None" = None) -> list[Path]:
+    def _draw_gas(self, result: "GasResult", unprotected: "GasResult | None" = None) -> list[Path]:
         # Here, because pictures need the extra `render`.
         from blast_env.plots import gas
         from blast_env.plots.figures import save_figure
@@ -156,13 +156,13 @@ class BlastFiles:
 
         kind = gas.kind_of(self.quantity or "impulse")
         gauge = self.gauge or next((each.name for each in result.run.site.gauges), "")
-        history = partial(gas.gauge_history, result, gauge, free_field=True, beside=bare)
+        history = partial(gas.gauge_history, result, gauge, free_field=True, beside=unprotected)
         pictures = (
-            (self.heat_map, partial(gas.facades, result, quantity=kind, beside=bare)),
+            (self.heat_map, partial(gas.facades, result, quantity=kind, beside=unprotected)),
             (self.history, history),
-            (self.impulse_map, partial(ground_map, result, "impulse", bare)),
-            (self.peak_map, partial(ground_map, result, "peak", bare)),
-            (self.risk_map, partial(threshold_map, result, bare)),
+            (self.impulse_map, partial(ground_map, result, "impulse", unprotected)),
+            (self.peak_map, partial(ground_map, result, "peak", unprotected)),
+            (self.risk_map, partial(threshold_map, result, unprotected)),
         )
         return [save_figure(draw(), path) for path, draw in pictures if path is not None]
 

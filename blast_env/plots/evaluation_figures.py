@@ -219,12 +219,12 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
     """Draw the load of each threat without and with the barrier, the worst first."""
     outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.load)
     place = np.arange(1, len(outcomes) + 1)
-    bare = np.array([outcome.unprotected_load for outcome in outcomes])
+    without = np.array([outcome.unprotected_load for outcome in outcomes])
     load = np.array([outcome.load for outcome in outcomes])
     objective = evaluation.scenario.objective
-    axes.vlines(place, load, bare, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
+    axes.vlines(place, load, without, color=unit_interval(QUIET_INK), linewidth=1.2, zorder=2)
     for values, estimate, colour, words in (
-        (bare, evaluation.unprotected_mean, _WITHOUT, "without"),
+        (without, evaluation.unprotected_mean, _WITHOUT, "without"),
         (load, evaluation.mean, _WITH, "with"),
     ):
         label = f"{words} barrier, mean {_load_text(evaluation, estimate.value)}"
@@ -236,7 +236,7 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
     label = f"mean of the worst {worst} with barrier, {_load_text(evaluation, evaluation.cvar)}"
     axes.axhline(evaluation.cvar, color=_WITH, linewidth=1.4, linestyle="--", label=label)
     axes.set_xlim(0.3, len(outcomes) + 0.7)
-    axes.set_ylim(0.0, 1.32 * max(bare.max(), load.max()))  # room for the legend
+    axes.set_ylim(0.0, 1.32 * max(without.max(), load.max()))  # room for the legend
     unit = f" ({objective.unit.replace(' ', '·')})" if objective.unit else ""
     axes.set_ylabel(f"{_load_name(evaluation)}\nprotected structures{unit}")
     axes.set_title("Every threat, the worst with the barrier first", fontsize=11)
@@ -294,8 +294,8 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     modules = evaluation.module_table
     own = modules[modules.structure.isin(parts.index)]
     outlines = [each for each in scene.structures if each.name in parts.index]
-    *_, walled, bare, _ = modules.columns
-    columns = (bare, walled)
+    *_, behind, without, _ = modules.columns
+    columns = (without, behind)
     highest = float(own[list(columns)].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
     for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
@@ -305,7 +305,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
         draw_enlarged(axes, obstacles, scale, 0.4)
-        pa_s = building["impulse_pa_s" if column == walled else "unprotected_impulse_pa_s"]
+        pa_s = building["impulse_pa_s" if column == behind else "unprotected_impulse_pa_s"]
         axes.set_title(
             f"{evaluation.scenario.title_of(name)} {words} barrier\n{pa_s:,.0f} Pa·s",
             fontsize=11,

@@ -170,7 +170,7 @@ def write_film(
             plan, width_px = for_gif(plan, width_px)
         painters = _painters(results, width_px // len(blasts))
         drawing = share_of(progress, _TENTHS_OF_FIRST_RUNS, 10, 10 - _TENTHS_OF_FIRST_RUNS)
-        frames = told_of(_frames(blasts, painters, plan), plan, drawing)
+        frames = with_progress(_frames(blasts, painters, plan), plan, drawing)
         title = blast.scenario.name
         save_frames(frames, temporary, suffix, plan, title, _comment(plan, blasts))
     return results
@@ -313,7 +313,7 @@ def _save_gif(frames: Iterable[Frame], path: Path, frames_per_s: float, comment:
         raise BlastEnvError(f"the film cannot be written: {failure}") from failure
 
 
-def told_of(frames: Iterable[Frame], plan: FilmPlan, progress: Tell) -> Iterator[Frame]:
+def with_progress(frames: Iterable[Frame], plan: FilmPlan, progress: Tell) -> Iterator[Frame]:
     """Yield frames, and report the share of the film so far."""
     for number, frame in enumerate(frames, start=1):
         yield frame

@@ -11,8 +11,8 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasResult
 from blast_env.gas.grid import GasGrid
-from blast_env.gas.opening import Opening, opening_of
 from blast_env.gas.probes import GroundMap
+from blast_env.gas.spherical_stage import SphericalStage, spherical_stage
 from blast_env.particles.calibration.references import Burst, burst_of, kingery_bulmash
 from blast_env.particles.calibration.references import Quantity as CurveQuantity
 from blast_env.plots.gas import (
@@ -96,7 +96,7 @@ def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
     maps = [each for each in result.run.solver.recorders if isinstance(each, GroundMap)]
     if not maps:
         raise BlastEnvError("the blast has no map: run it with recorders=ground_recorders")
-    opening = opening_of(result.run.charge, result.run.handover_radius_m)
+    opening = spherical_stage(result.run.charge, result.run.remap_radius_m)
     distance_m = _distances_m(result.run.grid, opening)
     if quantity == "peak":
         return np.maximum(maps[0].peak_pa, opening.peak_pa(distance_m))
@@ -104,7 +104,7 @@ def ground_values(result: GasResult, quantity: Quantity) -> FloatArray:
     return np.maximum(largest_pa_s, net_pa_s + maps[0].impulse_pa_s)
 
 
-def _distances_m(grid: GasGrid, opening: Opening) -> FloatArray:
+def _distances_m(grid: GasGrid, opening: SphericalStage) -> FloatArray:
     """Return the distances of the lowest cells from the centre of a blast (nx, ny)."""
     x_m, y_m, z_m = opening.centre_m
     across = grid.centres_m(0)[:, np.newaxis] - x_m
@@ -341,7 +341,7 @@ def _draw_ground(
     _draw_standing(axes, result)
     if result.run.charge.on_ground:
         # The radius of the front when the grid took over: inside, peaks are sharper.
-        _add_circle(axes, result.run.site.charge, result.run.handover_radius_m, **_FINER_STYLE)
+        _add_circle(axes, result.run.site.charge, result.run.remap_radius_m, **_FINER_STYLE)
 
 
 def _write_levels(axes: Axes, lines: QuadContourSet, result: GasResult) -> None:

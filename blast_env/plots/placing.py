@@ -8,7 +8,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import build_site
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.film import paint_at, plan_film
@@ -65,7 +65,7 @@ class PlacingPainter:
         """Width and height of the frames."""
         return self._sheet.size_px
 
-    def paint(self, placement: Placement, lines: Sequence[str] = ()) -> Frame:
+    def paint(self, placement: LayoutState, lines: Sequence[str] = ()) -> Frame:
         """Return a frame, uint8 (height, width, 3).
 
         Args:
@@ -79,7 +79,7 @@ class PlacingPainter:
             artist.remove()
         return frame
 
-    def _of(self, placement: Placement) -> tuple[Feature, ...]:
+    def _of(self, placement: LayoutState) -> tuple[Feature, ...]:
         """Return all features of a frame, the lowest first."""
         scenario, layout = placement.scenario, placement.layout
         found = [*self._features]
@@ -93,7 +93,7 @@ class PlacingPainter:
 
     def _handles(self) -> list[Artist]:
         """Return the entries of the legend, one per item, since items differ in colour."""
-        placement = Placement.empty(self._scenario)
+        placement = LayoutState.empty(self._scenario)
         catalogue = placement.catalogue
         numbers = {each.name: number for number, each in enumerate(catalogue.variants)}
         one_each = [catalogue.element_at(number, 0, 0) for number in numbers.values()]
@@ -125,7 +125,7 @@ def _particle_frames_px(scenario: Scenario, width_px: int) -> int:
 
 def _fullest_blast(scenario: Scenario) -> Blast:
     """Return a blast with all legend entries that the scenario can have: it needs most room."""
-    empty = Placement.empty(scenario)
+    empty = LayoutState.empty(scenario)
     legal = np.flatnonzero(empty.legal)
     return Blast(scenario, [empty.catalogue.element(int(action)) for action in legal[:1]])
 

@@ -712,13 +712,13 @@ def stand_off_text(scenario: Scenario, layout: Sequence[Element]) -> str:
     """Return the least stand-off with a layout and without, as text; empty without vehicles."""
     if not scenario.vehicles:
         return ""
-    with_layout, bare = (
+    with_layout, unprotected = (
         min(worst_places(scenario, source, each).stand_off_m for source in scenario.vehicles)
         for each in (layout, ())
     )
     if not layout:
-        return f"stand-off {bare:.1f} m"
-    return f"stand-off {with_layout:.1f} m, {bare:.1f} m without the barrier"
+        return f"stand-off {unprotected:.1f} m"
+    return f"stand-off {with_layout:.1f} m, {unprotected:.1f} m without the barrier"
 
 
 def rectangles_of(

@@ -13,9 +13,9 @@ from blast_env.evaluation.engines.gas import GasBlast, GasResult
 from blast_env.files import write_atomically
 from blast_env.gas.engine import GasRun, Recorders
 from blast_env.gas.grid import GasGrid
-from blast_env.gas.opening import opening_of
 from blast_env.gas.probes import Snapshots
 from blast_env.gas.solver import Recorder
+from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.particles.calibration.references import burst_of, kingery_bulmash
 from blast_env.plots.canvas import Frame
 from blast_env.plots.film import (
@@ -25,7 +25,7 @@ from blast_env.plots.film import (
     made_higher,
     plan_until,
     save_frames,
-    told_of,
+    with_progress,
 )
 from blast_env.plots.gas import (
     check_comparable,
@@ -108,8 +108,8 @@ def write_pressure_film(
         painter = PressurePainter(shots, full_kpa, width_px - width_px % 2)
         times_s = map(plan.time_s, range(plan.frame_count))
         frames = (painter.paint(time_s, plan.real_time_factor) for time_s in times_s)
-        told = told_of(frames, plan, share_of(progress, 1, 2))
-        save_frames(told, temporary, suffix, plan, blast.scenario.name, _comment(shots, plan))
+        reported = with_progress(frames, plan, share_of(progress, 1, 2))
+        save_frames(reported, temporary, suffix, plan, blast.scenario.name, _comment(shots, plan))
     return tuple(shot.result for shot in shots)
 
 
@@ -167,7 +167,7 @@ class PressureNow:
             PlaneNow(run, 2, cell[2]),
             PlaneNow(run, section.normal, cell[section.normal]),
         )
-        opening = opening_of(run.charge, run.handover_radius_m)
+        opening = spherical_stage(run.charge, run.remap_radius_m)
         shot = PressureShot(GasResult(blast, run), section, opening, planes)
         self._run = run
         self._painter = PressurePainter([shot], _free_field_peak_kpa(blast.site), width_px)
@@ -247,7 +247,7 @@ def record_planes(
         return (*made, *further(grid))
 
     result = blast.run(progress, recorders)
-    opening = opening_of(result.run.charge, result.run.handover_radius_m)
+    opening = spherical_stage(result.run.charge, result.run.remap_radius_m)
     return PressureShot(result, section, opening, (made[0], made[1]))
 
 

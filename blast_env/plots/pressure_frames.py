@@ -18,8 +18,8 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas import GasResult
 from blast_env.gas.engine import GasRun
-from blast_env.gas.opening import Opening
 from blast_env.gas.probes import Snapshot
+from blast_env.gas.spherical_stage import SphericalStage
 from blast_env.geometry import Rectangle
 from blast_env.plots.canvas import BAR_LABELS_PX, Frame, Sheet
 from blast_env.plots.gas import (
@@ -162,7 +162,7 @@ class PressureShot:
 
     result: GasResult
     section: VerticalSection
-    opening: Opening
+    opening: SphericalStage
     planes: tuple[Plane, Plane]
 
     def at(self, time_s: float, plane: int) -> FloatArray | None:

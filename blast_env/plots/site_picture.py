@@ -8,7 +8,7 @@ import numpy as np
 
 from blast_env.errors import UnknownNameError
 from blast_env.geometry import Element, layout_words
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.oblique import boxes_of, draw_oblique, scale_length_m
 from blast_env.plots.plan import (
     INK,
@@ -73,7 +73,7 @@ def site_picture(
     if view not in SITE_VIEWS:
         raise UnknownNameError("view", view, SITE_VIEWS)
     found = find_scenario(scenario)
-    placement = Placement.of(found, layout)
+    placement = LayoutState.of(found, layout)
     views = SITE_VIEWS[1:] if view == "both" else (view,)
     widths_in = [_width_in(placement, each) for each in views]
     layout = placement.layout
@@ -100,7 +100,7 @@ def site_picture(
     return figure
 
 
-def _items_left(zone: BuildZone | None, placement: Placement) -> list[Artist]:
+def _items_left(zone: BuildZone | None, placement: LayoutState) -> list[Artist]:
     """Return the legend entries for items without a placed piece."""
     if zone is None:
         return []
@@ -112,7 +112,7 @@ def _items_left(zone: BuildZone | None, placement: Placement) -> list[Artist]:
     ]
 
 
-def _width_in(placement: Placement, view: str) -> float:
+def _width_in(placement: LayoutState, view: str) -> float:
     """Return the width of a panel whose view fills the common height of panels, inches."""
     site = placement.scenario.site
     width_m, height_m = site.width_m, site.height_m
@@ -126,7 +126,7 @@ def _width_in(placement: Placement, view: str) -> float:
     return min(max(_PANEL_IN * width_m / height_m, least_in), most_in)
 
 
-def _subtitle(scenario: Scenario, placement: Placement) -> str:
+def _subtitle(scenario: Scenario, placement: LayoutState) -> str:
     masses = sorted({source.tnt_kg for source in scenario.charge})
     parts = [" or ".join(f"{mass:g}" for mass in masses) + " kg TNT"]
     zone = scenario.build_zone

@@ -38,8 +38,8 @@ def checks_of(study: Study) -> tuple[HandCheck, ...]:
     Impulse and pane need a building with a facade.
     """
     found = [_stand_off(study)]
-    if study.bare.responses:
-        facade = study.bare.responses[0].on_cells
+    if study.unprotected.responses:
+        facade = study.unprotected.responses[0].on_cells
         found.append(HandCheck("Impulse of a bay: sum of mean pressure times time", _sum(facade)))
         found += _pane(facade)
     found.append(HandCheck("Cost: number times unit cost", tuple(_cost(study))))
@@ -66,7 +66,7 @@ def _stand_off(study: Study) -> HandCheck:
             kingery_bulmash(quantity, away_m, charge.tnt_kg, burst)
             for quantity in ("reflected_overpressure", "reflected_impulse")
         )
-        fine = study.pair(target, threat, study.options.cells[1]).bare
+        fine = study.pair(target, threat, study.options.cells[1]).unprotected
         lines += [
             f"Kingery and Bulmash, {burst}, normal reflection: {peak_pa / PA_PER_KPA:,.1f} kPa,"
             f" {impulse_pa_s:,.0f} Pa s",

@@ -147,34 +147,40 @@ def kinds(units: UnitSystem) -> dict[str, Kind]:
 
 
 def blast_pictures(
-    bare: MeasuredBlast, walled: MeasuredBlast, units: UnitSystem
+    unprotected: MeasuredBlast, protected: MeasuredBlast, units: UnitSystem
 ) -> tuple[Picture, ...]:
     """Return the unfolded facades of the protected buildings, and the histories on them."""
     pictures: list[Picture] = []
-    for target in walled.targets:
-        if not target.protected or target.name not in walled.loads:
+    for target in protected.targets:
+        if not target.protected or target.name not in protected.loads:
             continue
-        pictures.append(_history(bare, walled, target, units))
+        pictures.append(_history(unprotected, protected, target, units))
         for kind in kinds(units).values():
-            figure = facades(walled.result, target.name, kind, bare.result)
+            figure = facades(protected.result, target.name, kind, unprotected.result)
             pictures.append((f"{target.name}: {kind.name}, walls unfolded", png(figure)))
     return tuple(pictures)
 
 
 def _history(
-    bare: MeasuredBlast, walled: MeasuredBlast, target: ReportedBuilding, units: UnitSystem
+    unprotected: MeasuredBlast,
+    protected: MeasuredBlast,
+    target: ReportedBuilding,
+    units: UnitSystem,
 ) -> Picture:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
-    wall = bare.loads[target.name].wall
+    wall = unprotected.loads[target.name].wall
     figure, axes = _page(3.2)
-    for measured, colour, words in ((bare, _BARE, "no barrier"), (walled, _WALLED, "layout")):
+    for measured, colour, words in (
+        (unprotected, _BARE, "no barrier"),
+        (protected, _WALLED, "layout"),
+    ):
         pressure = measured.histories.of(target.name, wall)
         if pressure is not None:
             axes.plot(
                 MS_PER_S * measured.histories.time_s,
                 pressure / units.pa_per_pressure,
                 color=colour,
-                linestyle="-" if measured is walled else "--",
+                linestyle="-" if measured is protected else "--",
                 linewidth=1.8,
                 label=words,
             )
@@ -190,22 +196,26 @@ def _history(
 
 
 def damage_pictures(
-    scenario: Scenario, layout: Layout, bare: Consequences, walled: Consequences, threat: str
+    scenario: Scenario,
+    layout: Layout,
+    unprotected: Consequences,
+    protected: Consequences,
+    threat: str,
 ) -> tuple[Picture, ...]:
     """Return pictures of the damage to facades under one threat, without the layout and with it.
 
     They are the site in three dimensions, and the unfolded facades and the pressure-impulse diagram
     of each building.
     """
-    if not walled.responses:
+    if not protected.responses:
         return ()
     words = ("no barrier", "layout")
     views = [
-        (words[0], (), bare.responses),
-        (words[1], layout, walled.responses),
+        (words[0], (), unprotected.responses),
+        (words[1], layout, protected.responses),
     ]
     pictures = [("damage of the facades", png(damage_view(scenario, views, threat)))]
-    for first, second in zip(bare.responses, walled.responses, strict=True):
+    for first, second in zip(unprotected.responses, protected.responses, strict=True):
         name = second.building
         rows = list(zip(words, (first, second), strict=True))
         pictures.append((f"{name}: facades unfolded", png(facade_picture(rows, name))))
@@ -215,14 +225,14 @@ def damage_pictures(
     return tuple(pictures)
 
 
-def risk_picture(bare: MeasuredBlast, walled: MeasuredBlast) -> Picture:
+def risk_picture(unprotected: MeasuredBlast, protected: MeasuredBlast) -> Picture:
     """Return the map of risk to windows and eardrums.
 
     The map without the layout stands beside it if the charge is at the same place in both.
     """
-    charges = (bare.result.run.site.charge, walled.result.run.site.charge)
-    beside = bare.result if charges[0] == charges[1] else None
-    figure = threshold_map(walled.result, beside)
+    charges = (unprotected.result.run.site.charge, protected.result.run.site.charge)
+    beside = unprotected.result if charges[0] == charges[1] else None
+    figure = threshold_map(protected.result, beside)
     return "risk to windows and eardrums, for the choice of assembly points", png(figure)
 
 

@@ -89,20 +89,20 @@ class LoadPair:
         target: The building.
         threat: The threat.
         cells: The cells.
-        bare: Without the layout.
-        walled: With it.
+        unprotected: Without the layout.
+        protected: With it.
     """
 
     target: ReportedBuilding
     threat: LoadCase
     cells: Cells
-    bare: TargetLoad
-    walled: TargetLoad
+    unprotected: TargetLoad
+    protected: TargetLoad
 
     @property
     def reduction(self) -> float:
         """Share of the impulse that is gone; NaN if there is none."""
-        return reductions(self.walled.impulse_pa_s, self.bare.impulse_pa_s).item()
+        return reductions(self.protected.impulse_pa_s, self.unprotected.impulse_pa_s).item()
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ class LoadErrors:
             ratio: Side of the coarser cells over that of the finer ones.
         """
         pairs = (
-            (fine.bare.impulse_pa_s, coarse.bare.impulse_pa_s),
-            (fine.walled.impulse_pa_s, coarse.walled.impulse_pa_s),
+            (fine.unprotected.impulse_pa_s, coarse.unprotected.impulse_pa_s),
+            (fine.protected.impulse_pa_s, coarse.protected.impulse_pa_s),
             (fine.reduction, coarse.reduction),
         )
         return cls(*(convergence_index(*each, ratio) for each in pairs))

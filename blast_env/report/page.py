@@ -256,7 +256,7 @@ def _summary(study: Study) -> list[SummaryLine]:
         ]
         if own:
             gone = [each.reduction for each in own]
-            worst = max(own, key=lambda each: each.walled.impulse_pa_s)
+            worst = max(own, key=lambda each: each.protected.impulse_pa_s)
             error = max(study.errors(each).reduction for each in own)
             ends = float(min(gone)), float(max(gone))
             lines.append(SummaryLine(target.name, worst, *ends, study.errors(worst), error))
@@ -273,31 +273,31 @@ class Sureness:
 
     Attributes:
         likely: Probability with the layout, and what drives it.
-        bare: Probability without it.
+        unprotected: Probability without it.
         masses: The largest mass that keeps the level, by threat.
     """
 
     likely: str
-    bare: str
+    unprotected: str
     masses: tuple[str, ...]
 
 
 def _sureness(study: Study) -> Sureness | None:
     """Return how sure the level is; `None` without buildings with a facade."""
-    if not study.walled.responses:
+    if not study.protected.responses:
         return None
-    walled, bare = (
-        level_probability(each, study.uncertainty) for each in (study.walled, study.bare)
+    protected, unprotected = (
+        level_probability(each, study.uncertainty) for each in (study.protected, study.unprotected)
     )
     target = study.target
     masses = []
     for number, threat in enumerate(study.threats):
-        kg, is_found = mass_near(study.walled.under(number), target)
-        kept = study.walled.under(number).passes(target)
+        kg, is_found = mass_near(study.protected.under(number), target)
+        kept = study.protected.under(number).passes(target)
         bound = "" if is_found else ("at least " if kept else "less than ")
         masses.append(f"{bound}{kg:.3g} kg ({threat.name})")
-    bare_text = probability_text(bare.of(target), len(bare.levels))
-    return Sureness(walled.words(target), bare_text, tuple(masses))
+    bare_text = probability_text(unprotected.of(target), len(unprotected.levels))
+    return Sureness(protected.words(target), bare_text, tuple(masses))
 
 
 REFERENCES: Final = (
@@ -343,12 +343,14 @@ class BayTable:
 
 def _bay_tables(study: Study) -> list[BayTable]:
     tables = []
-    for bare, walled in zip(study.bare.responses, study.walled.responses, strict=True):
+    for unprotected, protected in zip(
+        study.unprotected.responses, study.protected.responses, strict=True
+    ):
         standings = {
             each.bay.name: stood.standing.label
-            for each, stood in zip(walled.facade.bays, walled.standings, strict=True)
+            for each, stood in zip(protected.facade.bays, protected.standings, strict=True)
         }
-        both = list(zip(bay_rows(bare.facade), bay_rows(walled.facade), strict=True))
+        both = list(zip(bay_rows(unprotected.facade), bay_rows(protected.facade), strict=True))
         # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
         both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
         rows = tuple(
@@ -359,9 +361,9 @@ def _bay_tables(study: Study) -> list[BayTable]:
             )
             for first, second in both[:_MOST_BAYS]
         )
-        x_m, y_m = walled.charge.position_m
-        name = study.scenario.title_of(walled.building)
-        title = f"{name}, {walled.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
+        x_m, y_m = protected.charge.position_m
+        name = study.scenario.title_of(protected.building)
+        title = f"{name}, {protected.charge.tnt_kg:g} kg at ({x_m:.1f}, {y_m:.1f}) m"
         tables.append(BayTable(title, rows, len(both) - len(rows)))
     return tables
 
@@ -409,8 +411,8 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
             found += [(f"{name}, {words}: {what}", value, where) for what, value in values]
     for line in summary:
         for words, of_blast, load, error in (
-            (*sides[0], line.worst.bare, line.errors.bare_pa_s),
-            (*sides[1], line.worst.walled, line.errors.walled_pa_s),
+            (*sides[0], line.worst.unprotected, line.errors.bare_pa_s),
+            (*sides[1], line.worst.protected, line.errors.walled_pa_s),
         ):
             label = f"{line.worst.threat.name} {of_blast}, {fine}"
             where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
@@ -437,7 +439,7 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
     if verdict.barrier is not None:
         where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
         found.append(("barriers", _standing(verdict), where))
-    for neighbour in study.walled.worst_neighbours:
+    for neighbour in study.protected.worst_neighbours:
         share = _percent(neighbour.probability[BuildingDamage.MAJOR])
         where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "
         where += f"{_number(neighbour.impulse_pa_s)} Pa s; {blasts(sides[1][1])}"

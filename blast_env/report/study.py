@@ -21,7 +21,7 @@ from blast_env.evaluation.shared import keep_consequences
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Element, Layout, Piece, layout_text, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
-from blast_env.layout import Placement, check_layout
+from blast_env.layout import LayoutState, check_layout
 from blast_env.plots.pressure_frames import VerticalSection, default_section
 from blast_env.report.details import ReportDetails
 from blast_env.report.figures import (
@@ -169,8 +169,8 @@ class Study:
         bill: Bill of quantities of the layout; `blast_env.io.export.bill.BILL_COLUMNS`.
         cost: Its cost.
         pairs: Loads by threat, building and cell size.
-        bare: Response of the buildings without the layout, with the finer cells.
-        walled: Response of the buildings and of the barrier with it.
+        unprotected: Response of the buildings without the layout, with the finer cells.
+        protected: Response of the buildings and of the barrier with it.
         walled_coarse: The same with the coarser cells.
         pictures: Facades and histories with the finer cells, by threat; none if it was stopped
             before those.
@@ -193,8 +193,8 @@ class Study:
     bill: pd.DataFrame
     cost: float
     pairs: tuple[LoadPair, ...]
-    bare: Consequences
-    walled: Consequences
+    unprotected: Consequences
+    protected: Consequences
     walled_coarse: Consequences
     pictures: dict[str, tuple[Picture, ...]]
     stills: tuple[Picture, ...]
@@ -233,7 +233,7 @@ class Study:
         """The uncertain quantities, with the largest error of the cells of an impulse."""
         fine = self.options.cells[1]
         own = [each for each in self.pairs if each.target.protected and each.cells == fine]
-        shares = [self.errors(each).walled_pa_s / each.walled.impulse_pa_s for each in own]
+        shares = [self.errors(each).walled_pa_s / each.protected.impulse_pa_s for each in own]
         cells = max((share for share in shares if np.isfinite(share)), default=0.0)
         return Uncertainty(mass=self.options.mass_error, cells=cells)
 
@@ -315,11 +315,11 @@ def run_study(
         targets=targets,
         threats=runs.threats,
         bill=bill,
-        cost=Placement.of(scenario, cells).cost,
+        cost=LayoutState.of(scenario, cells).cost,
         pairs=tuple(each for each in runs.pairs if each.cells in options.cells),
-        bare=runs.consequences(fine, walled=False),
-        walled=runs.consequences(fine, walled=True),
-        walled_coarse=runs.consequences(coarse, walled=True),
+        unprotected=runs.consequences(fine, protected=False),
+        protected=runs.consequences(fine, protected=True),
+        walled_coarse=runs.consequences(coarse, protected=True),
         pictures=runs.pictures,
         stills=runs.stills,
         items=items,
@@ -479,9 +479,11 @@ class Runs:
             both = [self._drawn(threat, fine, layout, section) for layout in self._layouts]
             self._keep(threat, fine, *map(_Blast.of, both))
             # Drawn now, because only these two results are in memory at once.
-            bare, walled = (self._found[fine, is_walled][-1] for is_walled in (False, True))
+            unprotected, protected = (
+                self._found[fine, is_walled][-1] for is_walled in (False, True)
+            )
             self.pictures[threat.name] = (
-                *damage_pictures(self.scenario, self.layout, bare, walled, threat.name),
+                *damage_pictures(self.scenario, self.layout, unprotected, protected, threat.name),
                 risk_picture(*both),
                 *blast_pictures(both[0], both[1], self.options.units),
             )
@@ -512,14 +514,14 @@ class Runs:
             self.pictures.clear()
         return replace(self.options, cells=(done[0], done[-1]))
 
-    def consequences(self, cells: Cells, *, walled: bool) -> Consequences:
+    def consequences(self, cells: Cells, *, protected: bool) -> Consequences:
         """Return the consequences of all threats on the given cells, without or with the layout."""
-        return Consequences.together(self._found[cells, walled])
+        return Consequences.together(self._found[cells, protected])
 
     def _blast(self, threat: LoadCase, cells: Cells, layout: Layout) -> GasBlast:
         return GasBlast(self.scenario, layout, 0, GasEngine.with_cells(cells), threat.charge)
 
-    def _told(self, threat: LoadCase, cells: Cells, layout: Layout) -> Tell:
+    def _progress_of(self, threat: LoadCase, cells: Cells, layout: Layout) -> Tell:
         label = _label(threat, _WALLED if layout else _BARE, cells)
         return partial(self.progress, label)
 
@@ -528,18 +530,21 @@ class Runs:
         if (layout, threat) in self._ahead:
             return self._ahead[layout, threat]
         size = self.options.cells[0]
-        told = self._told(threat, size, layout)
-        return _Blast.of(measure(self._blast(threat, size, layout), self.targets, told))
+        progress = self._progress_of(threat, size, layout)
+        return _Blast.of(measure(self._blast(threat, size, layout), self.targets, progress))
 
     def _drawn(
         self, threat: LoadCase, cells: Cells, layout: Layout, section: VerticalSection | None
     ) -> MeasuredBlast:
-        blast, told = self._blast(threat, cells, layout), self._told(threat, cells, layout)
-        return measure(blast, self.targets, told, section)
+        blast, progress = (
+            self._blast(threat, cells, layout),
+            self._progress_of(threat, cells, layout),
+        )
+        return measure(blast, self.targets, progress, section)
 
-    def _keep(self, threat: LoadCase, cells: Cells, bare: _Blast, walled: _Blast) -> None:
+    def _keep(self, threat: LoadCase, cells: Cells, unprotected: _Blast, protected: _Blast) -> None:
         """Keep the numbers of both blasts of a threat."""
-        for layout, words, each in (((), _BARE, bare), (self.layout, _WALLED, walled)):
+        for layout, words, each in (((), _BARE, unprotected), (self.layout, _WALLED, protected)):
             label = _label(threat, words, cells)
             self.notes += [f"{label}: {note}" for note in each.notes]
             self.digests.append((label, each.digest))
@@ -547,8 +552,8 @@ class Runs:
             self._evaluators[cells].keep(layout, threat, each.loads)
             keep_consequences(self._evaluators[cells], layout, threat.charge, each.found)
         for target in self.targets:
-            if target.name in bare.on_targets and target.name in walled.on_targets:
-                loads = bare.on_targets[target.name], walled.on_targets[target.name]
+            if target.name in unprotected.on_targets and target.name in protected.on_targets:
+                loads = unprotected.on_targets[target.name], protected.on_targets[target.name]
                 self.pairs.append(LoadPair(target, threat, cells, *loads))
 
     def _moments_s(self) -> list[float]:
@@ -558,11 +563,11 @@ class Runs:
             for each in self.pairs
             if each.threat is self.threats[0]
             and each.target.protected
-            and each.bare.arrival_s > 0.0
+            and each.unprotected.arrival_s > 0.0
         ]
         if not own:
             return []
-        first = min(own, key=lambda each: each.bare.arrival_s).bare
+        first = min(own, key=lambda each: each.unprotected.arrival_s).unprotected
         arrival_s = first.arrival_s
         phase_s = first.duration_s if np.isfinite(first.duration_s) else arrival_s
         last_s = arrival_s + 2.0 * phase_s
@@ -619,9 +624,14 @@ class Runs:
 
     def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[ThreatOutcome, ...]:
         loads = self._blasts(label, self._layouts, charges)
-        bare, walled = loads[: len(charges)], loads[len(charges) :]
+        unprotected, protected = loads[: len(charges)], loads[len(charges) :]
         return tuple(
-            map(partial(ThreatOutcome.of, self.scenario, self.layout), charges, walled, bare)
+            map(
+                partial(ThreatOutcome.of, self.scenario, self.layout),
+                charges,
+                protected,
+                unprotected,
+            )
         )
 
     def item_worths(self) -> tuple[ItemWorth, ...]:
@@ -629,8 +639,8 @@ class Runs:
         pieces = standing(self.layout)
         layouts = ((), self.layout, *_fewer(self.layout))
         impulses = self._loads(_ITEMS, layouts, self.threats)
-        bare, whole, without = impulses[0], impulses[1], impulses[2:]
-        worths = ((without - whole) / bare).mean(axis=1)
+        unprotected, whole, without = impulses[0], impulses[1], impulses[2:]
+        worths = ((without - whole) / unprotected).mean(axis=1)
         items = [
             ItemWorth(
                 layout_text([element]),
@@ -646,10 +656,10 @@ class Runs:
         if not layouts:
             return ()
         impulses = self._loads(_FRONT, ((), *layouts), self.threats)
-        bare = np.broadcast_to(impulses[0], impulses[1:].shape)
-        gone = reductions(impulses[1:], bare).mean(axis=1)
+        unprotected = np.broadcast_to(impulses[0], impulses[1:].shape)
+        gone = reductions(impulses[1:], unprotected).mean(axis=1)
         points = [
-            FrontPoint(layout, Placement.of(self.scenario, layout).cost, float(share))
+            FrontPoint(layout, LayoutState.of(self.scenario, layout).cost, float(share))
             for layout, share in zip(layouts, gone, strict=True)
         ]
         return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
@@ -667,8 +677,8 @@ class Runs:
     ) -> list[BlastLoads]:
         """Return the loads of every layout under every threat, from the store if possible."""
         pairs = [(layout, threat) for layout in layouts for threat in threats]
-        told = partial(self.progress, label)
-        return self._evaluator.loads_of_many(pairs, self.options.processes, told)
+        progress = partial(self.progress, label)
+        return self._evaluator.loads_of_many(pairs, self.options.processes, progress)
 
 
 @dataclass(frozen=True)

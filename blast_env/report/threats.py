@@ -28,8 +28,14 @@ _STEPS: Final = 400
 
 def place_text(threat: LoadCase, scenario: Scenario, layout: Layout) -> str:
     """Return the place of a charge in words, with a layout, and without if that differs."""
-    bare, walled = (_place_text(threat.charge_against(scenario, each)) for each in ((), layout))
-    return walled if bare == walled else f"{bare} without the layout, {walled} with it"
+    unprotected, protected = (
+        _place_text(threat.charge_against(scenario, each)) for each in ((), layout)
+    )
+    return (
+        protected
+        if unprotected == protected
+        else f"{unprotected} without the layout, {protected} with it"
+    )
 
 
 def chief_threats(

@@ -120,22 +120,23 @@ def verdict_of(study: Study) -> ReportVerdict:
     asked = [_limit_words(limits)] if limits else []
     doubt = ""
     glazing: tuple[OtherGlass, ...] = ()
-    if study.walled.buildings:
-        asked.insert(0, study.walled.level_words_for(target))
-        kept.append(study.walled.passes(target))
-        kept_bare.append(study.bare.passes(target))
-        doubt = study.walled.doubt(target)
+    if study.protected.buildings:
+        asked.insert(0, study.protected.level_words_for(target))
+        kept.append(study.protected.passes(target))
+        kept_bare.append(study.unprotected.passes(target))
+        doubt = study.protected.doubt(target)
         glazing = tuple(_glazing(study))
     return ReportVerdict(
         passes=all(kept) if asked else None,
         passes_bare=all(kept_bare) if asked else None,
-        flagged=study.walled.is_flagged or any(each.pair.walled.flagged for each in limits),
-        flagged_bare=study.bare.is_flagged or any(each.pair.bare.flagged for each in limits),
+        flagged=study.protected.is_flagged or any(each.pair.protected.flagged for each in limits),
+        flagged_bare=study.unprotected.is_flagged
+        or any(each.pair.unprotected.flagged for each in limits),
         words="; ".join(asked),
         doubt=doubt,
-        buildings=tuple(_line(study, name) for name in study.walled.buildings),
+        buildings=tuple(_line(study, name) for name in study.protected.buildings),
         limits=limits,
-        barrier=study.walled.worst_barrier,
+        barrier=study.protected.worst_barrier,
         glazing=glazing,
     )
 
@@ -145,7 +146,9 @@ def _limits(study: Study) -> Iterator[KeptLimit]:
     for limit in study.options.limits:
         for pair in study.pairs:
             if pair.target.name == limit.target and pair.cells == fine:
-                yield KeptLimit(limit, pair, limit.is_kept(pair.walled), limit.is_kept(pair.bare))
+                yield KeptLimit(
+                    limit, pair, limit.is_kept(pair.protected), limit.is_kept(pair.unprotected)
+                )
 
 
 def _limit_words(limits: Sequence[KeptLimit]) -> str:
@@ -164,7 +167,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def _line(study: Study, name: str) -> BuildingLine:
-    both: Sequence[Consequences] = (study.bare, study.walled)
+    both: Sequence[Consequences] = (study.unprotected, study.protected)
     facades = [[response.facade for response in each.of(name)] for each in both]
     first = facades[0][0]
     return BuildingLine(
@@ -184,13 +187,14 @@ def _line(study: Study, name: str) -> BuildingLine:
 
 def _glazing(study: Study) -> Iterator[OtherGlass]:
     """Yield the verdicts with other glass, if any building has panes."""
-    if not any(each.facade.panes for each in study.walled.responses):
+    if not any(each.facade.panes for each in study.protected.responses):
         return
     for name, glazing in other_glazing(study.scenario).items():
-        walled, bare = (
-            each.with_glazing(glazing).passes(study.target) for each in (study.walled, study.bare)
+        protected, unprotected = (
+            each.with_glazing(glazing).passes(study.target)
+            for each in (study.protected, study.unprotected)
         )
-        yield OtherGlass(glazing.title, _price(study, name), walled, bare)
+        yield OtherGlass(glazing.title, _price(study, name), protected, unprotected)
 
 
 def _price(study: Study, glazing: str) -> float | None:

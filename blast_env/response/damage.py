@@ -14,7 +14,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import FacadeResponse, FilledBay, respond, sharpened
+from blast_env.response.facade import FacadeResponse, FilledBay, peak_corrected, respond
 from blast_env.response.glass import GlazingResponses, Pane, glazing_responses
 from blast_env.response.walls import Panel, PanelResponses, panel_responses
 
@@ -80,7 +80,7 @@ def bay_damages(
     filled, of_bay = [each for *_, each in places], [index for index, *_ in places]
     damage = _numbers(respond(filled, time_s, pressure_pa[of_bay]))
     if peak_factor > 1.0:
-        times_s, sharper_pa = sharpened(time_s, pressure_pa, peak_factor)
+        times_s, sharper_pa = peak_corrected(time_s, pressure_pa, peak_factor)
         damage = np.maximum(damage, _numbers(respond(filled, times_s, sharper_pa[of_bay])))
     of_bays: list[dict[str, float]] = [{} for _ in bays]
     for (index, name, _), value in zip(places, damage.tolist(), strict=True):

@@ -401,7 +401,7 @@ def slowest_period_s(bays: Sequence[FilledBay]) -> float:
     return max((each.period_s for each in (*panes, *panels)), default=0.0)
 
 
-def sharpened(
+def peak_corrected(
     time_s: FloatArray, pressure_pa: FloatArray, factor: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return histories with higher peaks and shorter durations, of the same impulse.

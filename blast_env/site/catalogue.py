@@ -237,7 +237,7 @@ class Hardening(Section):
         )
 
 
-class Removable(Section):
+class Demolition(Section):
     """A measure of a layout that removes structures.
 
     The structures no longer affect blasts and vehicles. Their ground stays closed to pieces.
@@ -255,10 +255,10 @@ class Removable(Section):
     cost: Cost
 
 
-AnyMeasure = Hardening | Removable
+AnyMeasure = Hardening | Demolition
 """A measure, which is taken or not and covers no cell."""
 
-_KINDS: Final[Mapping[type, type[Measure]]] = {Hardening: Measure, Removable: Removal}
+_KINDS: Final[Mapping[type, type[Measure]]] = {Hardening: Measure, Demolition: Removal}
 
 
 class Variant(NamedTuple):

@@ -38,7 +38,7 @@ class ObjectiveSection(Section):
     With kind `"response"` the response of the protected structures' facades counts instead of a
     load: the damage of their bays (`blast_env.response.damage`), weighted by area, a dimensionless
     number from 0 to 5. With a `target` the objective is the cheapest layout that reaches a level of
-    protection: see `response` and `counted`.
+    protection: see `response` and `objective_value`.
 
     Attributes:
         kind: Load or response of facades; the response needs the engine `gas`, or a surrogate of
@@ -141,7 +141,7 @@ class ObjectiveSection(Section):
             return f"{load:.3g}"
         return f"{load:,.0f} {self.unit}"
 
-    def paid(self, load: float) -> float:
+    def reward_value(self, load: float) -> float:
         """Return a load in `unit` converted to the unit of rewards: psi s, psi, or none."""
         return load if self.is_response or self.quantity == "both" else load / PA_PER_PSI
 
@@ -161,7 +161,7 @@ class ObjectiveSection(Section):
             damage = np.where(damage >= limit, 1.0 + damage - limit, 0.0)
         return float(area_m2 @ damage) / total_m2 if total_m2 > 0.0 else 0.0
 
-    def counted(self, combined: float, cost_share: float) -> float:
+    def objective_value(self, combined: float, cost_share: float) -> float:
         """Return the objective value of a layout, to be minimised.
 
         Without a target it is `combined`. With a target it is `cost_share` for a layout that

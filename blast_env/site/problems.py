@@ -103,10 +103,10 @@ def problems_from(
         prefix: Keys of the validated value in the file.
     """
     details = error.errors(include_url=False)
-    told = [each for detail in details[:MAX_PROBLEMS] for each in _translated(detail, model)]
+    translated = [each for detail in details[:MAX_PROBLEMS] for each in _translated(detail, model)]
     # The others are only counted, and need no message.
     counted = [Problem(key_path(detail["loc"]), detail["msg"]) for detail in details[MAX_PROBLEMS:]]
-    return tuple(problem.below(prefix) for problem in (*told, *counted))
+    return tuple(problem.below(prefix) for problem in (*translated, *counted))
 
 
 def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Problem]:

@@ -33,10 +33,10 @@ from blast_env.site.catalogue import (
     AnyMeasure,
     Catalogue,
     Cost,
+    Demolition,
     Hardening,
     Item,
     PlacedModule,
-    Removable,
     Variant,
 )
 from blast_env.site.sections import (
@@ -92,7 +92,7 @@ class _SameItems:
 
     items: tuple[Item, ...]
     hardening: tuple[Hardening, ...]
-    removable: tuple[Removable, ...]
+    removable: tuple[Demolition, ...]
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -142,7 +142,7 @@ class BuildZone(Section):
     columns: Count
     items: Annotated[tuple[Item, ...], Field(max_length=MOST_ITEMS)] = ()
     hardening: Annotated[tuple[Hardening, ...], Field(max_length=MOST_ITEMS)] = ()
-    removable: Annotated[tuple[Removable, ...], Field(max_length=MOST_ITEMS)] = ()
+    removable: Annotated[tuple[Demolition, ...], Field(max_length=MOST_ITEMS)] = ()
     stock: Annotated[StrictInt, Field(ge=1, le=MOST_STOCK)]
     keep_outs: Annotated[tuple[KeepOut, ...], Field(max_length=100)] = ()
     module_capacity: Annotated[StrictFloat, Field(gt=0.0, le=1e12)] | None = None

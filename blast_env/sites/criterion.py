@@ -13,7 +13,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Element, Layout, Rectangle
-from blast_env.layout import Placement, usable_cells
+from blast_env.layout import LayoutState, usable_cells
 from blast_env.site import (
     AnyScenario,
     AnySource,
@@ -104,7 +104,7 @@ class Visibility:
             over &= (share == 1.0) | (ends_m == 0.0) | (share * ends_m >= high_m)
         open_share *= float(weight[over].sum() / max(weight.sum(), 1e-300))
         height_m = ends_m[:, np.newaxis, np.newaxis] * np.tile(along_share, (TARGETS, 1, 1))
-        height_m -= Placement.empty(scenario).ground_m
+        height_m -= LayoutState.empty(scenario).ground_m
         return cls(weight[over], np.tile(cut, (TARGETS, 1, 1))[over], height_m[over], open_share)
 
     def cut_by(self, height_m: float | None) -> BoolArray:
@@ -121,7 +121,7 @@ class Visibility:
         """Return the share of the lines, by weight, that modules cut.
 
         Args:
-            cells: (row, column) of the cells that hold a module (`Placement.cells`).
+            cells: (row, column) of the cells that hold a module (`LayoutState.cells`).
             heights_m: Height of each module, `None` for the height of the air; all `None` unless
                 given.
         """
@@ -238,7 +238,7 @@ class SiteMeasures:
             BlastEnvError: If it has no build zone.
         """
         scenario = find_scenario(scenario)
-        lines, placement = Visibility.of(scenario), Placement.empty(scenario)
+        lines, placement = Visibility.of(scenario), LayoutState.empty(scenario)
         cut = _cut_by_variants(lines, placement.catalogue)
         if scenario.zone.items:
             random_share = _random_pieces_share(placement, lines, cut)
@@ -252,7 +252,7 @@ class SiteMeasures:
         )
 
 
-def cut_share_of(lines: Visibility, placement: Placement) -> float:
+def cut_share_of(lines: Visibility, placement: LayoutState) -> float:
     """Return the share of the lines that the placed modules cut, with their heights."""
     modules = placement.modules
     return lines.cut_share([each.cell for each in modules], [each.height_m for each in modules])
@@ -267,11 +267,11 @@ def visibility_layout(scenario: AnyScenario, lines: Visibility) -> Layout:
         scenario: The scenario, or its bundled name or path.
         lines: Its lines of sight.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     return _greedy(placement, lines, _cut_by_variants(lines, placement.catalogue)).layout
 
 
-def _greedy(placement: Placement, lines: Visibility, cut: BoolArray) -> Placement:
+def _greedy(placement: LayoutState, lines: Visibility, cut: BoolArray) -> LayoutState:
     left = np.ones(len(lines.weight), dtype=bool)
     possible = placement.legal.reshape(-1)  # what is not legal at first never becomes so
     cut, gain = cut[:, possible], np.zeros(len(possible))
@@ -379,7 +379,7 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
     cells = int(usable.sum())
     modules = zone.stock
     if zone.budget is not None:
-        mean_cost = Placement.empty(scenario).module_costs[usable].mean()
+        mean_cost = LayoutState.empty(scenario).module_costs[usable].mean()
         modules = min(modules, int(zone.budget / mean_cost))
     # A line is missed if all modules stand on cells that do not cut it.
     harmless = cells - lines.cut[:, usable].sum(axis=1)
@@ -390,7 +390,7 @@ def _random_share(scenario: Scenario, lines: Visibility) -> float:
     return round(share, 9)  # the last bit differs between machines and must not decide
 
 
-def _random_pieces_share(placement: Placement, lines: Visibility, cut: BoolArray) -> float:
+def _random_pieces_share(placement: LayoutState, lines: Visibility, cut: BoolArray) -> float:
     """Return the approximate share of the lines that random pieces cut; overlaps are allowed."""
     zone = placement.scenario.zone
     legal = placement.legal.reshape(len(placement.legal), -1)

@@ -40,7 +40,7 @@ def known_layouts(definition: Definition, published: BlastStore) -> dict[str, La
     for number, layout in enumerate(published_layouts(definition, published)):
         found[f"published blasts {number}"] = layout
     path = DATA / "best_found" / f"{definition.site}.json"
-    if definition.family != "told" and path.exists():
+    if definition.family != "known" and path.exists():
         found["study of the scenarios"] = load_layout(path, scenario)
     if scenario.zone.items:
         for name in ("package", "surrogate"):

@@ -159,20 +159,23 @@ def _definition_rows(case: LongRun, until_s: float) -> Iterator[tuple[str, ...]]
     """Yield the rows of a site: no barrier with loads in Pa s, layouts with reductions."""
     site, engine = case.site, case.engine
     placed = {"no barrier": (), **_rule_layouts(site), **_random_layouts(site, 1)}
-    bare = both_loads(site, (), engine, until_s)
+    unprotected = both_loads(site, (), engine, until_s)
     for name, layout in placed.items() if site.build_zone else [("no barrier", ())]:
         if layout:
             found = both_loads(site, layout, engine, until_s)
             positive, peak = (
                 f"{100.0 * (1.0 - own / without):.1f} %"
                 for own, without in (
-                    (found.positive_pa_s, bare.positive_pa_s),
-                    (found.impulse_pa_s, bare.impulse_pa_s),
+                    (found.positive_pa_s, unprotected.positive_pa_s),
+                    (found.impulse_pa_s, unprotected.impulse_pa_s),
                 )
             )
         elif name == "no barrier":
-            found = bare
-            positive, peak = f"{bare.positive_pa_s:,.0f} Pa s", f"{bare.impulse_pa_s:,.0f} Pa s"
+            found = unprotected
+            positive, peak = (
+                f"{unprotected.positive_pa_s:,.0f} Pa s",
+                f"{unprotected.impulse_pa_s:,.0f} Pa s",
+            )
         else:
             continue
         times_s = (found.reached_s, found.last_s, found.end_s)
@@ -197,9 +200,9 @@ def oblique(
             found = oblique_loads(angle_deg, cell, until)
             peaks_pa = (
                 *(found.mean_peak_pa, found.largest_peak_pa),
-                *(found.told_peak_pa, found.largest_told_pa),
+                *(found.covered_peak_pa, found.largest_told_pa),
             )
-            impulses = (found.impulse_pa_s, found.told_pa_s)
+            impulses = (found.impulse_pa_s, found.covered_pa_s)
             rows.append(
                 (
                     f"{angle_deg:g}",

@@ -83,7 +83,7 @@ def judge(
         progress: Called with the finished share of the gas blasts; those of the particle model
             follow.
     """
-    drawn = SeedRange.JUDGEMENT.seeds(0, seeds)
+    drawn = SeedRange.TEST.seeds(0, seeds)
     evaluator = BlastEvaluator(scenario, "gas")
     gas = _impulses(evaluator, layouts, charges, drawn[:1], processes, progress)
     of_gas = reductions(gas[1:], _bare(gas))

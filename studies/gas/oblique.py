@@ -76,8 +76,8 @@ class FacadeLoads:
         impulse_pa_s: Mean impulse over the cell faces.
         mean_peak_pa: Mean over the cell faces of the largest overpressure.
         largest_peak_pa: The largest overpressure on any of them.
-        told_pa_s: Mean impulse in the tables of the engine, along the facade's normal.
-        told_peak_pa: Mean over the bays of the largest mean overpressure along that normal.
+        covered_pa_s: Mean impulse in the tables of the engine, along the facade's normal.
+        covered_peak_pa: Mean over the bays of the largest mean overpressure along that normal.
         largest_told_pa: The largest of these peaks.
         told_m: Largest deflection of an elastic component of 10 ms in any bay along that normal.
     """
@@ -85,8 +85,8 @@ class FacadeLoads:
     impulse_pa_s: float
     mean_peak_pa: float
     largest_peak_pa: float
-    told_pa_s: float
-    told_peak_pa: float
+    covered_pa_s: float
+    covered_peak_pa: float
     largest_told_pa: float
     told_m: float
 
@@ -104,7 +104,7 @@ def oblique_loads(
     result = GasBlast(turned_block(angle_deg), engine=GasEngine(cell_m=cell_m, until=until)).run()
     chosen = _facade(result.run, angle_deg)
     impulse, peak = result.run.loads.impulse_pa_s, result.run.loads.peak_pa
-    told = result.on_walls[chosen]
+    covered = result.on_walls[chosen]
     bays = result.bay_loads
     assert bays is not None
     names = [each.name for each in result.run.site.structures]
@@ -116,8 +116,8 @@ def oblique_loads(
         impulse_pa_s=float(impulse[chosen].mean()),
         mean_peak_pa=float(peak[chosen].mean()),
         largest_peak_pa=float(peak[chosen].max()),
-        told_pa_s=float(np.average(told["impulse_pa_s"], weights=told["share"])),
-        told_peak_pa=float(peaks_pa.mean()),
+        covered_pa_s=float(np.average(covered["impulse_pa_s"], weights=covered["share"])),
+        covered_peak_pa=float(peaks_pa.mean()),
         largest_told_pa=float(peaks_pa.max()),
         told_m=_deflection_m(bays.recorder.time_s, history_pa),
     )

@@ -12,7 +12,7 @@ from blast_agents.training.agent import logits_of
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
 from blast_env.geometry import Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import save_scenario
 from blast_env.site.scene import Charge
 from tests.agents.training_runs import hyperparameters, settings
@@ -59,11 +59,11 @@ def test_the_policy_sees_heights_and_places_around_its_cells() -> None:
         own = [geometry.crop(named[name]) for name in features.around]
         return torch.stack(own, dim=1)
 
-    bare, walled = cell_features(), cell_features(Piece(5, 1, "wall", True))
+    unprotected, protected = cell_features(), cell_features(Piece(5, 1, "wall", True))
     assert features.around[2:] == GridObservation().channels_of(yard())[-4:]
-    assert walled[0, 0, 5:8, 1].tolist() == pytest.approx([2.0 / 12.0] * 3, abs=0.002)
-    legal = torch.as_tensor(Placement.empty(yard()).legal.astype("float32"))
-    torch.testing.assert_close(bare[0, 2:], legal)
+    assert protected[0, 0, 5:8, 1].tolist() == pytest.approx([2.0 / 12.0] * 3, abs=0.002)
+    legal = torch.as_tensor(LayoutState.empty(yard()).legal.astype("float32"))
+    torch.testing.assert_close(unprotected[0, 2:], legal)
     assert catalogue.element(int(legal.flatten().argmax())) == Piece(0, 0, "wall")
 
 
@@ -76,8 +76,8 @@ def test_an_agent_is_trained_on_pieces_and_proposes_them(tmp_path: Path) -> None
     train(settings(tmp_path / "yard.toml"), hyperparameters(), folder)
     agent = load_agent(folder)
     layout = agent.propose(scenario, CHARGE)
-    assert Placement.of(scenario, layout).layout == layout
+    assert LayoutState.of(scenario, layout).layout == layout
     assert agent.propose(scenario, CHARGE) == layout
     drawn = set(agent.sample(scenario, CHARGE, count=6, seed=1))
     assert len(drawn) > 1
-    assert all(Placement.of(scenario, each).layout == each for each in drawn)
+    assert all(LayoutState.of(scenario, each).layout == each for each in drawn)

@@ -26,7 +26,7 @@ from blast_env.design.search.operators import cut, individual, layout_of, mixed,
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from tests.agents.sites import site
@@ -61,7 +61,7 @@ def test_every_rule_gives_a_legal_layout_of_pieces(name: str) -> None:
     assert len(layouts) == 9
     for layout in layouts.values():
         assert layout
-        assert Placement.of(YARDS[name], layout).layout == layout
+        assert LayoutState.of(YARDS[name], layout).layout == layout
     assert layouts_by_rule(YARDS[name], CHARGE) == layouts
 
 
@@ -78,7 +78,7 @@ def test_walls_lie_across_the_line_of_sight() -> None:
     for rule in (wall_near_charge, wall_near_building):
         layout = rule(yard(), CHARGE)
         assert [each for each in layout if isinstance(each, Piece) and each.turned] == [*layout]
-        rows = sorted(row for row, _ in Placement.of(yard(), layout).cells)
+        rows = sorted(row for row, _ in LayoutState.of(yard(), layout).cells)
         assert rows == list(range(rows[0], rows[0] + 9))
     south = line_of_sight_wall(yard(), Charge((9.0, 0.7), 5.0), 0.0)
     assert not any(isinstance(each, Piece) and each.turned for each in south)
@@ -150,11 +150,11 @@ def test_draws_and_neighbours_are_legal(name: str, seed: int) -> None:
     scenario, rng = YARDS[name], np.random.default_rng(seed)
     for draw in (random_layout, random_walls):
         layout = draw(scenario, rng)
-        assert Placement.of(scenario, layout).is_full
+        assert LayoutState.of(scenario, layout).is_full
     moves, layout = Moves(scenario, count_share=0.3), random_part(scenario, rng)
     for _ in range(15):
         layout = moves.neighbour(layout, rng)
-        assert Placement.of(scenario, layout).layout == layout
+        assert LayoutState.of(scenario, layout).layout == layout
 
 
 def test_random_layouts_draw_every_item_and_orientation() -> None:
@@ -214,7 +214,7 @@ def test_individuals_and_their_children_are_layouts(name: str, seed: int) -> Non
         child = cross(first, second, rng)
         assert set(child) <= {*first, *second}
         legal = repaired(scenario, child, rng)
-        assert Placement.of(scenario, legal).layout == legal
+        assert LayoutState.of(scenario, legal).layout == legal
 
 
 # --- Searches.
@@ -237,7 +237,7 @@ def problem() -> DesignProblem:
 @pytest.mark.parametrize("method", ["random", "population_annealing", "genetic", "nsga2"])
 def test_searches_find_layouts_of_pieces(problem: DesignProblem, method: str) -> None:
     result = find_proposer(method).propose(problem, 60, 0)
-    assert Placement.of(problem.scenario, result.layout).layout == result.layout
+    assert LayoutState.of(problem.scenario, result.layout).layout == result.layout
     assert any(isinstance(each, Piece) and each.item == "wall" for each in result.layout)
     assert result.blasts <= 60
     assert result.load is not None

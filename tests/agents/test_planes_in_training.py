@@ -23,7 +23,7 @@ from blast_env.bundled import REAL_SIZE
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import OBSERVATIONS, GridObservation
 from blast_env.errors import BlastEnvError
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, generate_site
 from tests.catalogue_sites import yard_document
@@ -70,7 +70,7 @@ def check(scenario: Scenario, observation: str = "grid", policy: str | None = No
     in_training = model.env.reset()
     assert isinstance(in_training, np.ndarray)
     episode = OBSERVATIONS[observation].episode(env.observable)
-    planes = episode.observe(Placement.empty(scenario))[None]
+    planes = episode.observe(LayoutState.empty(scenario))[None]
     agent = policy_for(run, scenario)
     agent.load_state_dict(model.policy.state_dict())
     agent.set_training_mode(False)

@@ -41,7 +41,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, Evaluators
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario, VehicleCharge, save_scenario
 from blast_env.site.scene import Charge
 from tests.agents.training_runs import (
@@ -124,7 +124,7 @@ def test_what_is_wanted_is_legal_at_every_moment_and_leads_to_the_layout(
         wanted_counts.add(len(actions) if actions != [finish] else 0)
         if actions != [finish]:
             assert {scenario.zone.catalogue.element(each) for each in actions} <= set(layout)
-    full = Placement(scenario, layout).is_full
+    full = LayoutState(scenario, layout).is_full
     assert wanted_counts == set(range(1 if full else 0, len(layout) + 1))
 
 
@@ -184,7 +184,7 @@ def test_sites_with_and_without_vehicles_are_learnt_side_by_side() -> None:
     (case,) = first_cases(without, 1)
     lesson = Demonstration(case, by_rule(case), 0.4, "grid", among_vehicles=True)
     agent = TrainedAgent(agent_for(without).policy, with_vehicle)
-    seen = agent._episode(without, case.charge).observe(Placement.empty(without))
+    seen = agent._episode(without, case.charge).observe(LayoutState.empty(without))
     assert lesson.draw(np.random.default_rng(0)).observation.shape == seen.shape
     alone = replace(lesson, among_vehicles=False).draw(np.random.default_rng(0))
     assert len(alone.observation) < len(seen)
@@ -255,7 +255,7 @@ def test_no_label_is_worse_than_a_rule_s_layout(finished: Path) -> None:
 def test_its_agent_is_one_like_any_other(finished: Path) -> None:
     agent = load_agent(finished)
     layout = agent.propose(small_scenario())
-    assert Placement.of(small_scenario(), layout)
+    assert LayoutState.of(small_scenario(), layout)
 
 
 @pytest.mark.parametrize("rounds", [1, 2])

@@ -20,7 +20,7 @@ import blast_env  # noqa: F401
 from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation, Observable
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.sites import Visibility, generate_site
 from blast_env.sites.turning import turned
@@ -136,7 +136,7 @@ def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
     )
     zone = bare_site.zone
     planes = GridObservation().episode(Observable(bare_site, bare_site.charge))
-    seen = torch.as_tensor(planes.observe(Placement.empty(bare_site)))[None]
+    seen = torch.as_tensor(planes.observe(LayoutState.empty(bare_site)))[None]
     view = zone_view(seen, zone.rows, zone.columns, places=9)
     lines = Visibility.of(bare_site)
     expected = np.tensordot(lines.weight, lines.cut, axes=1) / lines.weight.sum()
@@ -170,12 +170,12 @@ def test_a_place_counts_by_the_angle_under_which_it_sees_the_facade() -> None:
         },
         "two_sides",
     )
-    wall = Placement.of(scenario, list(scenario.zone.cells()))
+    wall = LayoutState.of(scenario, list(scenario.zone.cells()))
     episode = GridObservation().episode(Observable(scenario, scenario.charge))
-    bare, walled = (
+    unprotected, protected = (
         zone_view(torch.as_tensor(episode.observe(placement))[None], 9, 1, places=2)
-        for placement in (Placement.empty(scenario), wall)
+        for placement in (LayoutState.empty(scenario), wall)
     )
-    assert bare.cells[..., CUT].sum() == pytest.approx(0.75 * SHARE_GAIN, rel=0.02)
-    assert bare.site[0, OPEN_FACADE] == pytest.approx(1.0)
-    assert walled.site[0, OPEN_FACADE] == pytest.approx(0.25, abs=0.01)  # as seen from the right
+    assert unprotected.cells[..., CUT].sum() == pytest.approx(0.75 * SHARE_GAIN, rel=0.02)
+    assert unprotected.site[0, OPEN_FACADE] == pytest.approx(1.0)
+    assert protected.site[0, OPEN_FACADE] == pytest.approx(0.25, abs=0.01)  # as seen from the right

@@ -23,7 +23,7 @@ from blast_env.design.search import LayoutAgent
 from blast_env.envs.observations import GridWithLoadObservation, Observable
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import PointSource, Scenario
 from blast_env.site.scene import Charge
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
@@ -61,7 +61,7 @@ def test_proposals_are_legal_and_always_the_same(run: Path) -> None:
     agent: LayoutAgent = load_agent(run)
     for charge in CHARGES:
         layout = agent.propose(small_scenario(), charge)
-        assert Placement.of(small_scenario(), layout).cells == layout
+        assert LayoutState.of(small_scenario(), layout).cells == layout
         assert layout == load_agent(run).propose(small_scenario(), charge)
 
 
@@ -70,17 +70,17 @@ def test_proposals_keep_every_condition_of_a_bundled_site(name: str) -> None:
     """Budget, clearance, access way and no-build areas, by an agent that knows nothing of them."""
     scenario = load_scenario(name)
     layout = untrained(scenario).propose(scenario)
-    assert Placement.of(scenario, layout).cells == layout
+    assert LayoutState.of(scenario, layout).cells == layout
 
 
 def test_a_grid_agent_needs_no_engine_and_no_calibration() -> None:
     """Whoever has but a site and an agent gets a layout; only the loads ask for more."""
     scenario = load_scenario("courtyard")
-    bare = scenario.model_copy(update={"calibration": None})
+    unprotected = scenario.model_copy(update={"calibration": None})
     agent = replace(untrained(scenario), engine="there is none")
-    assert agent.propose(bare) == untrained(scenario).propose(scenario)
+    assert agent.propose(unprotected) == untrained(scenario).propose(scenario)
     with pytest.raises(UnknownNameError, match="there is none"):
-        replace(agent, observation="grid_with_load").propose(bare)
+        replace(agent, observation="grid_with_load").propose(unprotected)
     with pytest.raises(UnknownNameError, match="did you mean 'grid'"):
         replace(agent, observation="gird")
 
@@ -103,7 +103,7 @@ def test_an_agent_of_another_observation_learns_is_chosen_and_proposes(
     assert agent.observation == observation
     for charge in CHARGES:
         layout = agent.propose(small_scenario(), charge)
-        assert layout == Placement.of(small_scenario(), layout).cells
+        assert layout == LayoutState.of(small_scenario(), layout).cells
 
 
 def test_the_spatial_policy_sees_the_loads_and_finds_channels_by_their_names() -> None:
@@ -128,7 +128,7 @@ def test_the_spatial_policy_sees_the_loads_and_finds_channels_by_their_names() -
         )
     charge = PointSource(position_m=(5.0, 12.0), tnt_kg=100.0)
     observable = Observable(scenario, (charge,), lambda *_: np.arange(1.0, 161.0))
-    seen = GridWithLoadObservation().episode(observable).observe(Placement.empty(scenario))
+    seen = GridWithLoadObservation().episode(observable).observe(LayoutState.empty(scenario))
     planes = torch.as_tensor(seen)[None]
     logits = logits_of(policies[0], planes)
     torch.testing.assert_close(logits_of(policies[1], planes.flip(1)), logits)
@@ -156,7 +156,7 @@ def test_samples_differ_and_follow_from_their_seed(run: Path) -> None:
     assert layouts == agent.sample(small_scenario(), CHARGES[0], count=6, seed=1)
     assert layouts != agent.sample(small_scenario(), CHARGES[0], count=6, seed=2)
     for layout in layouts:
-        assert Placement.of(small_scenario(), layout).cells == layout
+        assert LayoutState.of(small_scenario(), layout).cells == layout
     with pytest.raises(BlastEnvError, match="count is 0"):
         agent.sample(small_scenario(), count=0)
 
@@ -211,7 +211,7 @@ def test_an_image_agent_is_trained_loaded_and_proposes(tmp_path: Path, algorithm
     train(chosen, hyperparameters({"policy": "CnnPolicy"}, algorithm), tmp_path / "run")
     agent = load_agent(tmp_path / "run")
     layout = agent.propose(small_scenario(), CHARGES[0])
-    assert Placement.of(small_scenario(), layout).cells == layout
+    assert LayoutState.of(small_scenario(), layout).cells == layout
 
 
 def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:

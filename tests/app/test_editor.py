@@ -17,7 +17,7 @@ from blast_env.app.solids import boxes
 from blast_env.app.sources import blank_site
 from blast_env.app.threats import threats_of
 from blast_env.geometry import Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.plan import STRUCTURE
 from blast_env.site import ScenarioError, load_scenario
 from tests.gas_sites import WALL, column, hut, site_document
@@ -90,7 +90,7 @@ def test_a_zone_over_a_road_asks_and_keeps_it_free(tmp_path: Path) -> None:
     assert editor.asks_about_roads
     editor.answer_about_roads(free=True)
     assert not editor.asks_about_roads
-    usable = Placement.empty(editor.session.scenario).usable
+    usable = LayoutState.empty(editor.session.scenario).usable
     assert not usable[:, :5].any()  # x 1 to 3.5 m
     assert usable[:, 5:].any()
 
@@ -258,10 +258,10 @@ def test_the_plan_has_the_outline_of_a_polygon() -> None:
 def test_the_plan_shows_where_a_vehicle_gets_to() -> None:
     site = gate_site()
     view = PixelView.of(site, 600, 400)
-    bare, posts = (plan_svg(view, site, layout, None) for layout in ((), POSTS))
-    assert "stand-off 1.0 m" in bare  # half of its width from the hut
+    unprotected, posts = (plan_svg(view, site, layout, None) for layout in ((), POSTS))
+    assert "stand-off 1.0 m" in unprotected  # half of its width from the hut
     assert "stand-off 7.0 m" in posts
-    assert "vehicle 1: 5 kg" in bare
+    assert "vehicle 1: 5 kg" in unprotected
 
 
 def test_solids_have_the_heights_of_the_site() -> None:

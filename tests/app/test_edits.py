@@ -80,9 +80,9 @@ def test_a_drawn_zone_keeps_what_holds_in_the_old_one() -> None:
     assert after.zone.corner_m == (12.5, 4.0)
     assert after.zone.shape == (45, 19)
     assert after.zone.keep_outs == COURTYARD.zone.keep_outs
-    bare = edits.removed(COURTYARD, SiteThing(ThingKind.ZONE))
-    assert bare.build_zone is None
-    assert edits.added(bare, ThingKind.ZONE, (13.0, 5.0), (15.0, 7.0))[0].zone.stock == 4
+    unprotected = edits.removed(COURTYARD, SiteThing(ThingKind.ZONE))
+    assert unprotected.build_zone is None
+    assert edits.added(unprotected, ThingKind.ZONE, (13.0, 5.0), (15.0, 7.0))[0].zone.stock == 4
 
 
 def test_the_reason_is_that_of_the_library() -> None:

@@ -54,7 +54,7 @@ def blasted(tmp_path_factory: pytest.TempPathFactory) -> Session:
 
 def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> None:
     (threat,) = blasted.chosen_threats()
-    bare, before = blasted.verdicts()
+    unprotected, before = blasted.verdicts()
     there = blasted.folder.blasts_there()
     blasted.harden("glass", taken=True)
     _, after = blasted.verdicts()
@@ -70,21 +70,21 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     assert before.likely == "\N{EN DASH}" or 0.0 < float(before.likely.split()[-1]) <= 1.0
     assert after.standing.startswith("approximate (3.4 cells per m/kg^(1/3)")
     assert after.damage == before.damage  # its walls are as they were
-    assert blasted.verdicts()[0] == bare
+    assert blasted.verdicts()[0] == unprotected
     assert {row.cost for row in blasted.comparison()} == {"0", "70"}
     assert blasted.cost([0]) == ()
     assert blasted.folder.blasts_there() == there
     blasted.undo()
-    assert blasted.verdicts() == [bare, before]
+    assert blasted.verdicts() == [unprotected, before]
 
 
 def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Session) -> None:
     blasted.put("none", blasted.design.with_layout((GLASS,)))
     (threat,) = blasted.chosen_threats()
-    bare, own = blasted.shown(threat)
-    assert own.key == bare.key
+    unprotected, own = blasted.shown(threat)
+    assert own.key == unprotected.key
     assert [row.layout for row in blasted.verdicts()] == ["no barrier", own.name]
-    (without,), (with_glass,) = (blasted.verdicts_on(each, threat) for each in (bare, own))
+    (without,), (with_glass,) = (blasted.verdicts_on(each, threat) for each in (unprotected, own))
     assert with_glass.broken < without.broken
     blasted.undo()
 

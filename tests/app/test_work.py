@@ -83,7 +83,7 @@ def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Ses
     assert state_of(particles).state == "done"
     (threat,) = particles.chosen_threats()
     assert threat.charge == Charge((5.0, 15.0), 100.0)
-    bare, own = particles.shown(threat)
+    unprotected, own = particles.shown(threat)
     record = particles.folder.record_of(own.key)
     assert record is not None
     evaluator = BlastEvaluator(particles.scenario, "event")
@@ -92,7 +92,7 @@ def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Ses
     low, high = record.intervals[""]
     assert low < mean < high
     assert blast_loads(record).protected_impulse_pa_s == pytest.approx(mean)
-    for key in (bare.key, own.key):
+    for key in (unprotected.key, own.key):
         folder = particles.folder.blast_of(key)
         film = read_kept(Film, folder / FILM)
         assert film is not None
@@ -145,11 +145,11 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
             repeat={},
         )
 
-    bare = {"near": blast("near", (), 400.0, 100.0), "far": blast("far", (), 100.0, 50.0)}
+    unprotected = {"near": blast("near", (), 400.0, 100.0), "far": blast("far", (), 100.0, 50.0)}
     own = {"near": blast("near", WALL, 200.0, 50.0), "far": blast("far", WALL, 100.0, 100.0)}
-    records = [("no barrier", 0.0, each) for each in bare.values()]
+    records = [("no barrier", 0.0, each) for each in unprotected.values()]
     records += [("A", 6.0, each) for each in own.values()]
-    rows = {(row.layout, row.threat): row for row in comparison(records, bare, site)}
+    rows = {(row.layout, row.threat): row for row in comparison(records, unprotected, site)}
     counted = {key: float(row.load) for key, row in rows.items()}
     assert counted[("no barrier", "near")] == 2.0 * 2.0 + 3.0 * 2.0
     assert counted[("A", "near")] == 2.0 + 3.0
@@ -348,8 +348,8 @@ def test_a_blast_has_cells_that_grow(tmp_path: Path) -> None:
     assert cost == GasEngine(cells="coarse").cost(session.scenario, threat.charge)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
-    bare, *_ = session.shown(threat)
-    record = session.folder.record_of(bare.key)
+    unprotected, *_ = session.shown(threat)
+    record = session.folder.record_of(unprotected.key)
     assert record is not None
     result = GasBlast(session.scenario, (), 0, GasEngine(cells="coarse"), threat.charge).run()
     load = next(each for each in record.loads if each.name == "hut")
@@ -370,10 +370,10 @@ def test_a_blast_is_a_final_statement_with_the_error_of_its_cells(tmp_path: Path
     found = expected.to_dict()["result"]["grid_error"]
     rows = session.comparison()
     assert all(row.impulse.count("\N{PLUS-MINUS SIGN}") == 1 for row in rows)
-    bare, *_, walled = rows
-    assert bare.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['unprotected_load']:.2g}")
-    assert walled.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['load']:.2g}")
-    assert walled.reduction.endswith(f"\N{PLUS-MINUS SIGN} {100.0 * found['reduction']:.1f}")
+    unprotected, *_, protected = rows
+    assert unprotected.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['unprotected_load']:.2g}")
+    assert protected.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['load']:.2g}")
+    assert protected.reduction.endswith(f"\N{PLUS-MINUS SIGN} {100.0 * found['reduction']:.1f}")
     (blast,) = session.cost_of_search(1)
     assert blast == GasEngine().cost(hut(), threat.charge)  # searches stay on larger cells
 
@@ -447,12 +447,12 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
     session.engine = EngineRecord(name="gas", cell_m=0.5)
     session.blast([0])
     assert state_of(session).state == "done", state_of(session).text
-    bare, posts = (session.folder.record_of(each.key) for each in session.shown(nearest))
-    assert bare is not None
+    unprotected, posts = (session.folder.record_of(each.key) for each in session.shown(nearest))
+    assert unprotected is not None
     assert posts is not None
-    assert bare.repeat["charge"][0] == [9.0, 4.0]
+    assert unprotected.repeat["charge"][0] == [9.0, 4.0]
     assert posts.repeat["charge"][0][0] <= 3.0
-    assert posts.loads[0].impulse_pa_s < 0.6 * bare.loads[0].impulse_pa_s
+    assert posts.loads[0].impulse_pa_s < 0.6 * unprotected.loads[0].impulse_pa_s
     again = TypeAdapter(LoadCase).validate_json(TypeAdapter(LoadCase).dump_json(nearest))
     assert again.charge == nearest.charge != second.charge
 
@@ -565,7 +565,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: dict[str, object] = {}
-    told: list[float] = []
+    seen: list[float] = []
     stopped = ""
 
     def study(
@@ -576,7 +576,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
             sleep(0.11)  # more often nobody is told
             tell(label, 0.5)
             status = state_of(session)
-            told.append(status.share)
+            seen.append(status.share)
             assert (status.text, status.grace_s) == (label, 300.0)
         return SimpleNamespace(stopped=stopped)
 
@@ -593,7 +593,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     session.report(tmp_path / "r.html", tmp_path / "r.pdf", choice)
     cost = session.cost_of_report(choice)
     shares = [cost.share("T1, other masses", 0.5), cost.share("other places", 0.5)]
-    assert told == [*shares, shares[-1]]  # of the whole, and what is no part changes nothing
+    assert seen == [*shares, shares[-1]]  # of the whole, and what is no part changes nothing
     status = state_of(session)
     assert (status.state, status.file) == ("done", str(tmp_path / "r.pdf"))
     assert status.text == "wrote r.html and r.pdf"

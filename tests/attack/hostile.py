@@ -150,7 +150,7 @@ def site_document() -> Document:
 
 def _run() -> Document:
     return {
-        "problem": "control_room-told-v2",
+        "problem": "control_room-known-v2",
         "budget": 0,
         "seed": 0,
         "blasts": 0,
@@ -381,7 +381,7 @@ METHODS: Final = (
 
 def method_outcome(name: str) -> str:
     """Play a benchmark problem with something that is no method; return what is wrong then."""
-    problem = make("control_room-told-v2", 0)
+    problem = make("control_room-known-v2", 0)
     return outcome(lambda: find_method(name)(problem, 0), lambda _: "was a method")
 
 

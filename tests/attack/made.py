@@ -17,7 +17,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
 from blast_env.io.importing import ImportOptions, import_site
-from blast_env.layout import LayoutFile, Placement
+from blast_env.layout import LayoutFile, LayoutState
 from blast_env.site import load_scenario
 
 _REPAIR: Final = ImportOptions(repair=True)
@@ -337,7 +337,7 @@ def _drawn(path: Path) -> None:
     scenario = load_scenario(path)
     items = scenario.zone.catalogue.names
     layout = [Piece(3 + 9 * n, 30, name, False) for n, name in enumerate(items)]
-    Placement.of(scenario, layout).explain_vehicles()
+    LayoutState.of(scenario, layout).explain_vehicles()
 
 
 def _table(path: Path) -> None:

@@ -384,7 +384,7 @@ def _killed(most: int, name: str, folder: Path) -> JobOutcome:
         problem_with(partial(outcome_after_kill, name, folder / f"{at}", at), whole)
         for at in places
     )
-    return JobOutcome(steps, len(places), _told("step", places, problems))
+    return JobOutcome(steps, len(places), _known("step", places, problems))
 
 
 def _without_room(most: int, name: str, folder: Path) -> JobOutcome:
@@ -395,7 +395,7 @@ def _without_room(most: int, name: str, folder: Path) -> JobOutcome:
         problem_with(partial(outcome_after_full_device, name, folder / "disk", size, left), whole)
         for left in rooms
     )
-    return JobOutcome(size // _KB, len(rooms), _told("bytes left", rooms, problems))
+    return JobOutcome(size // _KB, len(rooms), _known("bytes left", rooms, problems))
 
 
 def spread(last: int, count: int) -> list[int]:
@@ -403,7 +403,7 @@ def spread(last: int, count: int) -> list[int]:
     return sorted({int(each) for each in np.linspace(0, last, count).round()})
 
 
-def _told(what: str, places: Sequence[int], problems: Iterable[str]) -> list[str]:
+def _known(what: str, places: Sequence[int], problems: Iterable[str]) -> list[str]:
     return [f"{what} {at}: {each}" for at, each in zip(places, problems, strict=True) if each]
 
 

@@ -116,7 +116,7 @@ def test_numbers_of_a_surrogate_are_numbers_within_bounds(
 
 @pytest.mark.parametrize("text", hostile.TEXTS[:-2])
 def test_foreign_texts_reach_neither_terminal_nor_page_as_they_are(text: str) -> None:
-    run = Run("control_room-told-v2", 0, 0, 0, ())
+    run = Run("control_room-known-v2", 0, 0, 0, ())
     assert hostile.shown([StandingsTable(text, ("method",), ((text,),))], "") == ""
     assert hostile._use_submission(Submission(text, (run,), text)) == ""
 

@@ -21,11 +21,11 @@ class RowEngine(ShadeEngine):
         self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
     ) -> BlastLoads:
         """Return the loads."""
-        bare = super().loads(scenario, (), charge, seed)
+        unprotected = super().loads(scenario, (), charge, seed)
         left = 1.0
         for element in layout:
             left *= 1.0 - 0.1 / (1.0 + abs(element[0] - self.row))
         structures = tuple(
-            replace(each, impulse_pa_s=left * each.impulse_pa_s) for each in bare.structures
+            replace(each, impulse_pa_s=left * each.impulse_pa_s) for each in unprotected.structures
         )
-        return BlastLoads(structures, left * bare.module_impulse)
+        return BlastLoads(structures, left * unprotected.module_impulse)

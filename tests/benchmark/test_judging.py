@@ -30,7 +30,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from tests.benchmark.row import RowEngine
 
-NAME = "control_room-told-v2"
+NAME = "control_room-known-v2"
 
 
 def wall(row: int) -> tuple[Piece, ...]:
@@ -86,7 +86,7 @@ def test_a_layout_that_is_better_than_the_best_known_shows() -> None:
 @pytest.mark.parametrize(
     ("runs", "message"),
     [
-        ((run(99),), "runs\\[0\\]: control_room-told-v2: .*outside"),
+        ((run(99),), "runs\\[0\\]: control_room-known-v2: .*outside"),
         ((run(1), run(2)), "appears twice"),
         ((replace(run(1), blasts=1),), "1 blasts were spent, the budget is 0"),
         ((replace(run(1), problem="none-v1"),), "there is no problem 'none-v1'"),

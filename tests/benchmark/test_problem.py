@@ -26,7 +26,7 @@ from tests.site.test_hardening import glazed_yard
 WALL = [Piece(12, 0, "low_wall", True)]
 
 
-def problem(budget: int = 3, name: str = "control_room-told-v2") -> BenchmarkProblem:
+def problem(budget: int = 3, name: str = "control_room-known-v2") -> BenchmarkProblem:
     return make(name, budget, engine=RowEngine())
 
 
@@ -108,31 +108,31 @@ def test_every_version_says_what_it_said() -> None:
 
 
 def test_a_problem_that_has_changed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    changed = Definition("control_room", "told")
+    changed = Definition("control_room", "known")
     monkeypatch.setitem(vars(changed), "digest", "0" * 16)
-    with pytest.raises(BlastEnvError, match=r"control_room-told-v2: .* never changes"):
+    with pytest.raises(BlastEnvError, match=r"control_room-known-v2: .* never changes"):
         make(changed, engine=RowEngine())
 
 
 def test_a_problem_that_there_is_not_names_the_nearest() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean 'control_room-told-v2'"):
+    with pytest.raises(UnknownNameError, match="did you mean 'control_room-known-v2'"):
         make("control_room-tol-v1")
 
 
 def test_families_ask_what_they_say() -> None:
     for definition in DEFINITIONS.values():
         case, scenario = definition.case, definition.scenario
-        practice = case.practice
-        assert practice is not None
-        assert (case.charge is not None) == (definition.family == "told")
+        search_set = case.search_set
+        assert search_set is not None
+        assert (case.charge is not None) == (definition.family == "known")
         if definition.family == "vehicle":
             assert scenario.vehicles
         points = [each for each in scenario.charge if isinstance(each, PointSource)]
         if definition.family == "hidden" and len(points) == len(scenario.charge):
-            assert len(case.threats) == len(practice.threats) == len(points)
+            assert len(case.threats) == len(search_set.threats) == len(points)
         assert (definition.family == "response") == scenario.objective.is_response
-        if definition.family == "told":
-            assert case.charges == practice.charges
+        if definition.family == "known":
+            assert case.charges == search_set.charges
 
 
 def test_what_is_stored_can_be_built() -> None:

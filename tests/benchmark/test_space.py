@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from blast_env.benchmark import DEFINITIONS, LayoutSpace, make
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Measure, Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import load_scenario
 from tests.catalogue_sites import WALL
 from tests.site.test_hardening import glazed_yard
@@ -46,7 +46,7 @@ def test_keys_reach_what_the_budget_pays_for() -> None:
 def test_without_a_catalogue_each_free_cell_has_two_choices() -> None:
     yard = LayoutSpace(load_scenario("courtyard"))
     assert (yard.choices == 2).all()
-    assert len(yard.places) == int(Placement.empty("courtyard").free.sum())
+    assert len(yard.places) == int(LayoutState.empty("courtyard").free.sum())
 
 
 def test_every_measure_is_a_place_of_its_own() -> None:
@@ -73,7 +73,7 @@ def test_a_vector_of_use_to_nobody_is_refused() -> None:
 
 
 def test_reasons_name_each_piece_that_cannot_stand() -> None:
-    problem = make("control_room-told-v2")
+    problem = make("control_room-known-v2")
     reasons = problem.check(
         [Piece(0, 0, "low_wall", True), Piece(0, 0, "low_wall", True), Piece(99, 0, "low_wall")]
     )

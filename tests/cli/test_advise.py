@@ -24,7 +24,7 @@ from blast_env.evaluation import BlastEvaluator, Case
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.probability import LevelProbability
 from blast_env.geometry import Layout, Measure, standing
-from blast_env.layout import Placement, load_layout
+from blast_env.layout import LayoutState, load_layout
 from blast_env.plots.cost_level import PricedDamage, cheapest
 from blast_env.site.scene import Charge
 from tests.evaluation.test_response_objective import THREAT
@@ -51,7 +51,7 @@ def test_each_kind_has_nothing_but_its_own_in_stock() -> None:
         (MeasureKind.HARDEN, False, True),
         (MeasureKind.TOGETHER, True, True),
     ):
-        placement = Placement.empty(only(scenario, kind))
+        placement = LayoutState.empty(only(scenario, kind))
         legal = {
             isinstance(placement.catalogue.element(action), Measure)
             for action in placement.legal.ravel().nonzero()[0].tolist()
@@ -150,7 +150,7 @@ def test_a_search_begins_with_rules_against_each_charge_for_a_share_of_the_budge
     scenario = only(glazed_yard(target="medium"), MeasureKind.SHIELD)
     charges = [Charge((2.0, y_m), 5.0) for y_m in (2.0, 10.0)]
     layouts = list(against_each(scenario, charges))
-    costs = [Placement(scenario, each).cost for each in layouts]
+    costs = [LayoutState(scenario, each).cost for each in layouts]
     assert 0.0 < max(costs) <= (scenario.zone.budget or 0.0)
     middle = scenario.zone.rows / 2
     assert any(min(x[0] for x in each) < middle < max(x[0] for x in each) for each in layouts)

@@ -47,7 +47,7 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
     result = evaluate("--run", visible, "--seeds", 3, "--out", out, "--export", export)
     assert result.exit_code == 0, result.output
     scenario, agent = load_scenario(visible / "scenario.toml"), load_agent(visible)
-    threats = draw_threats(scenario, SeedRange.JUDGEMENT.seeds(0, 3))
+    threats = draw_threats(scenario, SeedRange.TEST.seeds(0, 3))
     table = pd.read_csv(out / "cases.csv")
     for number, threat in enumerate(threats, start=1):
         path = export / f"layout_{number}.json"
@@ -84,7 +84,7 @@ def test_a_hidden_threat_gets_one_layout(hidden: Path, tmp_path: Path) -> None:
     scenario = load_scenario(hidden / "scenario.toml")
     layout = load_agent(hidden).propose(scenario, None)
     assert sorted(map(tuple, content["layout"])) == sorted(layout)
-    seeds = SeedRange.JUDGEMENT.seeds(0, 3)
+    seeds = SeedRange.TEST.seeds(0, 3)
     assert (
         content["result"]
         == evaluate_layout(scenario, layout, seeds, engine="event").to_dict()["result"]
@@ -106,7 +106,7 @@ def test_json_has_every_case_and_nothing_else_is_printed(visible: Path) -> None:
 
 def test_it_says_when_the_weights_were_chosen_by_the_threats(visible: Path) -> None:
     result = evaluate(
-        "--run", visible, "--seeds", 3, "--first-seed", SeedRange.SELECTION.value.start - 1
+        "--run", visible, "--seeds", 3, "--first-seed", SeedRange.VALIDATION.value.start - 1
     )
     assert "note: the best weights were chosen by 2 of these threats" in result.stdout
 

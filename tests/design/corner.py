@@ -3,13 +3,13 @@
 import numpy as np
 
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario
 
 
 def fill_from_the_corner(scenario: AnyScenario, _charge: AnyCharge | None) -> Layout:
     """Place whatever may stand from the lower left corner on."""
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     while not placement.is_full:
         first = int(np.flatnonzero(placement.legal)[0])
         placement = placement.place(placement.catalogue.element(first))

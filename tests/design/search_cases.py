@@ -12,7 +12,7 @@ from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase
 from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Element
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from tests.agents.sites import site
 
@@ -47,14 +47,14 @@ def small_problem(
 
 def every_layout(problem: DesignProblem) -> list[Layout]:
     """Return every legal layout, in ascending number of modules or pieces."""
-    empty = Placement.empty(problem.scenario)
+    empty = LayoutState.empty(problem.scenario)
     actions = np.flatnonzero(empty.places(empty.usable)).tolist()
     places = [empty.catalogue.element(action) for action in actions]
     found: list[Layout] = []
     for count in range(min(problem.stock, len(places)) + 1):
         for layout in combinations(places, count):
             with suppress(LayoutError):
-                found.append(Placement.of(problem.scenario, layout).layout)
+                found.append(LayoutState.of(problem.scenario, layout).layout)
     return found
 
 

@@ -79,7 +79,7 @@ def test_the_weights_are_chosen_by_seeds_of_their_own() -> None:
     cases = Selection.of(SETTINGS, SOURCE).cases
     assert len(cases) == SETTINGS.evaluation_cases
     for case in cases:
-        assert all(threat.seed in SeedRange.SELECTION.value for threat in case.threats)
+        assert all(threat.seed in SeedRange.VALIDATION.value for threat in case.threats)
 
 
 def test_fixed_charges_come_in_turn_in_training_selection_and_evaluation() -> None:

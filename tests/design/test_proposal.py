@@ -64,9 +64,9 @@ def test_the_gain_that_is_expected_is_that_of_the_surrogate_and_no_less_than_a_r
     found = blast_env.propose(wide_yard(), CHARGE)
     problem = problem_of(wide_yard(), CHARGE)
     guesses = proposal._guesses(problem)
-    bare, load = guesses.loads([(), found.layout])
+    unprotected, load = guesses.loads([(), found.layout])
     assert found.gain is not None
-    assert found.gain == pytest.approx(1.0 - load / bare)
+    assert found.gain == pytest.approx(1.0 - load / unprotected)
     assert found.gain > proposal.LEAST_GAIN
     rules = [tuple(sorted(each)) for each in layouts_by_rule(wide_yard(), CHARGE).values()]
     assert load <= guesses.loads(rules).min()

@@ -3,7 +3,7 @@ import pytest
 
 from blast_env import load_scenario
 from blast_env.design.rules import random_layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from tests.agents.sites import site
 
 
@@ -12,7 +12,7 @@ def test_random_layouts_are_legal_and_use_what_there_is(name: str) -> None:
     """Full stock, or nothing left that could be afforded or would leave the way open."""
     scenario = load_scenario(name)
     for seed in range(5):
-        placement = Placement.of(scenario, random_layout(scenario, np.random.default_rng(seed)))
+        placement = LayoutState.of(scenario, random_layout(scenario, np.random.default_rng(seed)))
         assert placement.is_full
 
 

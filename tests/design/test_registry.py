@@ -105,7 +105,7 @@ def test_both_are_methods_of_the_benchmark(tmp_path: Path) -> None:
         JudgedSubmission.load(tmp_path / "out" / f"judged_{name}.json").runs[0]
         for name in ("corner", "one_after_another")
     )
-    assert (rule.problem, rule.blasts, search.blasts) == ("hut-told-v2", 0, 2)
+    assert (rule.problem, rule.blasts, search.blasts) == ("hut-known-v2", 0, 2)
     assert min(rule.share, search.share) >= rule.best
 
 
@@ -192,12 +192,12 @@ nothing = 3
     ],
 )
 def test_an_optimiser_of_ones_own_is_held_to_the_rules(name: str, words: str) -> None:
-    problem = make("control_room-told-v2", 2, engine=RowEngine())
+    problem = make("control_room-known-v2", 2, engine=RowEngine())
     with pytest.raises(BlastEnvError, match=words):
         play(find_method(f"{__name__}:{name}"), [(lambda _: problem, 2, 0)])
 
 
 def test_an_optimiser_of_ones_own_enters_as_an_object_or_a_class() -> None:
-    problem = make("control_room-told-v2", 2, engine=RowEngine())
+    problem = make("control_room-known-v2", 2, engine=RowEngine())
     (found,) = play(find_method(f"{__name__}:Own"), [(lambda _: problem, 2, 0)])
     assert found.blasts == 2

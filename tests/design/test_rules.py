@@ -19,7 +19,7 @@ from blast_env.design.rules import (
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import PointSource, RectangleSource, Scenario
 from blast_env.site.scene import Charge
 from tests.agents.sites import site
@@ -146,7 +146,7 @@ def test_a_wall_keeps_every_condition(
     charge = Charge((5.0, charge_y_m), 100.0)
     wall = line_of_sight_wall(scenario, charge, share)
     assert len(wall) > 1
-    assert Placement.of(scenario, wall).cells == wall
+    assert LayoutState.of(scenario, wall).cells == wall
     assert line_of_sight_wall(scenario, charge, share) == wall
 
 

@@ -22,8 +22,8 @@ from blast_env.design.search.methods import PopulationAnnealingSearch
 from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase
-from blast_env.evaluation.cases import practice_hidden
-from blast_env.layout import Placement
+from blast_env.evaluation.cases import hidden_search_set
+from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.scene import Charge
 from tests.design.search_cases import (
@@ -160,9 +160,11 @@ def test_layouts_are_legal_on_real_sites(method: str, name: str) -> None:
     """With no-build areas, a budget and an access way, against a hidden charge."""
     scenario = ballistic(name)
     evaluator = BlastEvaluator(scenario, "event")
-    problem = DesignProblem(evaluator, practice_hidden(scenario, 3, 1, 0))
+    problem = DesignProblem(evaluator, hidden_search_set(scenario, 3, 1, 0))
     result = find_proposer(method).propose(problem, 10, 0)
-    assert Placement.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
+    assert (
+        LayoutState.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
+    )
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -208,13 +210,13 @@ def test_rules_spend_nothing(
     result = find_proposer(name).propose(problem, 0, 0)
     assert result.blasts == 0
     assert result.load is None
-    assert set(result.layout) == set(rule(problem.scenario, problem.told))
+    assert set(result.layout) == set(rule(problem.scenario, problem.known_charge))
 
 
 def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = DesignProblem(evaluator, practice_hidden(scenario, 8, 1, 0))
+    problem = DesignProblem(evaluator, hidden_search_set(scenario, 8, 1, 0))
     middle = Charge((5.0, 15.0), 100.0)
     found = find_proposer("wall_near_charge").propose(problem, 0)
     assert found.layout == tuple(sorted(wall_near_charge(scenario, middle)))
@@ -243,7 +245,7 @@ def test_every_proposer_has_its_name_and_a_title_of_its_own() -> None:
 
 
 def test_the_best_rule_is_chosen_by_a_blast_each(problem: DesignProblem) -> None:
-    layouts = set(layouts_by_rule(problem.scenario, problem.told).values())
+    layouts = set(layouts_by_rule(problem.scenario, problem.known_charge).values())
     result = find_proposer("best_rule").propose(problem, 100, 0)
     assert result.blasts == len(layouts) * len(problem.threats)
     assert result.layout in layouts
@@ -293,7 +295,7 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     """At equal cost: what makes it a baseline worth beating."""
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
-    problem = DesignProblem(evaluator, practice_hidden(scenario, 1, 1, 0))
+    problem = DesignProblem(evaluator, hidden_search_set(scenario, 1, 1, 0))
     genetic, drawn = (
         problem.load(find_proposer(name).propose(problem, 100, 0).layout)
         for name in ("genetic", "random")

@@ -9,7 +9,7 @@ from blast_env.design.rules import random_layout
 from blast_env.design.search import Layout
 from blast_env.design.search.moves import Moves, random_part, random_walls
 from blast_env.design.search.operators import cut, repaired
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from tests.agents.sites import site
 
 SITES = {name: load_scenario(name) for name in ("courtyard", "perimeter_gate", "street_junction")}
@@ -34,7 +34,7 @@ def test_every_neighbour_is_legal_and_close(name: str, seed: int) -> None:
     moves, layout = Moves(scenario, count_share=0.3), random_walls(scenario, rng)
     for _ in range(12):
         neighbour = moves.neighbour(layout, rng)
-        assert Placement.of(scenario, neighbour).cells == neighbour
+        assert LayoutState.of(scenario, neighbour).cells == neighbour
         assert len(neighbour) <= len(layout) + 1
         if name == "courtyard":
             assert len(neighbour) >= len(layout) - 1

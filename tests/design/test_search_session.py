@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, Case, DesignProblem, LoadCase
-from blast_env.evaluation.cases import practice_hidden, practice_visible
+from blast_env.evaluation.cases import hidden_search_set, known_search_set
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
 from tests.design.search_cases import ballistic, small_problem, small_scenario
@@ -34,7 +34,7 @@ def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk)
     """Mean over the realisations of a charge, then risk over the charges, as agents are paid."""
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    case = practice_hidden(scenario, 3, 2, 1, risk)
+    case = hidden_search_set(scenario, 3, 2, 1, risk)
     layout = ((9, 0), (10, 0), (11, 0))
     expected = DesignProblem(evaluator, case).assess(layout).impulse_pa_s
     found = DesignProblem(evaluator, case).load(layout)
@@ -137,19 +137,19 @@ def test_the_front_is_the_front(problem: DesignProblem) -> None:
 
 
 def test_it_reports_every_batch(problem: DesignProblem) -> None:
-    told: list[tuple[int, int]] = []
+    seen: list[tuple[int, int]] = []
     it = SearchSession(
-        problem, 9, Plan(1, 9), lambda state: told.append((state.blasts, state.budget))
+        problem, 9, Plan(1, 9), lambda state: seen.append((state.blasts, state.budget))
     )
     it.assess(LAYOUTS[:4])
     it.assess(LAYOUTS[2:6])
-    assert told == [(4, 9), (6, 9)]
+    assert seen == [(4, 9), (6, 9)]
 
 
 def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = DesignProblem(evaluator, practice_hidden(scenario, 16, 1, 0))
+    problem = DesignProblem(evaluator, hidden_search_set(scenario, 16, 1, 0))
     plans = [Plan.of(problem, budget) for budget in (1, 10, 50, 200, 1000, 100_000)]
     assert all(plan.exploring_blasts >= 1 for plan in plans)
     threats = [plan.threats for plan in plans]
@@ -161,7 +161,7 @@ def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
 def test_hidden_charges_come_first_and_spread() -> None:
     """A search that looks at the first three charges of the road has its middle and both ends."""
     scenario = ballistic("courtyard")
-    threats = practice_hidden(scenario, 16, 2, seed=3).threats
+    threats = hidden_search_set(scenario, 16, 2, seed=3).threats
     assert [t.charge for t in threats[:16]] == [t.charge for t in threats[16:]]
     assert len({threat.seed for threat in threats}) == 32
     first, *others = (t.charge_against(scenario, ()).position_m[1] for t in threats[:16])
@@ -171,11 +171,11 @@ def test_hidden_charges_come_first_and_spread() -> None:
 
 def test_a_known_charge_has_its_realisations() -> None:
     scenario = small_scenario()
-    threats = practice_visible(scenario, WEST, 3, seed=1).threats
+    threats = known_search_set(scenario, WEST, 3, seed=1).threats
     assert {threat.charge for threat in threats} == {WEST}
     assert len({threat.seed for threat in threats}) == 3
-    assert threats == practice_visible(scenario, WEST, 3, seed=1).threats
-    assert threats != practice_visible(scenario, WEST, 3, seed=2).threats
+    assert threats == known_search_set(scenario, WEST, 3, seed=1).threats
+    assert threats != known_search_set(scenario, WEST, 3, seed=2).threats
 
 
 def test_reductions_refer_to_the_threats_that_were_met(problem: DesignProblem) -> None:

@@ -61,7 +61,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, LoadCase, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout, Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.scene import Charge
 from studies.blast_table import COLUMNS, scenario_of, site_name
@@ -406,7 +406,7 @@ def test_a_safe_engine_gives_the_upper_end_behind_a_barrier() -> None:
     guess = surrogate.guess(site_of(PEAKS), [layout], [threat.charge_against(PEAKS, layout)])
     assert guess.peak_pa is not None
     assert guess.peak_spread is not None
-    (plain, safe), (bare, safe_bare) = (
+    (plain, safe), (unprotected, safe_unprotected) = (
         [
             BlastEvaluator(PEAKS, SurrogateEngine(surrogate, safe=flag)).loads(each, threat)
             for flag in (False, True)
@@ -421,7 +421,7 @@ def test_a_safe_engine_gives_the_upper_end_behind_a_barrier() -> None:
         upper = after[0] * np.exp(widths[0])
         assert [getattr(each, before) for each in safe.protected] == pytest.approx(upper)
         assert (upper > after[0]).all()
-    assert safe_bare.structures == bare.structures
+    assert safe_unprotected.structures == unprotected.structures
     with pytest.raises(BlastEnvError, match=r"has no intervals: .*calibrate"):
         by_hand().upper_ends(guess)
 
@@ -501,13 +501,13 @@ def test_it_learns_from_messages_what_ways_do_not_see() -> None:
     samples.features[:, FEATURES - SHARES :] = 0.0
     rows = samples.counts * samples.solids
     near = np.add.reduceat(samples.relations[:, 8], np.cumsum([0, *rows[:-1]])) / samples.counts
-    told = replace(samples.impulse, target=7.0 - 0.1 * near)
+    made_up = replace(samples.impulse, target=7.0 - 0.1 * near)
     blind = replace(samples, relations=np.zeros_like(samples.relations))
     every = np.ones(len(samples), dtype=bool)
     within = [
-        load_errors(found, found.impulse, given, told, every).within
+        load_errors(found, found.impulse, given, made_up, every).within
         for given in (blind, samples)
-        for found in [fit(replace(given, impulse=told), every, 120, 0, ABOUT, 1, peaks=False)]
+        for found in [fit(replace(given, impulse=made_up), every, 120, 0, ABOUT, 1, peaks=False)]
     ]
     assert within[1] < 0.3 * within[0]
 
@@ -520,8 +520,8 @@ def test_the_unit_of_loads_changes_nothing_that_is_learnt() -> None:
     for logarithm in (0.0, 60.0):
         peak = samples.peak
         known, target = peak.known + logarithm, peak.target + logarithm
-        told = replace(samples, impulse=replace(peak, known=known, target=target))
-        found = fit(told, every, 3, 0, ABOUT, 1, peaks=False)
+        made_up = replace(samples, impulse=replace(peak, known=known, target=target))
+        found = fit(made_up, every, 3, 0, ABOUT, 1, peaks=False)
         off.append(load_errors(found, found.impulse, samples, peak, every).rms)
     assert off[1] == pytest.approx(off[0], rel=0.02)
 
@@ -559,7 +559,7 @@ def test_a_search_by_guesses_is_never_worse_than_what_it_begins_with() -> None:
     assert loads[0] <= guesses.loads([tuple(sorted(each)) for each in begin]).min()
     assert len(ranked) > len(begin)
     for layout in ranked:
-        assert Placement.of(YARD, layout).layout == layout
+        assert LayoutState.of(YARD, layout).layout == layout
 
 
 def test_without_a_blast_it_proposes_the_same_legal_layout_again() -> None:
@@ -567,7 +567,7 @@ def test_without_a_blast_it_proposes_the_same_legal_layout_again() -> None:
     for charge in (None, Charge((1.5, 5.0), 5.0)):
         layout = agent.at_once(YARD, charge)
         assert layout == agent.at_once(YARD, charge)
-        assert Placement.of(YARD, layout).layout == layout
+        assert LayoutState.of(YARD, layout).layout == layout
         assert layout
 
 
@@ -583,7 +583,7 @@ class Drawing:
         return (2 * list(layouts_by_rule(scenario, charge).values()))[:count]
 
 
-@pytest.mark.parametrize("charge", [None, Charge((1.5, 5.0), 5.0)], ids=["hidden", "told"])
+@pytest.mark.parametrize("charge", [None, Charge((1.5, 5.0), 5.0)], ids=["hidden", "known"])
 def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
     charge: Charge | None,
 ) -> None:
@@ -601,7 +601,7 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
 def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     """With blasts for all rules it is at least as good as the best of them."""
     problem = DesignProblem(BlastEvaluator(YARD, FAST), case())
-    ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.told).values()}
+    ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.known_charge).values()}
     budget = 3 * len(ruled)
     method = LearntSearch(by_hand(), digest="digest", guesses=12, drawn=4)
     result = method.propose(problem, budget, 0)
@@ -616,7 +616,7 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     assert (first.layout, first.blasts) == (Drawing().propose(YARD), 1)
     guided = replace(method, agent=Drawing()).propose(problem, budget, 0)
     assert guided.load is not None
-    assert guided.load <= min(map(problem.load, Drawing().sample(YARD, problem.told, 3)))
+    assert guided.load <= min(map(problem.load, Drawing().sample(YARD, problem.known_charge, 3)))
 
 
 @dataclass(eq=False)
@@ -637,7 +637,7 @@ class WrongBy(DesignProblem):
 
 def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -> None:
     problem = WrongBy(BlastEvaluator(YARD, FAST), case(10))
-    assert problem.told is None
+    assert problem.known_charge is None
     method = LearntSearch(by_hand(), digest="digest", guesses=30, drawn=4)
     result = method.propose(problem, 40, 0)
     assert result.blasts == sum(problem.met.values()) <= 40
@@ -655,7 +655,7 @@ def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:
     assert len(set(layouts)) == len(layouts) > 8
     assert ruled <= set(layouts)
     for layout in layouts:
-        assert Placement.of(YARD, layout).layout == layout
+        assert LayoutState.of(YARD, layout).layout == layout
     assert layouts == Recipe(8).of(YARD, threat, 1)
     few = Recipe(0, 2).of(YARD, threat, 1)
     assert len(few) == 3
@@ -710,9 +710,9 @@ def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:
     evaluator = BlastEvaluator(YARD, FAST)
     agent, threat = LearntSearch(by_hand(), changes=2), draw_threats(YARD, [3])[0]
     found = verdict(by_hand(), 2, evaluator, threat)
-    bare = evaluator.loads((), threat).protected_impulse_pa_s
+    unprotected = evaluator.loads((), threat).protected_impulse_pa_s
     proposed = evaluator.loads(agent.at_once(YARD, threat.charge), threat)
-    assert found.reduction == pytest.approx(1.0 - proposed.protected_impulse_pa_s / bare)
+    assert found.reduction == pytest.approx(1.0 - proposed.protected_impulse_pa_s / unprotected)
     assert set(found.rules) == set(layouts_by_rule(YARD, threat.charge))
     assert found.promised < 1.0
     assert found.ms > 0.0

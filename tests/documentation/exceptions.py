@@ -173,7 +173,7 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/researchers/benchmark.md
     "blast-env judge --method genetic --budget 50 --seeds 10 --out entry": (
-        "--problem visitor_entrance-told_2-v2 --budget 2 --seeds 1 --cell 0.5"
+        "--problem visitor_entrance-known_2-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge --scenario courtyard --cases 8 --method rules --method best_rule"
     " --run runs/courtyard --out out/entry": "--cases 1 --budget 2 --cell 0.5",

@@ -78,7 +78,7 @@ def test_no_docstring_begins_with_what() -> None:
 
 @pytest.mark.parametrize("phrase", PHRASES)
 def test_no_page_has_the_phrase(phrase: str) -> None:
-    """Names of problems have hyphens: `control_room-told-v2`."""
+    """Names of problems have hyphens: `control_room-known-v2`."""
     words = r"\s+".join(phrase.split())
     pattern = re.compile(rf"(?<![\w-]){words}(?![\w-])", re.IGNORECASE)
     assert [(page, found) for page, text in prose() for found in pattern.findall(text)] == []

@@ -13,7 +13,7 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from tests.catalogue_sites import WALL, yard
 from tests.envs.small import make, play, same, small_scenario
@@ -39,7 +39,7 @@ def numbered(name: str, scenario: Scenario) -> NumberedActions:
     return NumberedActions.of(ACTIONS[name], scenario)
 
 
-def actions_for(actions: NumberedActions, placement: Placement, element: Element) -> list[int]:
+def actions_for(actions: NumberedActions, placement: LayoutState, element: Element) -> list[int]:
     """Return the actions that place an element: at each choice, the one that leads there."""
     variant = placement.catalogue.variant_number(element)
     place = (variant, element[0], element[1])
@@ -85,7 +85,7 @@ def test_choices_lead_to_what_is_legal_and_nowhere_else(name: str, scenario: Sce
             found += elements(after) if isinstance(after, ActionChoice) else [after]
         return found
 
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     for _ in range(2):
         legal = [
             scenario.zone.catalogue.element(a) for a in np.flatnonzero(placement.legal).tolist()
@@ -101,7 +101,7 @@ def paid(env: BlastBarrierEnv, layout: Layout) -> tuple[list[float], dict[str, A
     for element in layout:
         for action in actions_for(actions, env.placement, element):
             _, reward, ended, _, info = env.step(action)
-            assert (ended, info["illegal_actions"]) == (False, 0)
+            assert (ended, info["invalid_actions"]) == (False, 0)
             rewards.append(reward)
     _, reward, ended, _, info = env.step(actions.finish)
     assert (ended, info["layout"]) == (True, layout)
@@ -130,7 +130,7 @@ def test_what_does_not_go_with_a_choice_is_illegal_and_changes_nothing() -> None
     for count, action in enumerate((1, finish), start=1):
         after, reward, ended, _, info = env.step(action)
         assert same(before, after)
-        assert (reward, ended, info["illegal_actions"]) == (-0.001, False, count)
+        assert (reward, ended, info["invalid_actions"]) == (-0.001, False, count)
         assert same(env.action_masks(), mask)
     assert env.placement.layout == ()
 
@@ -152,7 +152,7 @@ def test_observations_show_what_is_still_possible() -> None:
 def test_a_measure_needs_no_place() -> None:
     scenario = glazed_yard()
     actions = numbered("item_then_block", scenario)
-    catalogue, placement = scenario.zone.catalogue, Placement.empty(scenario)
+    catalogue, placement = scenario.zone.catalogue, LayoutState.empty(scenario)
     measure = next(i for i, each in enumerate(catalogue.variants) if each.is_measure)
     assert actions.narrowed(ActionChoice(placement.legal), measure) == catalogue.element_at(
         measure, 0, 0
@@ -211,7 +211,7 @@ def test_a_full_row_means_the_nearest_row() -> None:
     env.reset(seed=0)
     assert env.action_masks()[:3].tolist() == [False, False, True]
     _, _, _, _, info = env.step(0)
-    assert (env.placement.cells[0][1], info["illegal_actions"]) == (2, 1)
+    assert (env.placement.cells[0][1], info["invalid_actions"]) == (2, 1)
 
 
 # --- Illegal actions.
@@ -234,8 +234,8 @@ def test_an_illegal_action_means_the_nearest_legal_cell() -> None:
         env.reset(seed=0)
         _, _, ended, _, info = env.step(action)
         assert env.placement.cells == (legal[away.index(min(away))],)
-        assert (info["illegal_actions"], ended) == (1, False)
-        assert info["reward_terms"]["illegal_actions"] == 0.0
+        assert (info["invalid_actions"], ended) == (1, False)
+        assert info["reward_terms"]["invalid_actions"] == 0.0
 
 
 def test_the_nearest_place_is_of_the_same_item_in_the_same_rotation() -> None:
@@ -257,7 +257,7 @@ def test_the_nearest_place_is_of_the_same_item_in_the_same_rotation() -> None:
 @pytest.mark.parametrize("name", list(ACTIONS))
 def test_no_policy_that_repeats_an_action_gets_stuck(name: str) -> None:
     """With masks disregarded; every episode ends in a layout, not by the limit of 100 actions."""
-    env = BlastBarrierEnv(yard(), engine=ShadeEngine(), action=name, illegal_action_limit=100)
+    env = BlastBarrierEnv(yard(), engine=ShadeEngine(), action=name, invalid_action_limit=100)
     for action in range(0, int(env.action_space.n), 7):  # type: ignore[attr-defined]
         env.reset(seed=0)
         actions, ended = 1, False
@@ -272,7 +272,7 @@ def test_what_repeats_without_effect_ends_the_episode() -> None:
     env.reset(seed=1)
     other_choice = 60  # a cell, where a block is asked for
     _, _, ended, _, info = env.step(other_choice)
-    assert (ended, info["illegal_actions"], info["reward_terms"]["illegal_actions"]) == (
+    assert (ended, info["invalid_actions"], info["reward_terms"]["invalid_actions"]) == (
         False,
         1,
         -0.001,
@@ -281,7 +281,7 @@ def test_what_repeats_without_effect_ends_the_episode() -> None:
     env.step(int(np.flatnonzero(env.action_masks())[0]))
     assert not env.step(other_choice)[2]
     _, _, ended, _, info = env.step(other_choice)
-    assert (ended, info["illegal_actions"], len(info["layout"])) == (True, 3, 1)
+    assert (ended, info["invalid_actions"], len(info["layout"])) == (True, 3, 1)
 
 
 def test_block_and_cell_mean_the_nearest_ones() -> None:

@@ -34,10 +34,10 @@ def test_the_hit_rate_is_told() -> None:
 @pytest.mark.parametrize("kind", ["folder", "memory"])
 def test_a_second_environment_needs_no_blast_and_says_the_same(kind: str, tmp_path: Path) -> None:
     cache = tmp_path / "blasts" if kind == "folder" else BlastStore(size=100)
-    bare, _ = without_counts(play(make(), seed=5))
+    unprotected, _ = without_counts(play(make(), seed=5))
     first, first_counts = without_counts(play(make(cache=cache), seed=5))
     second, second_counts = without_counts(play(make(cache=cache), seed=5))
-    assert same(bare, first)
+    assert same(unprotected, first)
     assert same(first, second)
     assert first_counts["cache_hit_rate"] == 0.0
     assert (second_counts["blasts"], second_counts["cache_hit_rate"]) == (0, 1.0)

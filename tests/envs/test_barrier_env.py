@@ -11,7 +11,7 @@ from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.units import PA_PER_PSI
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
@@ -79,7 +79,7 @@ def test_the_weights_of_structures_count() -> None:
 
 
 def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> None:
-    env = make(invalid_action="penalty", illegal_action_cost=0.25)
+    env = make(invalid_action="penalty", invalid_action_cost=0.25)
     env.reset(seed=1)
     observation, _, _, _, info = env.step(7)
     assert not info["action_mask"][HYDRANT]
@@ -87,16 +87,16 @@ def test_an_illegal_action_changes_nothing_but_the_count_and_the_reward() -> Non
     assert same(observation, after)
     assert not ended
     assert reward == -0.25
-    assert info["reward_terms"] == {"impulse": 0.0, "deposit": 0.0, "illegal_actions": -0.25}
-    assert info["illegal_actions"] == 1
+    assert info["reward_terms"] == {"impulse": 0.0, "deposit": 0.0, "invalid_actions": -0.25}
+    assert info["invalid_actions"] == 1
     env.step(0)
     again = env.step(0)  # the cell is taken now
     assert again[1] == -0.25
-    assert again[4]["illegal_actions"] == 2
+    assert again[4]["invalid_actions"] == 2
 
 
 def test_the_limit_of_illegal_actions_ends_the_episode_as_finishing_does() -> None:
-    env = make(invalid_action="penalty", illegal_action_limit=3, illegal_action_cost=0.5)
+    env = make(invalid_action="penalty", invalid_action_limit=3, invalid_action_cost=0.5)
     env.reset(seed=1)
     env.step(7)
     rewards, ended = zip(*[env.step(HYDRANT)[1:3] for _ in range(3)], strict=True)
@@ -157,7 +157,7 @@ def test_relative_rewards_add_up_to_the_reduction(threat: str) -> None:
     env = make(reward="relative", threat=threat, threats=None if threat == "visible" else 2)
     steps = play(env, seed=5)[1:]
     assert [step[1] for step in steps] == [0.0, 0.0, steps[-1][4]["reduction"]]
-    assert steps[-1][4]["reward_terms"].keys() == {"reduction", "illegal_actions"}
+    assert steps[-1][4]["reward_terms"].keys() == {"reduction", "invalid_actions"}
     env.reset(seed=5)
     assert env.step(FINISH)[1] == 0.0  # no barrier, no reduction
 
@@ -222,7 +222,7 @@ def test_a_reward_of_ones_own_names_its_terms() -> None:
     env = make(reward=PayPerModule())
     steps = play(env, seed=1)
     assert [step[1] for step in steps[1:]] == [1.0, 2.0, 3.0 - 7.0]
-    terms = {"modules": 3.0, "end": -7.0, "illegal_actions": 0.0}
+    terms = {"modules": 3.0, "end": -7.0, "invalid_actions": 0.0}
     assert steps[-1][4]["reward_terms"] == terms
 
 
@@ -236,7 +236,7 @@ class CountOfModules:
         assert len(observable.sources) == 1  # the charge is visible
         return self
 
-    def observe(self, placement: Placement) -> np.ndarray:
+    def observe(self, placement: LayoutState) -> np.ndarray:
         return np.array([len(placement.layout)], dtype=np.float32)
 
 
@@ -252,7 +252,7 @@ def test_an_observation_without_an_episode_is_refused() -> None:
 
 
 def test_a_reward_must_not_name_the_term_of_the_environment() -> None:
-    env = make(reward=lambda _: {"illegal_actions": 1.0})
+    env = make(reward=lambda _: {"invalid_actions": 1.0})
     env.reset(seed=1)
     with pytest.raises(BlastEnvError, match="'illegal_actions', which the environment adds"):
         env.step(0)

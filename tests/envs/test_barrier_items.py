@@ -12,7 +12,7 @@ from blast_env.envs.observations import FeaturesObservation, GridObservation, Ob
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from tests.catalogue_sites import ITEMS, WALL, item, yard
 
 
@@ -28,7 +28,7 @@ def test_actions_place_pieces_and_the_charge_goes_off() -> None:
     rewards = []
     for piece in WALL:
         _, reward, ended, _, info = env.step(catalogue.action(piece))
-        assert (ended, info["illegal_actions"]) == (False, 0)
+        assert (ended, info["invalid_actions"]) == (False, 0)
         rewards.append(reward)
     _, reward, ended, _, info = env.step(catalogue.finish)
     assert (ended, info["layout"]) == (True, WALL)
@@ -62,7 +62,7 @@ def test_an_illegal_piece_changes_nothing() -> None:
     before, *_ = env.step(yard().zone.catalogue.action(WALL[0]))
     after, reward, ended, _, info = env.step(yard().zone.catalogue.action(Piece(7, 1, "post")))
     assert np.array_equal(before, after)
-    assert (reward, ended, info["illegal_actions"]) == (-0.001, False, 1)
+    assert (reward, ended, info["invalid_actions"]) == (-0.001, False, 1)
 
 
 def test_incremental_rewards_add_up_over_pieces() -> None:
@@ -101,7 +101,7 @@ def test_frames_show_pieces() -> None:
 CHANNELS = GridObservation().channels_of(yard())
 
 
-def planes(placement: Placement) -> dict[str, np.ndarray]:
+def planes(placement: LayoutState) -> dict[str, np.ndarray]:
     """Return the planes of an observation on the cells of the build zone, from 0 to 1."""
     scenario = placement.scenario
     episode = GridObservation().episode(Observable(scenario, scenario.charge))
@@ -125,7 +125,7 @@ def test_planes_of_other_zones_stay_as_they_were() -> None:
 
 
 def test_planes_show_heights_items_and_where_they_may_go() -> None:
-    placement = Placement.of(yard(), WALL)
+    placement = LayoutState.of(yard(), WALL)
     seen = planes(placement)
     taken = np.zeros((14, 6), dtype=bool)
     taken[5:11, 1] = taken[4, 1] = True
@@ -145,13 +145,13 @@ def test_planes_show_heights_items_and_where_they_may_go() -> None:
 
 def test_structures_show_their_heights() -> None:
     episode = GridObservation().episode(Observable(yard(), yard().charge))
-    height = episode.observe(Placement.empty(yard()))[CHANNELS.index("structure_height")]
+    height = episode.observe(LayoutState.empty(yard()))[CHANNELS.index("structure_height")]
     assert height[9:15, 15:21] == pytest.approx(2.5 / 12.0, abs=0.002)
     assert height.max() == height[9, 15]
 
 
 def test_features_end_with_what_pieces_may_go_where() -> None:
-    placement = Placement.of(yard(), WALL)
+    placement = LayoutState.of(yard(), WALL)
     episode = FeaturesObservation().episode(Observable(yard(), yard().charge))
     values, cells = episode.observe(placement), 14 * 6
     space = FeaturesObservation().space(yard())

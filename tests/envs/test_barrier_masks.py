@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env.errors import LayoutError
-from blast_env.layout import Placement, check_layout
+from blast_env.layout import LayoutState, check_layout
 from blast_env.site import BuildZone, Scenario, bundled_scenarios, load_scenario
 from tests.envs.small import make, restricted_scenario, small_scenario
 
@@ -27,7 +27,7 @@ def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str)
     Whether a layout is accepted is for `check_layout` to say, which looks at it as a whole.
     """
     scenario = SCENARIOS[name]
-    env = make(scenario, invalid_action="penalty", illegal_action_limit=1000)
+    env = make(scenario, invalid_action="penalty", invalid_action_limit=1000)
     rng = np.random.default_rng(0)
     states = 0
     for episode in range(EPISODES):
@@ -109,4 +109,4 @@ def test_an_empty_zone_offers_what_the_placement_offers() -> None:
     scenario = restricted_scenario()
     env = make(scenario)
     _, info = env.reset(seed=0)
-    assert (info["action_mask"][:-1] == Placement.empty(scenario).free.ravel()).all()
+    assert (info["action_mask"][:-1] == LayoutState.empty(scenario).free.ravel()).all()

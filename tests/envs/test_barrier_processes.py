@@ -33,7 +33,7 @@ def test_vectors_of_environments_stack_the_information(mode: str, vector_kwargs:
     _, info = envs.reset(seed=3)
     assert info["action_mask"].shape == (2, FINISH + 1)
     _, _, _, _, info = envs.step(np.array([0, 4 * 5]))
-    assert info["illegal_actions"].tolist() == [0, 1]
+    assert info["invalid_actions"].tolist() == [0, 1]
     _, rewards, ended, _, info = envs.step(np.array([1, FINISH]))
     assert ended.tolist() == [False, True]
     assert info["_reduction"].tolist() == [False, True]

@@ -82,9 +82,9 @@ def test_the_planes_show_the_entry_and_the_ground_that_the_vehicle_reaches() -> 
         observation, _ = barrier.reset(seed=1)
         channels = GridObservation().channels_of(SITE)
         planes = dict(zip(channels, observation, strict=True))
-        bare = vehicle_reach(SITE, SOURCE).ground(16, 28)
-        assert (planes[EMPTY_REACH] == bare).all()
-        assert (planes[REACH] == bare).all()
+        unprotected = vehicle_reach(SITE, SOURCE).ground(16, 28)
+        assert (planes[EMPTY_REACH] == unprotected).all()
+        assert (planes[REACH] == unprotected).all()
         rows, columns = np.nonzero(planes["charge"])
         assert set(columns.tolist()) == {0}
         assert (rows.min(), rows.max()) == (3, 12) or (rows.min(), rows.max()) == (4, 11)
@@ -92,7 +92,7 @@ def test_the_planes_show_the_entry_and_the_ground_that_the_vehicle_reaches() -> 
             observation, *_ = barrier.step(row * 4 + column)
         planes = dict(zip(channels, observation, strict=True))
         assert (planes[REACH] == vehicle_reach(SITE, SOURCE, POSTS).ground(16, 28)).all()
-        assert (planes[EMPTY_REACH] == bare).all()
+        assert (planes[EMPTY_REACH] == unprotected).all()
         assert planes[REACH][:, 8:].max() == 0
 
 

@@ -12,7 +12,7 @@ from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.envs.observations import Observable
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
 from tests.evaluation.engines.shade import ShadeEngine
@@ -28,7 +28,7 @@ class OneNumber:
     def episode(self, observable: Observable) -> "OneNumber":
         return self
 
-    def observe(self, placement: Placement) -> np.ndarray:
+    def observe(self, placement: LayoutState) -> np.ndarray:
         return np.array([len(placement.layout)], dtype=np.float32)
 
 

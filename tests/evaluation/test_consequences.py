@@ -20,7 +20,7 @@ from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
-from blast_env.response.facade import peak_factor, respond, sharpened
+from blast_env.response.facade import peak_corrected, peak_factor, respond
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from tests.catalogue_sites import ITEMS, WALL, yard_document
@@ -76,10 +76,12 @@ def test_no_verdict_passes_without_the_flags_of_its_loads(found: Consequences) -
     assert replace(found, unchecked=()).is_flagged == any(
         not each for each in found.responses[0].known.values()
     )
-    bare = Consequences((replace(found.responses[0], known={}),))
-    assert bare.verdict_word(below) == "COMPLIES"
-    assert bare.verdict_word(LevelOfProtection.HIGH) == "DOES NOT COMPLY"
-    assert replace(bare, unchecked=(("kiosk", "too near"),)).verdict_word(below) == "COMPLIES"
+    unprotected = Consequences((replace(found.responses[0], known={}),))
+    assert unprotected.verdict_word(below) == "COMPLIES"
+    assert unprotected.verdict_word(LevelOfProtection.HIGH) == "DOES NOT COMPLY"
+    assert (
+        replace(unprotected, unchecked=(("kiosk", "too near"),)).verdict_word(below) == "COMPLIES"
+    )
 
 
 def test_bending_alone_is_no_verdict_on_a_wall_that_may_be_breached() -> None:
@@ -133,7 +135,7 @@ def test_no_verdict_passes_on_peaks_that_cells_clip() -> None:
         history = np.tile([peak_pa, 0.0, -0.4 * peak_pa, 0.0, 0.0], (len(bays), 1))
         response = BuildingResponse("hut", CHARGE, respond(bays, time_s, history), 2.0)
         found = Consequences((response,))
-        sharper = respond(bays, *sharpened(time_s, history, 2.0)).level_of_protection
+        sharper = respond(bays, *peak_corrected(time_s, history, 2.0)).level_of_protection
         on_cells = response.on_cells.level_of_protection
         assert found.level("hut") == min(sharper, on_cells)
         for level in LevelOfProtection:

@@ -105,11 +105,11 @@ def test_equal_blasts_are_simulated_once() -> None:
     evaluator = BlastEvaluator(COURTYARD)
     threat = THREATS[0]
     pairs = [(FEW, threat), ((), threat), (FEW[::-1], threat)]
-    first, bare, again = evaluator.loads_of_many(pairs)
+    first, unprotected, again = evaluator.loads_of_many(pairs)
     assert (evaluator.blasts, evaluator.cache_hits) == (2, 1)
     assert first is again
-    assert not same(first, bare)
-    assert evaluator.loads((), threat) is bare
+    assert not same(first, unprotected)
+    assert evaluator.loads((), threat) is unprotected
     assert (evaluator.blasts, evaluator.cache_hits) == (2, 2)
 
 

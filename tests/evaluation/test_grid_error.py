@@ -94,23 +94,23 @@ def test_final_statements_have_it_beside_each_number() -> None:
     """The loads on the hut by hand: fine cells, and coarse ones under the only charge."""
     fine = GasEngine(cell_m=0.25, border_m=0.0)
     evaluation = evaluate_layout(hut(), WALL, [0], engine=fine)
-    walled, bare = (
+    protected, unprotected = (
         [
             GasBlast(hut(), layout, 0, replace(fine, cell_m=cell_m)).run().impulse("hut").pa_s
             for cell_m in (0.25, 0.5)
         ]
         for layout in (WALL, ())
     )
-    gone = [reductions(*each).item() for each in zip(walled, bare, strict=True)]
+    gone = [reductions(*each).item() for each in zip(protected, unprotected, strict=True)]
     (row,) = evaluation.table.to_dict("records")
     assert row["reduction_error"] == pytest.approx(convergence_index(*gone))
-    assert row["impulse_error_pa_s"] == pytest.approx(convergence_index(*walled))
-    assert row["unprotected_impulse_error_pa_s"] == pytest.approx(convergence_index(*bare))
+    assert row["impulse_error_pa_s"] == pytest.approx(convergence_index(*protected))
+    assert row["unprotected_impulse_error_pa_s"] == pytest.approx(convergence_index(*unprotected))
     found = evaluation.to_dict()["result"]["grid_error"]
     assert found["coarser"] == "gas, cells of 0.5 m"
     assert found["reduction"] == pytest.approx(convergence_index(*gone))
-    assert found["load"] == pytest.approx(convergence_index(*walled))
-    assert found["unprotected_load"] == pytest.approx(convergence_index(*bare))
+    assert found["load"] == pytest.approx(convergence_index(*protected))
+    assert found["unprotected_load"] == pytest.approx(convergence_index(*unprotected))
     assert evaluation.objective_error == pytest.approx(found["load"])
     assert 0.001 < found["reduction"] < 0.05
 

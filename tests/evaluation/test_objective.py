@@ -27,10 +27,10 @@ def site(**objective: Any) -> Scenario:
 def measured() -> tuple[dict[str, float], dict[str, float]]:
     """Impulse (Pa s) and peak (Pa) on the hut without and with the wall, under the near threat."""
     loads = BlastEvaluator(hut(), "gas").loads_of_many([((), NEAR), (WALL, NEAR)])
-    bare, walled = (
+    unprotected, protected = (
         {"impulse": each.protected_impulse_pa_s, "peak": each.protected_peak_pa} for each in loads
     )
-    return bare, walled
+    return unprotected, protected
 
 
 def test_impulse_is_what_counts_unless_something_else_is_said() -> None:
@@ -41,15 +41,15 @@ def test_impulse_is_what_counts_unless_something_else_is_said() -> None:
 
 def test_peaks_count_in_pascal(measured: tuple[dict[str, float], dict[str, float]]) -> None:
     evaluation = evaluate_against(BlastEvaluator(site(quantity="peak"), "gas"), WALL, [NEAR])
-    bare, walled = measured
-    assert evaluation.unprotected_load == pytest.approx(bare["peak"])
-    assert evaluation.load == pytest.approx(walled["peak"])
-    assert evaluation.mean_reduction == pytest.approx(1.0 - walled["peak"] / bare["peak"])
+    unprotected, protected = measured
+    assert evaluation.unprotected_load == pytest.approx(unprotected["peak"])
+    assert evaluation.load == pytest.approx(protected["peak"])
+    assert evaluation.mean_reduction == pytest.approx(1.0 - protected["peak"] / unprotected["peak"])
     # Impulses stay impulses in what is reported of them.
-    assert evaluation.impulse_pa_s.value == pytest.approx(walled["impulse"])
+    assert evaluation.impulse_pa_s.value == pytest.approx(protected["impulse"])
     (row,) = evaluation.threat_table.to_dict("records")
-    assert (row["peak_pa"], row["load"]) == pytest.approx((walled["peak"],) * 2)
-    assert row["impulse_pa_s"] == pytest.approx(walled["impulse"])
+    assert (row["peak_pa"], row["load"]) == pytest.approx((protected["peak"],) * 2)
+    assert row["impulse_pa_s"] == pytest.approx(protected["impulse"])
     record = evaluation.to_dict()["result"]["objective"]
     assert record["unit"] == "Pa"
     assert record["load"] == evaluation.load
@@ -68,8 +68,8 @@ def test_both_add_shares_of_their_references_by_the_weights_of_a_structure(
     document["structures"][0] |= {"weight": 2.0, "peak_weight": 3.0}
     evaluator = BlastEvaluator(Scenario.from_document(document, "hut"), "gas")
     (loads,) = evaluator.loads_of_many([((), NEAR)])
-    bare, _ = measured
-    expected = 2.0 * bare["impulse"] / 50.0 + 3.0 * bare["peak"] / 20_000.0
+    unprotected, _ = measured
+    expected = 2.0 * unprotected["impulse"] / 50.0 + 3.0 * unprotected["peak"] / 20_000.0
     assert loads.load(evaluator.scenario.objective) == pytest.approx(expected)
 
 
@@ -95,9 +95,9 @@ def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
     evaluator = BlastEvaluator(site(charges="worst"), "gas")
     evaluation = evaluate_against(evaluator, WALL, [NEAR, FAR])
     loads = [each.protected_impulse_pa_s for each in evaluation.blasts]
-    bare = [each.protected_impulse_pa_s for each in evaluation.unprotected_blasts]
+    unprotected = [each.protected_impulse_pa_s for each in evaluation.unprotected_blasts]
     assert evaluation.load == max(loads)
-    assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(bare))
+    assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(unprotected))
     assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met
     problem = DesignProblem(evaluator, Case(evaluator.scenario, (NEAR, FAR)))
     assert problem.load(WALL) == max(loads)
@@ -163,16 +163,16 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     measured: tuple[dict[str, float], dict[str, float]], capsys: pytest.CaptureFixture[str]
 ) -> None:
     own = hut().model_copy(update={"objective": Cracking()})
-    bare, walled = (each["impulse"] - 100.0 for each in measured)
-    assert walled > 0.0
+    unprotected, protected = (each["impulse"] - 100.0 for each in measured)
+    assert protected > 0.0
     evaluation = evaluate_against(BlastEvaluator(own, "gas"), WALL, [NEAR])
-    assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((bare, walled))
+    assert (evaluation.unprotected_load, evaluation.load) == pytest.approx((unprotected, protected))
     print_means(evaluation, own.objective)
-    assert f"with barrier: mean {walled:.0f} Pa s of cracking" in capsys.readouterr().out
+    assert f"with barrier: mean {protected:.0f} Pa s of cracking" in capsys.readouterr().out
     env = BlastBarrierEnv(scenario=own, engine="gas")
     env.reset(seed=0, options={"charge_position_m": (2.0, 4.0), "layout": WALL})
     _, _, _, _, info = env.step(env.placement.catalogue.finish)
     counted = info["impulse_pa_s"] - 100.0
     assert info["reward_terms"]["impulse"] == pytest.approx(-counted / PA_PER_PSI)
     problem = DesignProblem(BlastEvaluator(own, "gas"), Case(own, (NEAR,)))
-    assert problem.load(WALL) == pytest.approx(walled)
+    assert problem.load(WALL) == pytest.approx(protected)

@@ -112,10 +112,10 @@ def test_in_the_shade_of_a_wall_loads_are_less_certain(found: Consequences) -> N
     assert not places.seen.any()
     site = found.responses[0].site
     assert site is not None
-    bare = replace(found.responses[0], site=replace(site, structures=site.structures[:1]))
-    assert bare.places.seen.tolist() == [True, True, *[False] * (len(places.seen) - 2)]
+    unprotected = replace(found.responses[0], site=replace(site, structures=site.structures[:1]))
+    assert unprotected.places.seen.tolist() == [True, True, *[False] * (len(places.seen) - 2)]
     shaded, seen = (
         level_probability(replace(found, responses=(each,)), replace(CERTAIN, in_shade=0.5), 200)
-        for each in (found.responses[0], bare)
+        for each in (found.responses[0], unprotected)
     )
     assert shaded.of(LevelOfProtection.LOW) < seen.of(LevelOfProtection.LOW)

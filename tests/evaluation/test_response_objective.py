@@ -14,9 +14,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, LoadCase, evaluate_against
 from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Measure
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.response.facade import peak_factor, respond, sharpened
+from blast_env.response.facade import peak_corrected, peak_factor, respond
 from blast_env.site.scene import Charge
 from tests.catalogue_sites import WALL
 from tests.site.test_hardening import TAKEN, glazed_yard
@@ -36,11 +36,11 @@ def evaluator() -> BlastEvaluator:
 
 def test_measures_need_no_blast(evaluator: BlastEvaluator) -> None:
     before = evaluator.blasts
-    bare, hardened = evaluator.loads_of_many([((), THREAT), ((TAKEN, PANELS), THREAT)])
+    unprotected, hardened = evaluator.loads_of_many([((), THREAT), ((TAKEN, PANELS), THREAT)])
     evaluator.loads((*WALL, TAKEN), THREAT)
     assert evaluator.blasts == before == 2
-    assert hardened.load(DAMAGE.objective) < bare.load(DAMAGE.objective)
-    assert hardened.protected_impulse_pa_s == bare.protected_impulse_pa_s
+    assert hardened.load(DAMAGE.objective) < unprotected.load(DAMAGE.objective)
+    assert hardened.protected_impulse_pa_s == unprotected.protected_impulse_pa_s
 
 
 def test_loads_with_measures_are_those_of_a_blast_with_them(evaluator: BlastEvaluator) -> None:
@@ -51,7 +51,7 @@ def test_loads_with_measures_are_those_of_a_blast_with_them(evaluator: BlastEval
     engine = find_engine("gas")
     result = engine.blast(DAMAGE, (TAKEN,), 0, THREAT.charge).run()
     own = result.bay_loads.response  # type: ignore[attr-defined]
-    histories = sharpened(own.time_s, own.pressure_pa, peak_factor(0.5, THREAT.charge.tnt_kg))
+    histories = peak_corrected(own.time_s, own.pressure_pa, peak_factor(0.5, THREAT.charge.tnt_kg))
     sharp = respond(own.bays, *histories)
     damage = np.zeros(len(own.bays))
     for each in (own, sharp):
@@ -81,15 +81,17 @@ def test_with_a_target_the_cheapest_layout_that_reaches_it_is_worth_most() -> No
     damage, area_m2 = np.array([2.9, 3.0, 4.5]), np.array([1.0, 1.0, 2.0])
     assert objective.response(damage, area_m2) == pytest.approx((1.0 + 2.0 * 2.5) / 4.0)
     assert objective.response(damage[:1], area_m2[:1]) == 0.0
-    passes, dearer, fails = (objective.counted(*each) for each in ((0, 0.2), (0, 1.0), (1e-6, 0.0)))
+    passes, dearer, fails = (
+        objective.objective_value(*each) for each in ((0, 0.2), (0, 1.0), (1e-6, 0.0))
+    )
     assert passes < dearer < fails
 
 
 def test_case_counts_the_cost_of_a_layout_that_passes() -> None:
     scenario = glazed_yard(target="medium")
     case = Case(scenario, (THREAT,))
-    assert case.counted([0.0], (TAKEN,)) == pytest.approx(5.0 / 20.0)
-    assert case.counted([0.3], (TAKEN,)) == pytest.approx(1.3)
+    assert case.objective_value([0.0], (TAKEN,)) == pytest.approx(5.0 / 20.0)
+    assert case.objective_value([0.3], (TAKEN,)) == pytest.approx(1.3)
     assert case.combined([0.3]) == pytest.approx(0.3)
 
 
@@ -97,14 +99,14 @@ def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None
     surrogate = SurrogateEngine()
     env = BlastBarrierEnv(glazed_yard(target="medium"), engine=surrogate, reward="incremental")
     env.reset(seed=0)
-    catalogue = Placement.empty(glazed_yard(target="medium")).catalogue
+    catalogue = LayoutState.empty(glazed_yard(target="medium")).catalogue
     paid = 0.0
     for action in (catalogue.action(TAKEN), catalogue.finish):
         _, reward, terminated, _, info = env.step(action)
         paid += float(reward)
     assert terminated
     assert paid == pytest.approx(-info["response"])
-    assert info["reward_terms"].keys() == {"response", "illegal_actions"}
+    assert info["reward_terms"].keys() == {"response", "invalid_actions"}
     assert info["level_of_protection"] in {each.label for each in LevelOfProtection}
     assert info["layout"] == (TAKEN,)
 

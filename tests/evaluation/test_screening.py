@@ -151,8 +151,8 @@ def test_a_charge_of_a_file_takes_its_mass_from_a_preset_or_an_explosive() -> No
     assert [each.tnt_kg for each in site.charge] == [227.0, pytest.approx(2.74)]
     assert [each.name for each in screen(site).threats] == ["car", "parcel"]
     unnamed = [{**each.model_dump(), "threat": None} for each in site.charge]
-    bare = Scenario.from_document(site.model_dump() | {"charge": unnamed}, "yard")
-    assert bare.content_hash == site.content_hash
+    unprotected = Scenario.from_document(site.model_dump() | {"charge": unnamed}, "yard")
+    assert unprotected.content_hash == site.content_hash
     document["charge"] = [place | {"mass_kg": 2.0, "explosive": "c5"}]
     with pytest.raises(BlastEnvError, match="must have a mass_kg in kg and an explosive of tnt"):
         Scenario.from_document(document, "yard")

@@ -14,7 +14,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_layout,
 )
-from blast_env.evaluation.cases import practice_hidden
+from blast_env.evaluation.cases import hidden_search_set
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.layout.build_scene import build_site, worst_places
@@ -36,13 +36,13 @@ def evaluation() -> LayoutEvaluation:
 def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
     evaluation: LayoutEvaluation,
 ) -> None:
-    with_posts, bare = worst_places(SITE, SOURCE, POSTS), worst_places(SITE, SOURCE)
+    with_posts, unprotected = worst_places(SITE, SOURCE, POSTS), worst_places(SITE, SOURCE)
     for rank, outcome in enumerate(evaluation.outcomes):
         assert outcome.threat == LoadCase(VehicleCharge(SOURCE, rank), rank)
         assert outcome.charge.position_m == with_posts.places_m[rank]
         assert outcome.stand_off_m == pytest.approx(with_posts.distances_m[rank])
-        assert outcome.unprotected_stand_off_m == pytest.approx(bare.distances_m[rank])
-        charge = Charge(bare.places_m[rank], 5.0)
+        assert outcome.unprotected_stand_off_m == pytest.approx(unprotected.distances_m[rank])
+        charge = Charge(unprotected.places_m[rank], 5.0)
         alone = simulate(gate_site(), charge=charge, engine=GAS)
         assert outcome.unprotected_impulse_pa_s == pytest.approx(alone.impulse("hut").pa_s)
     assert evaluation.mean_reduction > 0.5  # distance does that, not the posts of 1 m
@@ -96,7 +96,7 @@ def test_a_blast_without_a_charge_given_has_the_vehicle_at_its_worst_place() -> 
 def test_a_search_meets_the_worst_places_first() -> None:
     road = {"kind": "segment", "start_m": [2.0, 2.0], "end_m": [2.0, 6.0], "tnt_kg": 5.0}
     both = gate_site(charge=[vehicle_document(), road])
-    threats = practice_hidden(both, 12, 1, seed=0).threats
+    threats = hidden_search_set(both, 12, 1, seed=0).threats
     vehicles = [each.charge for each in threats if isinstance(each.charge, VehicleCharge)]
     assert 0 < len(vehicles) < 12
     assert [each.charge for each in threats[: len(vehicles)]] == vehicles

@@ -99,8 +99,8 @@ def test_a_blast_in_a_corner_equals_its_mirror_images() -> None:
 
     walls = np.zeros((n + 1, n + 1, n + 1), dtype=bool)
     walls[0], walls[:, 0], walls[:, :, 0] = True, True, True
-    walled = blast(walls, (5, 6, 4), faces={"z_low": FaceKind.OPEN}, **options)
-    walled.advance(0.01)
+    protected = blast(walls, (5, 6, 4), faces={"z_low": FaceKind.OPEN}, **options)
+    protected.advance(0.01)
 
     images = blast(
         np.zeros((2 * n, 2 * n, 2 * n), dtype=bool),
@@ -119,9 +119,9 @@ def test_a_blast_in_a_corner_equals_its_mirror_images() -> None:
     )
     images.advance(0.01)
     exact = images.pressure()[n:, n:, n:]
-    assert corner.steps == walled.steps == images.steps
+    assert corner.steps == protected.steps == images.steps
     assert corner.pressure() == pytest.approx(exact, rel=1e-11)
-    assert walled.pressure()[1:, 1:, 1:] == pytest.approx(exact, rel=1e-11)
+    assert protected.pressure()[1:, 1:, 1:] == pytest.approx(exact, rel=1e-11)
 
 
 def test_fuel_is_kept_until_it_burns() -> None:

@@ -51,9 +51,9 @@ def test_cells_without_pressure_are_lifted_and_counted(energy: float) -> None:
     """Should a cell ever lose its pressure, the run goes on, and says so."""
     solver = blast(np.zeros((12, 12, 12), dtype=bool), (4, 4, 4))
     solver.step()
-    assert solver.lifted == 0
+    assert solver.floored_cells == 0
     solver.state[ENERGY, 6, 6, 6] = energy
     solver.step()
-    assert solver.lifted == 1
+    assert solver.floored_cells == 1
     assert np.isfinite(solver.state).all()
     assert solver.pressure().min() > 0.0

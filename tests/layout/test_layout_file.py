@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import blast_env
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.layout import LayoutFile, Placement, load_layout, write_layout
+from blast_env.layout import LayoutFile, LayoutState, load_layout, write_layout
 from blast_env.site import Scenario, load_scenario, save_scenario
 from tests.layout.test_layout import scenario
 from tests.site.documents import full_document
@@ -56,7 +56,7 @@ JSON = st.recursive(
 def test_every_layout_that_can_be_placed_comes_back(
     tmp_path_factory: pytest.TempPathFactory, random: Any, provenance: dict[str, Any]
 ) -> None:
-    placement = Placement.empty(scenario())
+    placement = LayoutState.empty(scenario())
     for _ in range(random.randint(0, 12)):
         free = list(zip(*(each.tolist() for each in placement.free.nonzero()), strict=True))
         placement = placement.place(random.choice(free))
@@ -96,7 +96,7 @@ def test_a_scenario_that_was_changed_since_is_another_one(tmp_path: Path) -> Non
     document = full_document() | {"description": "other words change nothing"}
     path = tmp_path / "layout.json"
     original = Scenario.from_document(document, "test")
-    rows, columns = Placement.empty(original).free.nonzero()
+    rows, columns = LayoutState.empty(original).free.nonzero()
     cell = (int(rows[0]), int(columns[0]))
     write_layout(path, original, [cell])
     renamed = Scenario.from_document(full_document(), "test")

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell
-from blast_env.layout import Placement, check_layout, usable_cells
+from blast_env.layout import LayoutState, check_layout, usable_cells
 from tests.site.documents import Document
 from tests.site.zones import (
     area,
@@ -32,7 +32,7 @@ CONDITIONS: Document = {
 }
 
 
-def assert_free_explain_and_place_agree(placement: Placement, cells: list[Cell]) -> None:
+def assert_free_explain_and_place_agree(placement: LayoutState, cells: list[Cell]) -> None:
     for cell in cells:
         reason = placement.explain(cell)
         assert (reason is None) == placement.free[cell], cell
@@ -55,7 +55,7 @@ def test_free_cells_are_those_that_the_rules_allow(document: Document, seed: int
     scenario = buildable(document)
     zone = scenario.zone
     rng = np.random.default_rng(seed)
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     # The checks of a scenario promise this.
     assert not placement.is_full
     while True:
@@ -76,11 +76,11 @@ def test_order_does_not_matter_and_fewer_modules_are_no_worse(
 ) -> None:
     scenario = buildable(document)
     full = filled(scenario, np.random.default_rng(seed))
-    shuffled = Placement.of(scenario, data.draw(st.permutations(full.cells)))
+    shuffled = LayoutState.of(scenario, data.draw(st.permutations(full.cells)))
     assert (shuffled.free == full.free).all()
     assert shuffled.cost == full.cost
     some = data.draw(st.lists(st.sampled_from(full.cells), unique=True))
-    fewer = Placement.of(scenario, some)
+    fewer = LayoutState.of(scenario, some)
     assert all(fewer.free[cell] for cell in set(full.cells) - set(some))
     assert (fewer.free >= full.free).all()
 
@@ -94,19 +94,19 @@ def test_order_does_not_matter_and_fewer_modules_are_no_worse(
 def test_layout_that_closes_the_way_is_refused_by_the_cell_that_closes_it() -> None:
     scenario = zone_scenario(access_way={"width_m": 0.5, "between": "left_right"})
     wall = [(row, 3) for row in range(8)]
-    assert Placement.of(scenario, wall[:-1]).cells == tuple(wall[:-1])
+    assert LayoutState.of(scenario, wall[:-1]).cells == tuple(wall[:-1])
     with pytest.raises(LayoutError, match=r"cell \(7, 3\) would close the access way of 0.5 m"):
-        Placement.of(scenario, wall)
+        LayoutState.of(scenario, wall)
     with pytest.raises(LayoutError, match=r"cell \(0, 3\) would close the access way of 0.5 m"):
         check_layout(scenario, wall[::-1])
     # A diagonal wall: the vehicle does not fit between corners that touch.
     with pytest.raises(LayoutError, match=r"cell \(7, 7\) would close"):
-        Placement.of(scenario, [(i, i) for i in range(8)])
+        LayoutState.of(scenario, [(i, i) for i in range(8)])
 
 
 @pytest.mark.parametrize("cell", [(np.int64(3), np.uint8(1)), np.array([3, 1]), [3, 1]])
 def test_numpy_cells_become_plain_integers(cell: Any) -> None:
-    placement = Placement.empty(zone_scenario()).place(cell)
+    placement = LayoutState.empty(zone_scenario()).place(cell)
     assert placement.cells == ((3, 1),)
     assert all(type(number) is int for number in placement.cells[0])
     assert placement.explain(cell) == "cell (3, 1) is taken by a module"
@@ -116,7 +116,7 @@ def test_numpy_cells_become_plain_integers(cell: Any) -> None:
 
 
 def test_placing_leaves_the_placement_as_it_was() -> None:
-    before = Placement.empty(zone_scenario())
+    before = LayoutState.empty(zone_scenario())
     free = before.free.copy()
     before.place((0, 0)).place((5, 5))
     assert (before.cells, before.stock_left, before.cost) == ((), 10, 0.0)
@@ -125,14 +125,14 @@ def test_placing_leaves_the_placement_as_it_was() -> None:
 
 @pytest.mark.parametrize("name", ["free", "usable", "module_costs"])
 def test_arrays_are_read_only(name: str) -> None:
-    placement = Placement.of(zone_scenario(), [(0, 0)])
+    placement = LayoutState.of(zone_scenario(), [(0, 0)])
     for each in (placement, pickle.loads(pickle.dumps(placement))):
         with pytest.raises(ValueError, match="read-only"):
             getattr(each, name)[0, 0] = 1
 
 
 def test_placement_survives_pickling_and_copying() -> None:
-    placement = Placement.of(zone_scenario(budget=5.0, module_cost=0.5), [(1, 2), (0, 0)])
+    placement = LayoutState.of(zone_scenario(budget=5.0, module_cost=0.5), [(1, 2), (0, 0)])
     assert placement.free.any()
     for again in (pickle.loads(pickle.dumps(placement)), copy.deepcopy(placement)):
         assert again == placement

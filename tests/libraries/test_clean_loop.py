@@ -58,7 +58,7 @@ def test_a_loop_in_the_style_of_cleanrl(name: str) -> None:
             value = agent.critic(observation)[:, 0]
         assert mask.gather(1, action[:, None]).all()
         seen, reward, terminated, truncated, info = envs.step(action.numpy())
-        assert not info.get("illegal_actions", np.zeros(_ENVS)).any()
+        assert not info.get("invalid_actions", np.zeros(_ENVS)).any()
         ended = torch.as_tensor(terminated | truncated)
         chance = policy.log_prob(action)
         row = (observation, mask, action, chance, value, torch.as_tensor(reward).float(), ended)

@@ -102,7 +102,7 @@ def test_maskable_ppo_learns_by_item_and_block_in_a_zone_of_a_hundred_metres() -
         assert mask[action]
         choices.add(int(action) // 88 if action >= 4 else -1)
         observation, _, ended, _, info = env.step(action)
-        assert info["illegal_actions"] == 0
+        assert info["invalid_actions"] == 0
         if ended:
             observation, info = env.reset()
     assert len(choices) == 3  # item, block and cell

@@ -51,10 +51,10 @@ def both(site: Scenario) -> list[tuple[str, BuildingResponse]]:
 def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> None:
     """Four walls of a bay with two panes each; in the west the panes fly, and the wall holds."""
     figure = facade_picture(both(site), "hut")
-    bare, walled = (
+    unprotected, protected = (
         [each for each in plot.patches if isinstance(each, Rectangle)] for plot in figure.axes
     )
-    for patches, panes in ((bare, WORST), (walled, BEST)):
+    for patches, panes in ((unprotected, WORST), (protected, BEST)):
         colours = [tuple(each.get_facecolor()[:3]) for each in patches]
         assert len(colours) == 4 * 3
         assert colours.count(to_rgb(panes)) >= 2
@@ -64,8 +64,10 @@ def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> 
 
 def test_a_view_shows_the_bays_of_the_walls_that_are_seen(site: Scenario) -> None:
     """From the south-west: the western bay, with and without a barrier, and the southern one."""
-    (_, bare), (_, walled) = both(site)
-    figure = damage_view(site, [("no barrier", (), [bare]), ("walls", WALL, [walled])], "hut")
+    (_, unprotected), (_, protected) = both(site)
+    figure = damage_view(
+        site, [("no barrier", (), [unprotected]), ("walls", WALL, [protected])], "hut"
+    )
     for axes, west in zip(figure.axes, (WORST, BEST), strict=True):
         faces = next(each for each in axes.collections if isinstance(each, PolyCollection))
         colours = [tuple(each[:3]) for each in np.asarray(faces.get_facecolor()).tolist()]
@@ -88,10 +90,10 @@ def test_a_bay_with_better_glass_is_in_the_diagram_of_that_glass(site: Scenario)
     """Its point among the regions of the old glass would say that it fails."""
     better = find_component("window_laminated_12")
     assert isinstance(better, Glazing)
-    bare = response(site, 4e4)
+    unprotected = response(site, 4e4)
     bays = [replace(each, glazing=better) for each in site.bays]
-    hardened = respond(bays, bare.time_s, bare.pressure_pa)
-    figure = pressure_impulse_diagram([("nothing", bare), ("laminated", hardened)], "hut")
+    hardened = respond(bays, unprotected.time_s, unprotected.pressure_pa)
+    figure = pressure_impulse_diagram([("nothing", unprotected), ("laminated", hardened)], "hut")
     counts = {
         axes.get_title(): [
             len(np.asarray(line.get_xdata()))
@@ -148,8 +150,8 @@ def test_a_burst_in_the_air_reaches_as_far_as_its_reflection_on_the_ground() -> 
 
 def test_a_map_of_risks_has_a_region_and_a_circle_a_threshold(site: Scenario) -> None:
     blasts = (GasBlast(site, layout, charge=CHARGE) for layout in ((), WALL))
-    bare, walled = (blast.run(recorders=ground_recorders) for blast in blasts)
-    figure = threshold_map(walled, beside=bare)
+    unprotected, protected = (blast.run(recorders=ground_recorders) for blast in blasts)
+    figure = threshold_map(protected, beside=unprotected)
     words = [text.get_text() for text in figure.legends[0].get_texts()]
     assert any(each.startswith("windows usually shattered: from 3.4 kPa, ") for each in words)
     for axes in figure.axes:

@@ -58,12 +58,12 @@ def barrier_blast(blast: GasBlast) -> GasBlast:
 
 
 @pytest.fixture(scope="module")
-def bare(blast: GasBlast) -> GasResult:
+def unprotected(blast: GasBlast) -> GasResult:
     return blast.run(recorders=ground_recorders)
 
 
 @pytest.fixture(scope="module")
-def walled(barrier_blast: GasBlast) -> GasResult:
+def protected(barrier_blast: GasBlast) -> GasResult:
     return barrier_blast.run(recorders=ground_recorders)
 
 
@@ -101,15 +101,15 @@ def assert_all_is_on_the_page(figure: Figure) -> None:
 # The ground.
 
 
-def test_the_ground_has_what_gauges_have(bare: GasResult) -> None:
+def test_the_ground_has_what_gauges_have(unprotected: GasResult) -> None:
     """Also where the front passed before the grid took over."""
     for name in ("front", "behind"):
-        row = bare.gauges.set_index("name").loc[name]
+        row = unprotected.gauges.set_index("name").loc[name]
         (x_m, y_m, z_m) = (float(row[f"{axis}_m"]) for axis in "xyz")  # type: ignore[arg-type]
-        x, y, _ = bare.run.grid.cell_at((x_m, y_m, z_m))
-        impulse = ground_values(bare, "impulse")[x, y]
+        x, y, _ = unprotected.run.grid.cell_at((x_m, y_m, z_m))
+        impulse = ground_values(unprotected, "impulse")[x, y]
         assert impulse == pytest.approx(row["impulse_pa_s"], rel=0.05)
-        assert ground_values(bare, "peak")[x, y] == pytest.approx(row["peak_pa"], rel=0.03)
+        assert ground_values(unprotected, "peak")[x, y] == pytest.approx(row["peak_pa"], rel=0.03)
 
 
 @pytest.mark.usefixtures("laid_out")
@@ -121,11 +121,11 @@ def test_the_ground_has_what_gauges_have(bare: GasResult) -> None:
     ],
 )
 def test_maps_show_the_ground_of_the_site_on_one_scale(
-    bare: GasResult, walled: GasResult, quantity: Any, factor: float, label: str
+    unprotected: GasResult, protected: GasResult, quantity: Any, factor: float, label: str
 ) -> None:
-    figure = ground_map(walled, quantity, beside=bare)
+    figure = ground_map(protected, quantity, beside=unprotected)
     left, right = images_of(figure)
-    for image, result in ((left, bare), (right, walled)):
+    for image, result in ((left, unprotected), (right, protected)):
         values = ground_values(result, quantity)[2:-2, 2:-2]  # the margin
         np.testing.assert_allclose(values_of(image), factor * values.T)
     assert left.norm is right.norm
@@ -138,34 +138,36 @@ def test_maps_show_the_ground_of_the_site_on_one_scale(
 
 @pytest.mark.parametrize("quantity", ["peak", "impulse"])
 def test_maps_of_their_own_can_have_the_scale_of_another(
-    bare: GasResult, walled: GasResult, quantity: Any
+    unprotected: GasResult, protected: GasResult, quantity: Any
 ) -> None:
-    levels = map_levels(bare, quantity)
-    for result in (bare, walled):
+    levels = map_levels(unprotected, quantity)
+    for result in (unprotected, protected):
         (image,) = images_of(ground_map(result, quantity, levels=levels))
         assert image.get_clim() == (levels[0], levels[-1])
 
 
 def test_walls_of_their_own_can_have_the_scale_of_another(
-    bare: GasResult, walled: GasResult
+    unprotected: GasResult, protected: GasResult
 ) -> None:
-    full = full_load(bare, "hut", "impulse")
-    for result in (bare, walled):
+    full = full_load(unprotected, "hut", "impulse")
+    for result in (unprotected, protected):
         images = images_of(facades(result, "hut", "impulse", full=full))
         assert {image.get_clim() for image in images} == {(0.0, full)}
-    largest = max(float(np.nanmax(values_of(image))) for image in images_of(facades(bare, "hut")))
+    largest = max(
+        float(np.nanmax(values_of(image))) for image in images_of(facades(unprotected, "hut"))
+    )
     assert largest <= full <= 1.3 * largest
 
 
-def test_solids_are_no_ground(walled: GasResult) -> None:
-    values = values_of(images_of(ground_map(walled))[0])
+def test_solids_are_no_ground(protected: GasResult) -> None:
+    values = values_of(images_of(ground_map(protected))[0])
     assert np.isnan(values).sum() == 4 * 4 + 6
     assert np.isnan(values[6:10, 12:16]).all()
 
 
 @pytest.mark.usefixtures("laid_out")
-def test_a_map_names_what_stands_and_numbers_contours(walled: GasResult) -> None:
-    figure = ground_map(walled, "impulse")
+def test_a_map_names_what_stands_and_numbers_contours(protected: GasResult) -> None:
+    figure = ground_map(protected, "impulse")
     words = {text.get_text() for text in figure.axes[0].texts}
     assert "hut\n2 m" in words
     assert words & {"50", "70", "100", "150", "200"}
@@ -175,31 +177,31 @@ def test_a_map_names_what_stands_and_numbers_contours(walled: GasResult) -> None
     assert_all_is_on_the_page(figure)
 
 
-def test_a_map_needs_its_recorder(blast: GasBlast, walled: GasResult) -> None:
+def test_a_map_needs_its_recorder(blast: GasBlast, protected: GasResult) -> None:
     run = replace(blast, engine=GasEngine(margin_m=1.0, until=1e-3)).run()
     with pytest.raises(BlastEnvError, match="recorders=ground_recorders"):
         ground_map(run)
-    assert any(isinstance(each, GroundMap) for each in walled.run.solver.recorders)
+    assert any(isinstance(each, GroundMap) for each in protected.run.solver.recorders)
     with pytest.raises(UnknownNameError, match="did you mean 'peak'"):
-        ground_map(walled, "peek")  # type: ignore[arg-type]
+        ground_map(protected, "peek")  # type: ignore[arg-type]
 
 
-def test_only_the_same_charge_can_stand_beside(bare: GasResult) -> None:
-    other = replace(bare, blast=replace(bare.blast, charge=Charge((2.0, 5.0), 5.0)))
+def test_only_the_same_charge_can_stand_beside(unprotected: GasResult) -> None:
+    other = replace(unprotected, blast=replace(unprotected.blast, charge=Charge((2.0, 5.0), 5.0)))
     for draw in (ground_map, facades):
         with pytest.raises(BlastEnvError, match="different charges"):
-            draw(bare, beside=other)
+            draw(unprotected, beside=other)
 
 
 # Facades.
 
 
 @pytest.mark.usefixtures("laid_out")
-def test_walls_show_the_loads_on_their_faces(walled: GasResult) -> None:
-    figure = facades(walled, "hut", "peak")
+def test_walls_show_the_loads_on_their_faces(protected: GasResult) -> None:
+    figure = facades(protected, "hut", "peak")
     images = images_of(figure)
     for image, wall in zip(images, ("west", "south", "east", "north"), strict=True):
-        faces = walled.faces
+        faces = protected.faces
         own = faces[(faces["structure"] == "hut") & (faces["face"] == wall)]
         along = "y_m" if wall in ("west", "east") else "x_m"
         expected = own.pivot_table(index="z_m", columns=along, values="peak_pa").to_numpy()
@@ -210,7 +212,9 @@ def test_walls_show_the_loads_on_their_faces(walled: GasResult) -> None:
     assert_all_is_on_the_page(figure)
 
 
-def test_a_building_of_two_parts_is_unfolded_as_one(blast: GasBlast, bare: GasResult) -> None:
+def test_a_building_of_two_parts_is_unfolded_as_one(
+    blast: GasBlast, unprotected: GasResult
+) -> None:
     """The same walls in the same place, on which the same gas arrives."""
     document = blast.scenario.model_dump(exclude_none=True)
     (whole,) = document["structures"]
@@ -219,17 +223,17 @@ def test_a_building_of_two_parts_is_unfolded_as_one(blast: GasBlast, bare: GasRe
     north = {**part, "name": "north_half", "corner_m": (left, bottom + 0.5 * part["rows"])}
     document["structures"] = [{**part, "name": "south_half"}, north]
     halves = replace(blast, scenario=Scenario.from_document(document, "halves")).run()
-    for images in zip(*(map(images_of, map(facades, (bare, halves)))), strict=True):
+    for images in zip(*(map(images_of, map(facades, (unprotected, halves)))), strict=True):
         one, two = map(values_of, images)
         np.testing.assert_array_equal(one, two)
-    words = {facades(each).get_suptitle() for each in (bare, halves)}
+    words = {facades(each).get_suptitle() for each in (unprotected, halves)}
     assert all("walls of hut" in text for text in words)
     assert len(values_of(images_of(facades(halves, "north_half"))[0])[0]) == part["rows"]
 
 
-def test_neighbouring_walls_share_a_corner(walled: GasResult) -> None:
+def test_neighbouring_walls_share_a_corner(protected: GasResult) -> None:
     """As one walks round: the west wall's right end is the south wall's left end."""
-    panels = facades(walled).axes[:4]
+    panels = facades(protected).axes[:4]
     assert [axes.get_xlabel() for axes in panels] == ["y (m)", "x (m)", "y (m)", "x (m)"]
     ends = [axes.get_xlim() for axes in panels]
     assert ends == [(5.0, 3.0), (6.0, 8.0), (3.0, 5.0), (8.0, 6.0)]
@@ -237,9 +241,9 @@ def test_neighbouring_walls_share_a_corner(walled: GasResult) -> None:
 
 @pytest.mark.usefixtures("laid_out")
 def test_walls_with_and_without_a_barrier_have_one_scale(
-    bare: GasResult, walled: GasResult
+    unprotected: GasResult, protected: GasResult
 ) -> None:
-    figure = facades(walled, beside=bare)
+    figure = facades(protected, beside=unprotected)
     images = images_of(figure)
     assert len(images) == 8
     assert len({id(image.norm) for image in images}) == 1
@@ -269,7 +273,7 @@ def test_words_of_a_barrier_keep_each_number_with_its_item() -> None:
     ]
 
 
-def test_a_wall_that_does_not_count_says_so(bare: GasResult) -> None:
+def test_a_wall_that_does_not_count_says_so(unprotected: GasResult) -> None:
     section = {**hut().model_dump()["structures"][0], "faces": ["west"]}
     scenario = hut(structures=[section])
     short = GasEngine(margin_m=1.0, until=1e-3)
@@ -277,20 +281,22 @@ def test_a_wall_that_does_not_count_says_so(bare: GasResult) -> None:
     marked = ["does not count" in axes.get_title() for axes in figure.axes[:4]]
     assert marked == [False, True, True, True]
     with pytest.raises(UnknownNameError, match="did you mean 'hut'"):
-        facades(bare, "hat")
+        facades(unprotected, "hat")
 
 
 # Gauges.
 
 
 @pytest.mark.usefixtures("laid_out")
-def test_a_history_ends_at_the_impulse_of_its_gauge(bare: GasResult, walled: GasResult) -> None:
-    figure = gauge_history(walled, "behind", beside=bare)
+def test_a_history_ends_at_the_impulse_of_its_gauge(
+    unprotected: GasResult, protected: GasResult
+) -> None:
+    figure = gauge_history(protected, "behind", beside=unprotected)
     upper, lower = figure.axes
     assert upper.get_ylabel() == "overpressure (kPa)"
     assert lower.get_ylabel() == "impulse up to then (Pa·s)"
     assert lower.get_xlabel() == "time since the detonation (ms)"
-    for k, result in enumerate((bare, walled)):
+    for k, result in enumerate((unprotected, protected)):
         row = result.gauges.set_index("name").loc["behind"]
         pressure = np.asarray(upper.lines[k].get_ydata())
         impulse = np.asarray(lower.lines[k].get_ydata())
@@ -299,8 +305,8 @@ def test_a_history_ends_at_the_impulse_of_its_gauge(bare: GasResult, walled: Gas
     assert_all_is_on_the_page(figure)
 
 
-def test_the_free_field_is_kingery_bulmashs_at_the_gauges_distance(bare: GasResult) -> None:
-    figure = gauge_history(bare, "front", free_field=True)
+def test_the_free_field_is_kingery_bulmashs_at_the_gauges_distance(unprotected: GasResult) -> None:
+    figure = gauge_history(unprotected, "front", free_field=True)
     distance_m = np.sqrt(3.75**2 + 2 * 0.25**2)
     peak_kpa = np.asarray(figure.axes[0].lines[1].get_ydata()).max()
     impulse = np.asarray(figure.axes[1].lines[1].get_ydata())[-1]
@@ -313,7 +319,7 @@ def test_the_free_field_is_kingery_bulmashs_at_the_gauges_distance(bare: GasResu
     words = legend.get_texts()[1].get_text()
     assert words.startswith("Kingery-Bulmash, free field, incident at 3.8 m: peak ")
     with pytest.raises(UnknownNameError, match="did you mean 'front'"):
-        gauge_history(bare, "frost")
+        gauge_history(unprotected, "frost")
 
 
 # Films.

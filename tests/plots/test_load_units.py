@@ -19,12 +19,12 @@ WALL = ((1, 0), (2, 0))
 
 
 @pytest.fixture(scope="module")
-def bare() -> BlastResult:
+def unprotected() -> BlastResult:
     return simulate(small_scenario(), seed=0, engine="event")
 
 
 @pytest.fixture(scope="module")
-def walled() -> BlastResult:
+def protected() -> BlastResult:
     return simulate(small_scenario(), WALL, seed=0, engine="event")
 
 
@@ -41,12 +41,12 @@ def texts(figure: matplotlib.figure.Figure) -> str:
 
 
 def test_a_load_spread_evenly_over_the_seen_width_is_that_of_the_structure(
-    bare: BlastResult,
+    unprotected: BlastResult,
 ) -> None:
-    unit = bare.load_unit
-    (building,) = (each for each in bare.obstacles if each.protected)
-    pa_s = bare.impulse(building.name).pa_s
-    width_m = seen_width_m(building.rectangle_m, bare.blast.scene.charge.position_m)
+    unit = unprotected.load_unit
+    (building,) = (each for each in unprotected.obstacles if each.protected)
+    pa_s = unprotected.impulse(building.name).pa_s
+    width_m = seen_width_m(building.rectangle_m, unprotected.blast.scene.charge.position_m)
     each = building.impulse * MODULE_SIDE_M / width_m
     assert unit.factor * each == pytest.approx(pa_s)
     assert unit.of_structure(building) == f"{pa_s:,.0f} Pa s"
@@ -61,33 +61,33 @@ def test_without_a_calibration_loads_stay_in_simulation_units(uncalibrated: Blas
 
 
 def test_maps_without_and_with_a_barrier_have_one_scale_in_pa_s(
-    bare: BlastResult, walled: BlastResult
+    unprotected: BlastResult, protected: BlastResult
 ) -> None:
-    scale = common_scale([walled, bare])
-    figures = [heat_map(each, scale=scale) for each in (bare, walled)]
+    scale = common_scale([protected, unprotected])
+    figures = [heat_map(each, scale=scale) for each in (unprotected, protected)]
     ends = [figure.axes[-1].get_ylim() for figure in figures]
     assert ends[0] == ends[1] == (0.0, scale.full)
     assert scale.full == nice_ceiling(scale.full)
     assert all("Pa s" in texts(figure) for figure in figures)
-    assert f"{walled.impulse('building').pa_s:,.0f} Pa s from" in texts(figures[1])
-    assert "Pa s" in texts(impulse_over_time(bare))
+    assert f"{protected.impulse('building').pa_s:,.0f} Pa s from" in texts(figures[1])
+    assert "Pa s" in texts(impulse_over_time(unprotected))
 
 
-def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(bare: BlastResult) -> None:
-    unit = bare.load_unit
-    full = scale_end([bare], unit)
+def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(unprotected: BlastResult) -> None:
+    unit = unprotected.load_unit
+    full = scale_end([unprotected], unit)
     assert full is not None
     assert unit.factor * full == pytest.approx(nice_ceiling(unit.factor * full))
 
 
-def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult) -> None:
+def test_frames_say_what_has_come_so_far_and_what_one_seed_is(unprotected: BlastResult) -> None:
     """The line with the loads changes from frame to frame; the site below it is the same."""
-    unit = bare.load_unit
-    painter = FramePainter(bare.blast, unit=unit)
-    balls = bare.final_balls
-    begun = painter.paint(balls, bare.blast.scene.obstacles(), 0.0)
-    ended = painter.paint(balls, bare.obstacles, 0.0)
-    site = bare.blast.scene.site_m
+    unit = unprotected.load_unit
+    painter = FramePainter(unprotected.blast, unit=unit)
+    balls = unprotected.final_balls
+    begun = painter.paint(balls, unprotected.blast.scene.obstacles(), 0.0)
+    ended = painter.paint(balls, unprotected.obstacles, 0.0)
+    site = unprotected.blast.scene.site_m
     top = painter.sheet.pixel(site.left, site.top)[1] - 4
     changed = np.argwhere((begun[:top] != ended[:top]).any(axis=2))
     assert len(changed) > 0
@@ -96,11 +96,14 @@ def test_frames_say_what_has_come_so_far_and_what_one_seed_is(bare: BlastResult)
 
 
 def test_films_beside_each_other_say_each_blast_s_own_load(
-    bare: BlastResult, walled: BlastResult
+    unprotected: BlastResult, protected: BlastResult
 ) -> None:
     """The law of a calibration is no straight line: one factor for both would be wrong."""
-    shared = bare.load_unit.with_loads_of(walled.load_unit)
-    (building,) = (each for each in walled.obstacles if each.protected)
-    assert shared.of_structure(building) == f"{walled.impulse('building').pa_s:,.0f} Pa s"
-    assert bare.load_unit.of_structure(building) != shared.of_structure(building)
-    assert (shared.factor, shared.label) == (bare.load_unit.factor, bare.load_unit.label)
+    shared = unprotected.load_unit.with_loads_of(protected.load_unit)
+    (building,) = (each for each in protected.obstacles if each.protected)
+    assert shared.of_structure(building) == f"{protected.impulse('building').pa_s:,.0f} Pa s"
+    assert unprotected.load_unit.of_structure(building) != shared.of_structure(building)
+    assert (shared.factor, shared.label) == (
+        unprotected.load_unit.factor,
+        unprotected.load_unit.label,
+    )

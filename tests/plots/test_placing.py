@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.frames import FramePainter
 from blast_env.plots.placing import PlacingPainter, sources_text
 from blast_env.plots.plan import EXPLOSIVE, FREE_CELL
@@ -24,9 +24,11 @@ def pixels_of(frame: np.ndarray, colour: tuple[int, int, int]) -> int:
 
 def test_free_cells_are_told_from_cells_that_are_not() -> None:
     painter = PlacingPainter(SCENARIO, SCENARIO.charge)
-    empty = pixels_of(painter.paint(Placement.empty(SCENARIO)), FREE)
-    one = pixels_of(painter.paint(Placement.of(SCENARIO, LAYOUT[:1])), FREE)
-    full = pixels_of(painter.paint(Placement.of(SCENARIO, [(r, 0) for r in range(10)][:10])), FREE)
+    empty = pixels_of(painter.paint(LayoutState.empty(SCENARIO)), FREE)
+    one = pixels_of(painter.paint(LayoutState.of(SCENARIO, LAYOUT[:1])), FREE)
+    full = pixels_of(
+        painter.paint(LayoutState.of(SCENARIO, [(r, 0) for r in range(10)][:10])), FREE
+    )
     assert empty > one > full > 0
 
 
@@ -34,7 +36,7 @@ def test_free_cells_are_told_from_cells_that_are_not() -> None:
 def test_frames_of_the_blast_have_the_same_size(width_px: int) -> None:
     painter = PlacingPainter(SCENARIO, SCENARIO.charge, width_px=width_px)
     width, height = painter.size_px
-    assert painter.paint(Placement.empty(SCENARIO)).shape == (height, width, 3)
+    assert painter.paint(LayoutState.empty(SCENARIO)).shape == (height, width, 3)
     for layout in ((), LAYOUT):
         blast = Blast(SCENARIO, layout)
         frames = FramePainter(blast, width_px=width_px, height_px=height)
@@ -42,7 +44,7 @@ def test_frames_of_the_blast_have_the_same_size(width_px: int) -> None:
 
 
 def test_a_known_charge_is_a_star_and_a_hidden_one_a_line_or_a_veil() -> None:
-    placement = Placement.empty(SCENARIO)
+    placement = LayoutState.empty(SCENARIO)
     known = PlacingPainter(SCENARIO, SCENARIO.charge).paint(placement)
     road = PlacingPainter(SCENARIO, (ROAD,)).paint(placement)
     park = PlacingPainter(SCENARIO, (PARK,)).paint(placement)
@@ -55,7 +57,7 @@ def test_a_known_charge_is_a_star_and_a_hidden_one_a_line_or_a_veil() -> None:
 
 def test_lines_are_written() -> None:
     painter = PlacingPainter(SCENARIO, SCENARIO.charge)
-    placement = Placement.empty(SCENARIO)
+    placement = LayoutState.empty(SCENARIO)
     frames = [painter.paint(placement, lines) for lines in ((), ("a",), ("a", "b"))]
     assert (frames[0] != frames[1]).any()
     assert (frames[1] != frames[2]).any()

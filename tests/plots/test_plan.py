@@ -17,7 +17,7 @@ from blast_env.geometry import Rectangle
 from blast_env.io.export import LayoutPlan
 from blast_env.io.export.dxf import drawing
 from blast_env.io.export.files import feature_collection
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import vehicle_reach
 from blast_env.plots.labels import Label, labels_of, settled_labels
 from blast_env.plots.placing import PlacingPainter, sources_text
@@ -60,7 +60,7 @@ def test_a_new_condition_of_the_zone_is_in_all_pictures_and_drawings() -> None:
     assert "soft ground" in [text.get_text() for text in figure.legends[0].get_texts()]
     fills = [patch.get_facecolor()[:3] for patch in figure.axes[0].patches]
     assert tuple(np.array(COLOUR) / 255.0) in fills
-    frame = PlacingPainter(site, site.charge).paint(Placement.empty(site))
+    frame = PlacingPainter(site, site.charge).paint(LayoutState.empty(site))
     assert (frame == COLOUR).all(axis=2).sum() > 1000
     svg = plan_svg(PixelView.of(site, 600, 400), site, (), None)
     assert 'fill="#0102fa"' in svg

@@ -44,11 +44,11 @@ def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(
 
 def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(study: Study) -> None:
     pair = study.pair(study.targets[0], study.threats[0], 0.25)
-    bare = pair.bare
-    assert bare.counted.source is PeakSource.CURVE
-    limit = Limit("hut", peak_pa=0.5 * (bare.peak_pa + bare.counted.pa))
-    assert bare.peak_pa < limit.peak_pa < bare.counted.pa
-    assert not limit.is_kept(bare)
-    words = f"(Kingery-Bulmash reflected; gas {bare.peak_pa / 1e3:.0f})"
+    unprotected = pair.unprotected
+    assert unprotected.counted.source is PeakSource.CURVE
+    limit = Limit("hut", peak_pa=0.5 * (unprotected.peak_pa + unprotected.counted.pa))
+    assert unprotected.peak_pa < limit.peak_pa < unprotected.counted.pa
+    assert not limit.is_kept(unprotected)
+    words = f"(Kingery-Bulmash reflected; gas {unprotected.peak_pa / 1e3:.0f})"
     assert words in report_html(study, ["blast-env"])
     assert [each.pair for each in verdict_of(study).limits] == [pair]

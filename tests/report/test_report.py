@@ -77,19 +77,19 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     result = blast_env.simulate(glazed_hut(), LAYOUT, engine="gas")
     (row,) = result.structures.to_dict("records")
     pair = study.pair(target, threat, 0.5)
-    assert pair.walled.impulse_pa_s == pytest.approx(row["impulse_pa_s"])
-    assert pair.walled.peak_pa == row["peak_pa"]
-    assert pair.walled.arrival_s == row["arrival_s"]
-    assert pair.walled.wall == row["most_loaded_face"]
-    assert pair.walled.wall_impulse_pa_s == pytest.approx(row["most_loaded_pa_s"])
-    assert pair.walled == measured.loads["hut"]
+    assert pair.protected.impulse_pa_s == pytest.approx(row["impulse_pa_s"])
+    assert pair.protected.peak_pa == row["peak_pa"]
+    assert pair.protected.arrival_s == row["arrival_s"]
+    assert pair.protected.wall == row["most_loaded_face"]
+    assert pair.protected.wall_impulse_pa_s == pytest.approx(row["most_loaded_pa_s"])
+    assert pair.protected == measured.loads["hut"]
     assert 0.1 < pair.reduction < 0.5
     assert {each.cells for each in study.pairs} == {0.5, 0.25}
     fine = study.pair(target, threat, 0.25)
     errors = study.errors(fine)
     assert study.grid_error == errors.reduction
     assert errors.reduction == pytest.approx(convergence_index(fine.reduction, pair.reduction))
-    both = (each.walled.impulse_pa_s for each in (fine, pair))
+    both = (each.protected.impulse_pa_s for each in (fine, pair))
     assert errors.walled_pa_s == pytest.approx(convergence_index(*both))
     assert np.isnan(study.errors(pair).reduction)  # of the coarser cells there is none
     digests = dict(study.digests)
@@ -116,11 +116,11 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
         GasBlast(small_hut(), layout, charge=threat.charge).run().impulse("hut").pa_s
         for layout in ((), LAYOUT, LAYOUT[1:])
     ]
-    bare, whole, without = impulses
+    unprotected, whole, without = impulses
     worths = {each.name: each.worth for each in study.items}
     first, second, third, last = (layout_text([each]) for each in LAYOUT)
     assert worths.keys() == {first, second, third, last}
-    assert worths[first] == pytest.approx((without - whole) / bare)
+    assert worths[first] == pytest.approx((without - whole) / unprotected)
     assert [each.worth for each in study.items] == sorted(worths.values(), reverse=True)
     # The charge is in the middle before the wall: both halves are worth alike, but for rounding.
     assert worths[first] == pytest.approx(worths[last], rel=0.05)
@@ -131,8 +131,8 @@ def test_worth_of_a_module_is_what_comes_back_without_it(study: Study) -> None:
 def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: Study) -> None:
     outcomes = study.masses["T1"]
     assert [each.threat.name for each in outcomes] == ["2.5 kg", "5 kg", "10 kg"]
-    bare = [each.unprotected_load for each in outcomes]
-    assert bare == sorted(bare)
+    unprotected = [each.unprotected_load for each in outcomes]
+    assert unprotected == sorted(unprotected)
     (place,) = study.places
     assert place.load == outcomes[1].load
     (point,) = study.front
@@ -163,7 +163,7 @@ def test_page_needs_nothing_else(page: str) -> None:
 def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: str) -> None:
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
     pm, errors = "\N{PLUS-MINUS SIGN}", study.errors(fine)
-    assert f"<td>{fine.bare.impulse_pa_s:.0f} {pm} {errors.bare_pa_s:.1f}</td>" in page
+    assert f"<td>{fine.unprotected.impulse_pa_s:.0f} {pm} {errors.bare_pa_s:.1f}</td>" in page
     assert f"<td>{100 * fine.reduction:.1f} % {pm} {100 * errors.reduction:.1f}</td>" in page
     assert small_hut().content_hash in page
     assert "<code>blast-env report &#34;a site.toml&#34;</code>" in page
@@ -189,10 +189,10 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
 
 def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
-    assert fine.walled.wall_impulse_pa_s < 300.0 < fine.bare.wall_impulse_pa_s
+    assert fine.protected.wall_impulse_pa_s < 300.0 < fine.unprotected.wall_impulse_pa_s
     whole, *limits = re.findall(r'<span class="(\w+)">([^<]+)</span>', page)
-    assert fine.bare.flagged  # 6.8 cells per m/kg^(1/3)
-    assert fine.walled.flagged
+    assert fine.unprotected.flagged  # 6.8 cells per m/kg^(1/3)
+    assert fine.protected.flagged
     assert whole[1] in ("COMPLIES (flagged)", "DOES NOT COMPLY")
     assert limits == [("fail", "does not comply"), ("pass", "complies (flagged)")]
     assert ">complies<" not in page
@@ -206,8 +206,8 @@ def test_other_units_and_loads_within_what_was_checked(study: Study, page: str) 
     other = replace(study, notes=(), options=replace(study.options, units=UNITS["psi"]))
     changed = report_html(other, ["blast-env"])
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
-    assert f"<td>{fine.bare.impulse_pa_s / 6.894757:.1f} \N{PLUS-MINUS SIGN} " in changed
-    assert f"<td>{fine.bare.peak_pa / 6894.757:.1f}</td>" in changed
+    assert f"<td>{fine.unprotected.impulse_pa_s / 6.894757:.1f} \N{PLUS-MINUS SIGN} " in changed
+    assert f"<td>{fine.unprotected.peak_pa / 6894.757:.1f}</td>" in changed
     assert "Impulses in psi·ms, overpressures in psi" in changed
     assert "No load in this report is outside that range." in changed
 
@@ -288,7 +288,7 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     (line,) = verdict.buildings
     assert line.levels[0] <= line.levels[1]
     assert (line.panes, line.panels) == (8, 4)
-    assert verdict.passes == (study.walled.passes(study.target) and verdict.limits[0].kept)
+    assert verdict.passes == (study.protected.passes(study.target) and verdict.limits[0].kept)
     first = page[page.index("<h3>Verdict") : page.index("<h2>")]
     assert f">{verdict.word}<" in first
     assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
@@ -339,7 +339,10 @@ def test_details_come_from_a_file_and_options_have_precedence(tmp_path: Path) ->
 
 def test_a_barrier_that_adds_load_is_named(study: Study) -> None:
     pairs = tuple(
-        replace(each, bare=replace(each.bare, impulse_pa_s=0.9 * each.walled.impulse_pa_s))
+        replace(
+            each,
+            unprotected=replace(each.unprotected, impulse_pa_s=0.9 * each.protected.impulse_pa_s),
+        )
         for each in study.pairs
     )
     page = report_html(replace(study, pairs=pairs), [])
@@ -356,9 +359,11 @@ def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
 def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) -> None:
     empty = Consequences(())
     options = replace(study.options, limits=())
-    bare = replace(study, bare=empty, walled=empty, walled_coarse=empty, options=options)
-    assert verdict_of(bare).word == "NO VERDICT"
-    page = report_html(bare, ["blast-env"])
+    unprotected = replace(
+        study, unprotected=empty, protected=empty, walled_coarse=empty, options=options
+    )
+    assert verdict_of(unprotected).word == "NO VERDICT"
+    page = report_html(unprotected, ["blast-env"])
     assert "no building has a facade" in page
     assert "Loads of the protected buildings" in page
 
@@ -369,7 +374,7 @@ def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) ->
     for words in ("without a barrier", "with the layout"):
         assert digests[f"T1 {words}, cells of 0.25 m"][:16] in table
     fine = study.pair(study.targets[0], study.threats[0], 0.25)
-    assert f"{fine.walled.impulse_pa_s:.0f} Pa\N{MIDDLE DOT}s" in table.replace(" Pa s", " Pa·s")
+    assert f"{fine.protected.impulse_pa_s:.0f} Pa\N{MIDDLE DOT}s" in table.replace(" Pa s", " Pa·s")
     assert "bill of quantities" in table
 
 
@@ -463,7 +468,7 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each part that is told of is one that was counted, and no blast runs twice."""
-    told: list[str] = []
+    seen: list[str] = []
     charges: list[Any] = []
     blasts: list[Any] = []
     run = GasBlast.run
@@ -475,9 +480,9 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
 
     monkeypatch.setattr(GasBlast, "run", counted_run)
     options = replace(study.options, front=None, stills=0, cache=tmp_path)
-    run_study(small_hut(), LAYOUT, options, lambda label, _: told.append(label))
+    run_study(small_hut(), LAYOUT, options, lambda label, _: seen.append(label))
     parts = blasts_of(small_hut(), LAYOUT, options, study.threats)
-    assert set(told) == {each.label for each in parts if each.charges}
+    assert set(seen) == {each.label for each in parts if each.charges}
     assert Counter(charges) == Counter(charge for each in parts for charge in each.charges)
     assert len(charges) == len(set(blasts)) == 4 + 4 + len(LAYOUT)
     fewer = blasts_of(small_hut(), LAYOUT, replace(options, items=False), study.threats)

@@ -9,7 +9,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Rectangle
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue, find_component
-from blast_env.response.facade import Bay, FilledBay, divide, force_words, respond, sharpened
+from blast_env.response.facade import Bay, FilledBay, divide, force_words, peak_corrected, respond
 from blast_env.response.glass import GlazingCondition, Interlayer
 from blast_env.response.walls import panel_responses
 
@@ -88,7 +88,7 @@ def test_sharper_histories_keep_their_impulse(factor: float, lasts_s: float) -> 
     time_s = np.arange(0.0, 0.2, 0.001)
     gone_s = time_s - 0.02
     history = 1e4 * np.clip(1.0 + gone_s / 0.004, 0.0, 1.0) * np.clip(1.0 - gone_s / lasts_s, 0, 1)
-    times_s, (sharper,) = sharpened(time_s, history[np.newaxis], factor)
+    times_s, (sharper,) = peak_corrected(time_s, history[np.newaxis], factor)
     assert np.trapezoid(sharper, times_s) == pytest.approx(np.trapezoid(history, time_s), rel=0.08)
     assert sharper.max() == pytest.approx(factor * history.max(), rel=0.15)
 

@@ -15,7 +15,7 @@ from blast_env.design.rules import random_layout, wall_near_charge
 from blast_env.design.search import layouts_by_rule
 from blast_env.evaluation import BlastEvaluator, Case, Evaluators, LoadCase, draw_threats
 from blast_env.io.export import LayoutPlan
-from blast_env.layout import LayoutFile, Placement, check_layout, usable_cells
+from blast_env.layout import LayoutFile, LayoutState, check_layout, usable_cells
 from blast_env.site.scene import Charge
 from blast_env.sites import SiteMeasures, turned
 
@@ -39,7 +39,7 @@ PUBLIC = (
 GIVEN_BY_THE_CALLER = {
     "Observable",  # what an observation is given
     "TrainedAgent",
-    "Placement",  # whose constructor checks nothing: `of` does
+    "LayoutState",  # whose constructor checks nothing: `of` does
 }
 
 
@@ -90,8 +90,8 @@ def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> No
     "call",
     [
         lambda it: blast_env.site.scenario_hash(it),
-        lambda it: Placement.of(it, [(0, 0)]).cells,
-        lambda it: Placement.empty(it).free.tolist(),
+        lambda it: LayoutState.of(it, [(0, 0)]).cells,
+        lambda it: LayoutState.empty(it).free.tolist(),
         lambda it: usable_cells(it).tolist(),
         lambda it: check_layout(it, [(1, 1)]),
         lambda it: LayoutFile.of(it, [(1, 1)]),

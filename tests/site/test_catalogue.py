@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from blast_env.errors import LayoutError
 from blast_env.evaluation.engines import simulate
 from blast_env.geometry import Piece, Rectangle
-from blast_env.layout import LayoutFile, Placement, load_layout, write_layout
+from blast_env.layout import LayoutFile, LayoutState, load_layout, write_layout
 from blast_env.layout.build_scene import build_scene, build_site
 from blast_env.site import (
     Scenario,
@@ -142,7 +142,7 @@ def test_everything_wrong_with_a_catalogue_is_named_at_once() -> None:
 
 
 def test_pieces_cover_cells_and_have_heights() -> None:
-    placement = Placement.of(yard(), WALL)
+    placement = LayoutState.of(yard(), WALL)
     assert placement.cells[:3] == ((5, 1), (6, 1), (7, 1))
     assert [module.height_m for module in placement.modules] == [2.0] * 6 + [1.0]
     names = {module.piece for module in placement.modules}
@@ -175,14 +175,14 @@ def test_without_a_catalogue_actions_are_cells() -> None:
 
 def test_a_cost_area_raises_the_share_of_a_piece_inside() -> None:
     """Two of three modules on ground that costs twice as much: five thirds."""
-    placement = Placement.of(
+    placement = LayoutState.of(
         yard(cost_areas=[{**AREA, "cost_factor": 2.0}]), [Piece(0, 0, "wall"), Piece(5, 0, "post")]
     )
     assert placement.cost == pytest.approx(6.0 * 5.0 / 3.0 + 1.0, rel=1e-15)
 
 
 def test_the_stock_of_the_zone_bounds_all_items_together() -> None:
-    placement = Placement.of(yard(stock=2), WALL[:2])
+    placement = LayoutState.of(yard(stock=2), WALL[:2])
     assert (placement.stock_left, placement.stocks_left, placement.is_full) == (0, (0, 0, 0), True)
     assert placement.explain(WALL[2]) == "the stock of 2 pieces is used up"
 
@@ -196,7 +196,7 @@ def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None
     """In every state on the way to a full zone, for every piece there could be."""
     scenario = buildable(document)
     rng = np.random.default_rng(seed)
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     catalogue = placement.catalogue
     while not placement.is_full:
         legal = placement.legal.ravel()
@@ -213,7 +213,7 @@ def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None
         placement = before.place(catalogue.element(int(rng.choice(np.flatnonzero(legal)))))
         assert (placement.legal <= before.legal).all()
     shuffled = [placement.layout[i] for i in rng.permutation(len(placement.layout))]
-    again = Placement.of(scenario, shuffled)
+    again = LayoutState.of(scenario, shuffled)
     assert (again.legal == placement.legal).all()
     assert again.cost == placement.cost
 
@@ -235,7 +235,7 @@ def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None
 )
 def test_explanations_name_piece_cell_and_reason(piece: Piece, words: str) -> None:
     scenario = yard(keep_outs=[{**AREA, "corner_m": (3.5, 9.0), "reason": "a tree"}], budget=3.5)
-    placement = Placement.of(scenario, [Piece(5, 4, "basket")])
+    placement = LayoutState.of(scenario, [Piece(5, 4, "basket")])
     turned = ", turned," if piece.turned else ""
     expected = f"{piece.item!r} at cell ({piece.row}, {piece.column}){turned} {words}"
     assert (placement.explain(piece) or "").startswith(expected)
@@ -244,7 +244,7 @@ def test_explanations_name_piece_cell_and_reason(piece: Piece, words: str) -> No
 
 
 def test_an_item_that_may_not_be_turned_is_not() -> None:
-    placement = Placement.empty(yard(items=changed(0, rotatable=False)))
+    placement = LayoutState.empty(yard(items=changed(0, rotatable=False)))
     assert placement.explain(Piece(0, 0, "wall", True)) == (
         "'wall' at cell (0, 0), turned, may not be turned: it is not rotatable"
     )
@@ -253,13 +253,13 @@ def test_an_item_that_may_not_be_turned_is_not() -> None:
 def test_a_piece_that_closes_the_way_is_refused() -> None:
     scenario = yard(access_way={"width_m": 1.0, "between": "left_right"}, budget=100.0)
     walls = [Piece(row, 2, "wall", True) for row in (0, 3, 6)]
-    placement = Placement.of(scenario, [*walls, Piece(12, 2, "basket")])
+    placement = LayoutState.of(scenario, [*walls, Piece(12, 2, "basket")])
     assert placement.explain(Piece(9, 2, "post")) is None
     closing = Piece(10, 2, "post")
     words = "would close the access way of 1 m from left to right"
     assert placement.explain(closing) == f"'post' at cell (10, 2) {words}"
     with pytest.raises(LayoutError, match=f"'basket' at cell \\(12, 2\\) {words}"):
-        Placement.of(scenario, [*walls, closing, Piece(12, 2, "basket")])
+        LayoutState.of(scenario, [*walls, closing, Piece(12, 2, "basket")])
 
 
 @pytest.mark.parametrize(
@@ -284,7 +284,7 @@ def test_a_piece_that_closes_the_way_is_refused() -> None:
 )
 def test_what_is_no_layout_is_refused(layout: Any, words: str) -> None:
     with pytest.raises(LayoutError, match=f"^{re.escape(words)}"):
-        Placement.of(yard(), layout)
+        LayoutState.of(yard(), layout)
 
 
 # --- Layout files.
@@ -334,7 +334,7 @@ def test_bad_layout_files_are_named(tmp_path: Path, content: Document, words: st
 
 def test_the_barrier_of_a_site_has_the_heights_of_its_pieces() -> None:
     barrier = build_site(yard(), WALL).structures[-1]
-    assert barrier.cells == Placement.of(yard(), WALL).cells
+    assert barrier.cells == LayoutState.of(yard(), WALL).cells
     assert barrier.heights_m == (2.0,) * 6 + (1.0,)
     assert barrier.height_m == 2.0
     pieces = [part.piece for part in barrier.build().parts]
@@ -360,13 +360,13 @@ def test_gas_goes_over_each_piece_at_its_own_height() -> None:
         (4, 1): 1.0,
     }
     of_structure = dict(iter(result.modules.groupby("structure")["piece"]))
-    pieces = {module.piece for module in Placement.of(yard(), WALL).modules}
+    pieces = {module.piece for module in LayoutState.of(yard(), WALL).modules}
     assert set(of_structure["barrier"]) == pieces
     assert set(of_structure["hut"]) == {""}
-    bare = simulate(yard(), engine="gas").impulse("hut").pa_s
+    unprotected = simulate(yard(), engine="gas").impulse("hut").pa_s
     low = yard(items=changed(0, height_m=0.5))
     behind = [simulate(each, WALL[:2], engine="gas").impulse("hut").pa_s for each in (yard(), low)]
-    assert behind[0] < 0.9 * bare
+    assert behind[0] < 0.9 * unprotected
     assert behind[0] < 0.95 * behind[1]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.errors import LayoutError
 from blast_env.geometry import Cell
-from blast_env.layout import Placement, usable_cells
+from blast_env.layout import LayoutState, usable_cells
 from blast_env.site import Scenario
 from tests.site.documents import minimal_document
 from tests.site.zones import area, filled, structure, zone_scenario
@@ -15,7 +15,7 @@ from tests.site.zones import area, filled, structure, zone_scenario
 
 def test_budget_can_be_spent_to_the_last_of_it() -> None:
     # Three times 0.1 is more than 0.3 in floating-point numbers.
-    placement = Placement.of(zone_scenario(module_cost=0.1, budget=0.3), [(0, 0), (0, 1)])
+    placement = LayoutState.of(zone_scenario(module_cost=0.1, budget=0.3), [(0, 0), (0, 1)])
     assert placement.free.sum() == 62
     full = placement.place((0, 2))
     assert full.is_full
@@ -25,7 +25,7 @@ def test_budget_can_be_spent_to_the_last_of_it() -> None:
 
 def test_cells_too_dear_for_the_rest_of_the_budget_are_not_free() -> None:
     duct = area(0.0, 0.0, 1.0, 4.0, module_cost=3.0, reason="duct")
-    placement = Placement.empty(zone_scenario(budget=4.5, cost_areas=[duct]))
+    placement = LayoutState.empty(zone_scenario(budget=4.5, cost_areas=[duct]))
     assert placement.free.all()
     after = placement.place((0, 0)).place((0, 7))
     assert (after.cost, after.budget_left) == (4.0, 0.5)
@@ -38,7 +38,7 @@ def test_cells_too_dear_for_the_rest_of_the_budget_are_not_free() -> None:
 def test_highest_cost_counts_where_areas_overlap_and_areas_may_be_cheap() -> None:
     duct = area(0.0, 0.0, 1.0, 1.0, module_cost=3.0, reason="duct")
     slab = area(0.5, 0.5, 1.25, 1.0, module_cost=0.5, reason="foundation slab")
-    costs = Placement.empty(zone_scenario(cost_areas=[slab, duct])).module_costs
+    costs = LayoutState.empty(zone_scenario(cost_areas=[slab, duct])).module_costs
     # The slab reaches half into column 3.
     assert costs[:4, :5].tolist() == [
         [3.0, 3.0, 1.0, 1.0, 1.0],
@@ -75,7 +75,7 @@ def test_clearance_is_rounded_at_corners() -> None:
 def test_module_moves_the_access_way_to_the_other_side() -> None:
     """Three rows, and a vehicle that is two cells wide and may change rows before and after."""
     way = {"width_m": 1.0, "between": "left_right"}
-    placement = Placement.empty(zone_scenario(rows=3, stock=24, access_way=way))
+    placement = LayoutState.empty(zone_scenario(rows=3, stock=24, access_way=way))
     assert placement.free.tolist() == [[True] * 8, [False] * 8, [True] * 8]
     after = placement.place((0, 3))
     assert np.flatnonzero(after.free[0]).tolist() == [0, 1, 2, 4, 5, 6, 7]
@@ -86,7 +86,7 @@ def test_module_moves_the_access_way_to_the_other_side() -> None:
 def test_vehicle_may_drive_over_keep_outs() -> None:
     way = {"width_m": 1.0, "between": "bottom_top"}
     path = area(0.0, 0.0, 1.0, 4.0, reason="path")
-    placement = Placement.empty(zone_scenario(access_way=way, keep_outs=[path], stock=48))
+    placement = LayoutState.empty(zone_scenario(access_way=way, keep_outs=[path], stock=48))
     assert placement.free[:, 2:].all()
     assert len(filled(placement.scenario, np.random.default_rng(0)).cells) == 48
 
@@ -116,7 +116,7 @@ def test_cell_has_its_reason(cell: Cell, words: str | None) -> None:
         access_way={"width_m": 2.0, "between": "left_right"},
     )
     # Four rows are left above the module, just enough for the vehicle, and three below it.
-    placement = Placement.of(scenario, [(3, 4)])
+    placement = LayoutState.of(scenario, [(3, 4)])
     assert placement.explain(cell) == words
     if words is not None:
         with pytest.raises(LayoutError, match=f"^{re.escape(words)}$"):
@@ -124,23 +124,23 @@ def test_cell_has_its_reason(cell: Cell, words: str | None) -> None:
 
 
 def test_used_stock_is_the_reason_wherever_the_site_allows_a_module() -> None:
-    placement = Placement.of(zone_scenario(stock=2), [(0, 0), (1, 1)])
+    placement = LayoutState.of(zone_scenario(stock=2), [(0, 0), (1, 1)])
     assert (placement.is_full, placement.stock_left) == (True, 0)
     assert placement.explain((3, 4)) == "the stock of 2 modules is used up"
     assert placement.explain((1, 1)) == "cell (1, 1) is taken by a module"
-    single = Placement.of(zone_scenario(stock=1), [(0, 0)])
+    single = LayoutState.of(zone_scenario(stock=1), [(0, 0)])
     assert single.explain((3, 4)) == "the stock of 1 module is used up"
 
 
 def test_charge_keeps_its_cells_free() -> None:
-    placement = Placement.empty(zone_scenario(corner_m=[1.0, 1.0]))
+    placement = LayoutState.empty(zone_scenario(corner_m=[1.0, 1.0]))
     # The charge is at (2, 2) m, the corner of four cells, and 0.5 m in radius.
     assert (~placement.usable).sum() == 4
     assert (placement.explain((1, 1)) or "").endswith("where the charge may be (charge[0])")
 
 
 def test_nothing_can_be_placed_without_a_build_zone() -> None:
-    placement = Placement.empty(Scenario.from_document(minimal_document(), "test"))
+    placement = LayoutState.empty(Scenario.from_document(minimal_document(), "test"))
     assert placement.free.shape == placement.usable.shape == (0, 0)
     assert (placement.is_full, placement.stock_left, placement.cost) == (True, 0, 0.0)
     assert placement.budget_left is None

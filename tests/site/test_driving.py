@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.design.posts import line_of_posts
+from blast_env.design.bollards import line_of_posts
 from blast_env.geometry import Piece, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import vehicle_drive, worst_places
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.crash_rating import CrashRating
@@ -288,18 +288,18 @@ def test_stand_off_is_what_the_ratings_leave_and_explained() -> None:
     strong, weak = (rated_site(f"V/7200[N2A]/{km_h}/90:0.0") for km_h in (64, 48))
     assert worst_stand_off_m(strong) == pytest.approx(7.0)
     assert worst_stand_off_m(weak) == pytest.approx(1.0)
-    (text,) = Placement.of(weak, PIECES).explain_vehicles()
+    (text,) = LayoutState.of(weak, PIECES).explain_vehicles()
     assert "in at (1, " in text
     assert "with 5" in text
     assert "rated 7200 kg at 48 km/h (V/7200[N2A]/48/90:0.0)" in text
-    (text,) = Placement.of(strong, PIECES).explain_vehicles()
+    (text,) = LayoutState.of(strong, PIECES).explain_vehicles()
     assert "comes as near as 7.0 m" in text
     assert "through" not in text
 
 
 def worst_stand_off_m(scenario: Scenario) -> float:
     (source,) = scenario.vehicles
-    placement = Placement.of(scenario, PIECES)
+    placement = LayoutState.of(scenario, PIECES)
     return worst_places(scenario, source, placement.layout).stand_off_m
 
 

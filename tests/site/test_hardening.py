@@ -10,7 +10,7 @@ import pytest
 from blast_env.errors import LayoutError
 from blast_env.geometry import Measure, Piece, layout_counts, layout_words, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities, element_table
-from blast_env.layout import Placement, load_layout, write_layout
+from blast_env.layout import LayoutState, load_layout, write_layout
 from blast_env.plots.plan import barrier_features
 from blast_env.site import Scenario, ScenarioError
 from tests.catalogue_sites import WALL, yard_document
@@ -37,7 +37,7 @@ def glazed_yard(*hardening: dict[str, Any], **objective: Any) -> Scenario:
 
 
 def test_a_measure_covers_no_cell_and_can_be_taken_once() -> None:
-    placement = Placement.empty(glazed_yard())
+    placement = LayoutState.empty(glazed_yard())
     numbers = [each.is_measure for each in placement.catalogue.variants]
     legal = placement.legal[np.array(numbers)]
     assert legal.shape[0] == 2
@@ -66,7 +66,7 @@ def test_a_measure_is_no_piece_in_words() -> None:
 
 def test_measures_take_from_the_budget() -> None:
     scenario = Scenario.from_document(document({**GLASS, "cost": 16.0}, PANELS), "yard")
-    placement = Placement.of(scenario, [TAKEN])
+    placement = LayoutState.of(scenario, [TAKEN])
     assert placement.budget_left == pytest.approx(4.0)
     with pytest.raises(LayoutError, match="only 4 of the budget of 20 is left"):
         placement.place(WALL[0])
@@ -74,16 +74,16 @@ def test_measures_take_from_the_budget() -> None:
 
 def test_bays_get_what_measures_put_there() -> None:
     scenario = glazed_yard()
-    bare, glazed = scenario.bays, scenario.bays_with([TAKEN, *WALL[:1]])
-    assert [each.bay for each in bare] == [each.bay for each in glazed]
-    for before, after in zip(bare, glazed, strict=True):
+    unprotected, glazed = scenario.bays, scenario.bays_with([TAKEN, *WALL[:1]])
+    assert [each.bay for each in unprotected] == [each.bay for each in glazed]
+    for before, after in zip(unprotected, glazed, strict=True):
         assert before.glazing is not None
         assert after.glazing is not None
         assert after.glazing.interlayer is not None
         assert (after.glazing.width_m, after.glazing.sill_m) == (1.0, before.glazing.sill_m)
         assert after.wall == before.wall
     panels = scenario.bays_with([Measure.named("panels")])
-    changed = {each.bay.wall for each, old in zip(panels, bare, strict=True) if each != old}
+    changed = {each.bay.wall for each, old in zip(panels, unprotected, strict=True) if each != old}
     assert changed == {"west", "east"}
 
 
@@ -149,9 +149,9 @@ def test_a_probability_of_the_target_counts_for_no_hash() -> None:
 
 
 def test_hash_is_as_ever_where_nothing_of_it_is_used() -> None:
-    bare = document()
-    del bare["build_zone"]["hardening"]
-    with_facade = Scenario.from_document(bare, "yard")
+    unprotected = document()
+    del unprotected["build_zone"]["hardening"]
+    with_facade = Scenario.from_document(unprotected, "yard")
     plain = Scenario.from_document(yard_document(), "yard")
     assert with_facade.content_hash == plain.content_hash
     assert glazed_yard().content_hash != plain.content_hash  # there is more to be built

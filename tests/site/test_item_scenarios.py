@@ -8,7 +8,7 @@ from blast_env.design.rules import random_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.gas.settings import CHECKED_CELLS
 from blast_env.geometry import Layout, Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import worst_places
 from blast_env.site import Scenario
 
@@ -46,7 +46,7 @@ def test_cells_are_as_fine_as_the_charge_was_checked_with(name: str) -> None:
 def test_random_layouts_spend_most_of_the_budget(name: str) -> None:
     scenario = load_scenario(name)
     rng = np.random.default_rng(0)
-    placements = [Placement.of(scenario, random_layout(scenario, rng)) for _ in range(8)]
+    placements = [LayoutState.of(scenario, random_layout(scenario, rng)) for _ in range(8)]
     assert all(placement.is_full for placement in placements)
     costs = [placement.cost for placement in placements]
     assert np.mean(costs) > 0.8 * (scenario.zone.budget or np.inf)
@@ -60,7 +60,7 @@ def stand_off_m(scenario: Scenario, layout: Layout) -> float:
 def test_a_barrier_beside_the_gate_keeps_the_vehicle_from_the_hotel() -> None:
     scenario = load_scenario("hotel_forecourt")
     beside = (Piece(8, 5, "concrete_road_barrier", True),)
-    Placement.of(scenario, beside)  # the fire brigade still gets through
+    LayoutState.of(scenario, beside)  # the fire brigade still gets through
     assert stand_off_m(scenario, ()) == pytest.approx(1.0)
     assert stand_off_m(scenario, beside) > 8.0
     ahead = (Piece(8, 0, "concrete_road_barrier", True),)
@@ -70,7 +70,7 @@ def test_a_barrier_beside_the_gate_keeps_the_vehicle_from_the_hotel() -> None:
 def test_one_end_of_the_street_alone_is_closed_in_vain() -> None:
     scenario = load_scenario("shopping_street")
     left, right = Piece(2, 0, "planter_row", True), Piece(2, 36, "planter_row", True)
-    Placement.of(scenario, (left, right))
+    LayoutState.of(scenario, (left, right))
     open_m = stand_off_m(scenario, ())
     assert stand_off_m(scenario, (left,)) == stand_off_m(scenario, (right,)) == open_m < 1.5
     assert stand_off_m(scenario, (left, right)) > 6.0
@@ -81,9 +81,9 @@ def test_a_wall_at_the_visitor_entrance_screens_the_front() -> None:
     scenario = load_scenario("visitor_entrance")
     wall = tuple(Piece(row, 5, "t_wall_3_6", True) for row in (7, 14))
     engine = GasEngine(until=0.03)
-    bare, screened = (
+    unprotected, screened = (
         GasBlast(scenario, layout, 0, engine, None).run().impulse("reception").pa_s
         for layout in ((), wall)
     )
-    assert bare > 400.0
-    assert screened < 0.9 * bare
+    assert unprotected > 400.0
+    assert screened < 0.9 * unprotected

@@ -20,7 +20,7 @@ from blast_env.evaluation.governing import Severity
 from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import clearance_outlines
-from blast_env.layout import Placement, usable_cells
+from blast_env.layout import LayoutState, usable_cells
 from blast_env.layout.build_scene import build_scene, vehicle_reach, worst_places
 from blast_env.plots.facade import damage_view
 from blast_env.plots.plan import Kinds, site_features
@@ -203,7 +203,7 @@ def test_pictures_and_drawings_show_the_outline(tmp_path: Path) -> None:
     assert {place for hole in feature.holes_m for place in hole} == set(COURT)
     layout: Layout = ((0, 0),)
     site_picture(scenario, layout)
-    assert "P" in placing_text(Placement.of(scenario, layout), scenario.charge)
+    assert "P" in placing_text(LayoutState.of(scenario, layout), scenario.charge)
     assert len([each for each in boxes(scenario, layout) if each.name == "museum"]) > 1
     path = tmp_path / "museum.dxf"
     export_layout(LayoutPlan(scenario, layout), path)

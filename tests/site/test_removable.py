@@ -16,9 +16,9 @@ from blast_env.evaluation.cases import visible_case
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece, Removal, layout_words, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
-from blast_env.layout import Placement, load_layout, write_layout
+from blast_env.layout import LayoutState, load_layout, write_layout
 from blast_env.layout.build_scene import build_site, worst_places
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout.placement import load_relevant
 from blast_env.plots.plan import Kinds, site_features
 from blast_env.site import Scenario, ScenarioError
 from tests.catalogue_sites import WALL, yard_document
@@ -43,11 +43,11 @@ def fenced(**zone: Any) -> Scenario:
 def test_a_blast_is_that_of_the_site_without_it() -> None:
     scenario = fenced()
     never = Scenario.from_document(yard_document(), "yard")
-    there, away, bare = (
+    there, away, unprotected = (
         blast_env.simulate(site, layout, engine=SHORT)
         for site, layout in ((scenario, WALL), (scenario, (*WALL, AWAY)), (never, WALL))
     )
-    assert away.digest == bare.digest
+    assert away.digest == unprotected.digest
     assert there.impulse("hut").pa_s < away.impulse("hut").pa_s
     names = [each.name for each in build_site(scenario, (AWAY,)).structures]
     assert names == ["hut"]
@@ -55,16 +55,16 @@ def test_a_blast_is_that_of_the_site_without_it() -> None:
 
 def test_it_is_a_part_of_layouts_that_blasts_meet_and_that_covers_no_cell(tmp_path: Path) -> None:
     scenario = fenced()
-    placement = Placement.of(scenario, (*WALL, AWAY))
+    placement = LayoutState.of(scenario, (*WALL, AWAY))
     assert placement.cost == pytest.approx(13.0 + 3.0)
-    assert placement.cells == Placement.of(scenario, WALL).cells
+    assert placement.cells == LayoutState.of(scenario, WALL).cells
     assert standing(placement.layout) == WALL
-    assert met_by_blasts(placement.layout) == (*WALL, AWAY)
+    assert load_relevant(placement.layout) == (*WALL, AWAY)
     with pytest.raises(LayoutError, match="the stock of 1 'no_fence' is used up"):
         placement.place(AWAY)
     action = placement.catalogue.action(AWAY)
     assert isinstance(placement.catalogue.element(action), Removal)
-    assert isinstance(Placement.of(scenario, [Piece(0, 0, "no_fence")]).layout[0], Removal)
+    assert isinstance(LayoutState.of(scenario, [Piece(0, 0, "no_fence")]).layout[0], Removal)
     path = write_layout(tmp_path / "layout.json", scenario, (*WALL, AWAY))
     content = json.loads(path.read_text())
     assert content["taken_away"] == ["no_fence"]
@@ -97,7 +97,7 @@ def test_a_vehicle_drives_where_it_stood() -> None:
     near = [worst_places(scenario, vehicle, layout).stand_off_m for layout in ((), (AWAY,))]
     assert near[0] == pytest.approx(7.5 - 5.5 + 1.0)  # half its width
     assert near[1] == pytest.approx(1.0)
-    assert "as near as 1.0 m" in Placement.of(scenario, [AWAY]).explain_vehicles()[0]
+    assert "as near as 1.0 m" in LayoutState.of(scenario, [AWAY]).explain_vehicles()[0]
 
 
 def test_environment_and_search_take_it_where_it_pays() -> None:
@@ -105,7 +105,7 @@ def test_environment_and_search_take_it_where_it_pays() -> None:
     scenario = fenced(budget=3.0, items=[{**_ITEM, "cost": 3.0}])
     environment = BlastBarrierEnv(scenario, engine=SHORT)
     _, info = environment.reset(seed=0)
-    action = Placement.empty(scenario).catalogue.action(AWAY)
+    action = LayoutState.empty(scenario).catalogue.action(AWAY)
     assert info["action_mask"][action]
     _, reward, ended, _, info = environment.step(action)
     assert ended  # nothing more can be paid for
@@ -145,7 +145,7 @@ def test_what_cannot_be_taken_away_is_refused(
 def test_without_items_it_is_refused_and_names_do_not_count_for_the_hash() -> None:
     with pytest.raises(ScenarioError, match="removable: must be left out"):
         fenced(items=[], height_m=2.0, stock=3)
-    told = document()
-    told["build_zone"]["removable"][0]["description"] = "the old fence"
-    assert Scenario.from_document(told, "yard").content_hash == fenced().content_hash
+    known_charge = document()
+    known_charge["build_zone"]["removable"][0]["description"] = "the old fence"
+    assert Scenario.from_document(known_charge, "yard").content_hash == fenced().content_hash
     assert fenced().content_hash != fenced(removable=[]).content_hash

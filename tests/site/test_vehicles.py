@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import charge_against, vehicle_reach, worst_places
 from blast_env.site import AnyCharge, VehicleCharge
 from blast_env.site.reach import Reach
@@ -223,7 +223,7 @@ def test_charges_of_one_vehicle_take_one_place_after_the_other() -> None:
 def test_modules_keep_clear_of_the_entries_so_that_it_can_always_enter() -> None:
     zone = gate_site().zone.model_dump() | {"corner_m": [0.5, 0.0]}
     scenario = gate_site(build_zone=zone)
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     assert placement.explain((4, 0)) == "cell (4, 0) is where a vehicle enters (charge[0])"
     entered = np.zeros((16, 4), dtype=bool)
     entered[4:12, :3] = True  # the entry of 4 m, as deep as the vehicle is wide

@@ -10,7 +10,7 @@ from hypothesis import assume
 from hypothesis import strategies as st
 
 from blast_env.geometry import Cell, Piece, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import BuildZone, Scenario, ScenarioError
 from tests.site.documents import Document
 
@@ -55,14 +55,14 @@ def zone_scenario(*structures: Document, **zone: Any) -> Scenario:
     return Scenario.from_document(zone_document(*structures, **zone), "zone")
 
 
-def available(placement: Placement) -> list[Cell]:
+def available(placement: LayoutState) -> list[Cell]:
     """The cells that may take a module, as plain integers."""
     return [(int(row), int(column)) for row, column in np.argwhere(placement.free)]
 
 
-def filled(scenario: Scenario, rng: np.random.Generator) -> Placement:
+def filled(scenario: Scenario, rng: np.random.Generator) -> LayoutState:
     """Modules on free cells drawn at random, until there are none."""
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     while not placement.is_full:
         cells = available(placement)
         placement = placement.place(cells[rng.integers(len(cells))])

@@ -16,7 +16,7 @@ from blast_env.calibration import load_calibration
 from blast_env.envs.observations import FeaturesObservation, GridObservation
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario, SegmentSource
 from blast_env.site.zone import distance_m, source_bounds_m
 from blast_env.sites import Objection, SiteRanges, VisibilityCriterion, draw_site, generate_site
@@ -162,7 +162,7 @@ def test_everything_drawn_from_the_default_ranges_is_valid() -> None:
     # Also what the criterion rejects: nothing is left to the checks of a scenario.
     for seed in range(300):
         site = draw_site(np.random.default_rng(seed), RANGES, "drawn")
-        assert Placement.empty(site).free.any()
+        assert LayoutState.empty(site).free.any()
 
 
 def test_sites_meet_the_criterion_and_most_meet_it_at_once(sites: tuple[Scenario, ...]) -> None:

@@ -12,7 +12,7 @@ from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.geometry import Piece, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import worst_places
 from blast_env.site import Scenario
 from blast_env.sites import (
@@ -84,7 +84,7 @@ def test_a_vehicle_needs_room_in_the_spaces(item_sites: tuple[Scenario, ...]) ->
 
 def test_items_out_of_stock_are_masked(item_sites: tuple[Scenario, ...]) -> None:
     for site in item_sites:
-        placement = Placement.empty(site)
+        placement = LayoutState.empty(site)
         for legal, variant in zip(placement.legal, placement.catalogue.variants, strict=True):
             item = site.zone.items[variant.item]
             assert item.stock > 0 or not legal.any()
@@ -94,8 +94,8 @@ def test_items_out_of_stock_are_masked(item_sites: tuple[Scenario, ...]) -> None
 def test_vehicles_come_near_and_can_be_kept_away(item_sites: tuple[Scenario, ...]) -> None:
     for site in item_sites:
         for source in site.vehicles:
-            bare = worst_places(site, source)
-            assert bare.stand_off_m < site.vehicle_ground(source).entry_stand_off_m - 2.0
+            unprotected = worst_places(site, source)
+            assert unprotected.stand_off_m < site.vehicle_ground(source).entry_stand_off_m - 2.0
 
 
 def test_an_environment_draws_sites_with_and_without_vehicles() -> None:
@@ -140,8 +140,8 @@ def test_a_low_wall_cuts_the_lines_to_the_foot_of_a_building_alone() -> None:
     crossed = lines.cut[:flat] & (lines.height_m[:flat] > 0.0)
     ratio = lines.height_m[2 * flat :][crossed] / lines.height_m[:flat][crossed]
     assert np.allclose(ratio, 5.0)
-    wall = Placement.of(site, [Piece(5, 5, "wall", True)])
-    posts = Placement.of(site, [Piece(row, 5, "post") for row in (5, 6, 7)])
+    wall = LayoutState.of(site, [Piece(5, 5, "wall", True)])
+    posts = LayoutState.of(site, [Piece(row, 5, "post") for row in (5, 6, 7)])
     assert set(wall.cells) == set(posts.cells)
     assert cut_share_of(lines, wall) > cut_share_of(lines, posts) > 0.0
     assert lines.cut_share(wall.cells) >= cut_share_of(lines, wall)

@@ -5,7 +5,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from blast_env.layout import Placement, usable_cells
+from blast_env.layout import LayoutState, usable_cells
 from blast_env.site import Scenario
 from blast_env.sites import SiteMeasures, Visibility, visibility_layout
 from tests.site.test_removable import fenced
@@ -69,7 +69,7 @@ def test_it_keeps_every_condition_and_each_module_adds_less(sites: tuple[Scenari
     for site in sites[:40]:
         lines = Visibility.of(site)
         layout = visibility_layout(site, lines)
-        Placement.of(site, layout)  # raises where a condition is broken
+        LayoutState.of(site, layout)  # raises where a condition is broken
         zone = site.build_zone
         if zone is not None and zone.budget is None:
             cut = [lines.cut_share(layout[:count]) for count in range(len(layout) + 1)]

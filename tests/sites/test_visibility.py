@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import Visibility, visibility_layout
 from tests.sites.cases import COLUMNS, ROWS, block, yard, yard_document
@@ -110,7 +110,7 @@ def test_bundled_scenarios_have_lines_of_sight() -> None:
 def test_the_first_piece_cuts_most_for_its_cost_of_all_that_may_stand() -> None:
     """Piece by piece, by the cells and the height of each."""
     scenario = load_scenario("visitor_entrance")
-    lines, empty = Visibility.of(scenario), Placement.empty(scenario)
+    lines, empty = Visibility.of(scenario), LayoutState.empty(scenario)
     worth = {}
     for action in np.flatnonzero(empty.legal).tolist():
         piece = empty.catalogue.element(action)

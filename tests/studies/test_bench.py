@@ -108,8 +108,8 @@ def test_the_cost_of_a_site_is_that_of_its_blast_and_what_was_told(cost: SiteCos
     assert (cost.site, cost.cells) == ("street_20_m", "uniform")
     assert 1e-6 * cost.cell_updates / cost.cpu_s > 1.0
     assert 100.0 < cost.memory_mb < 1000.0
-    assert cost.told == engine.cost(scenario, draw_charge(scenario, 0))
-    assert 0.5 < cost.told.steps / cost.steps < 2.0
+    assert cost.estimate == engine.cost(scenario, draw_charge(scenario, 0))
+    assert 0.5 < cost.estimate.steps / cost.steps < 2.0
 
 
 def test_the_command_prints_a_row_for_each_site_and_way_of_growing(

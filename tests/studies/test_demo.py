@@ -11,7 +11,7 @@ from blast_env.design.search import ProposerKind, proposers
 from blast_env.design.surrogate import site_of
 from blast_env.evaluation import Case, Evaluation, LoadCase, SeedRange
 from blast_env.io.export import SUFFIXES
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario, save_scenario
 from blast_env.site.scene import Charge
 from studies.demo import (
@@ -65,9 +65,9 @@ def test_it_trains_compares_and_films(tmp_path: Path) -> None:
         assert (settings.out / name).stat().st_size > 0
     cases = comparison.agent.cases
     assert [case.scenario.charge[0].tnt_kg for case in cases] == [0.5, 2.0]
-    assert all(case.threats[0].seed in SeedRange.JUDGEMENT.value for case in cases)
+    assert all(case.threats[0].seed in SeedRange.TEST.value for case in cases)
     for layout in comparison.agent.layouts:
-        assert Placement.of(SITE, layout).layout == layout
+        assert LayoutState.of(SITE, layout).layout == layout
 
 
 def test_a_blast_corrects_the_guess_of_its_layout_and_less_those_of_others() -> None:
@@ -88,11 +88,13 @@ def comparison_of(
 ) -> AgentComparison:
     """Loads by hand, a threat each; without a barrier it is 10 Pa s everywhere."""
     cases = tuple(Case(SITE, (LoadCase(CHARGE, seed),)) for seed in range(len(agent)))
-    bare = np.full((len(agent), 1), 10.0)
+    unprotected = np.full((len(agent), 1), 10.0)
 
     def of(loads: list[float]) -> Evaluation:
         layouts = ((),) * len(agent)
-        return Evaluation(cases, layouts, np.array(loads)[:, None], bare, np.ones_like(bare, bool))
+        return Evaluation(
+            cases, layouts, np.array(loads)[:, None], unprotected, np.ones_like(unprotected, bool)
+        )
 
     rules = {"wall near the charge": rule or random, "wall near the building": other or random}
     methods = {NOTHING: [10.0] * len(agent), RANDOM: random, **rules, AGENT: agent}
@@ -113,8 +115,10 @@ def test_the_verdict_needs_an_interval_above_zero() -> None:
 
 def test_a_row_says_by_how_much_the_agent_is_ahead() -> None:
     """Paired: 20 points in every case leave no spread, however much the cases differ."""
-    bare, random, *_, agent = comparison_of([1.0, 4.0, 2.0, 6.0], [3.0, 6.0, 4.0, 8.0]).rows()
-    assert bare[:5] == ("no barrier", "10", "0.0 %", "0.0 % to 0.0 %", "67.5 %")
+    unprotected, random, *_, agent = comparison_of(
+        [1.0, 4.0, 2.0, 6.0], [3.0, 6.0, 4.0, 8.0]
+    ).rows()
+    assert unprotected[:5] == ("no barrier", "10", "0.0 %", "0.0 % to 0.0 %", "67.5 %")
     assert random[:3] == (RANDOM, "5", "47.5 %")
     assert random[4:] == ("20.0 %", "20.0 % to 20.0 %")
     assert agent[4:] == ("-", "-")

@@ -10,7 +10,7 @@ from blast_env.evaluation import draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines import find_engine
-from blast_env.layout import Placement, load_layout
+from blast_env.layout import LayoutState, load_layout
 from blast_env.response.walls import DamageLevel
 from blast_env.site import load_scenario
 from studies.response import BEAM_DEFLECTION_MM, BEAM_STEEL_DEPTHS_M, beam_response
@@ -23,7 +23,7 @@ def test_what_was_found_is_for_the_site_as_it_is_and_within_its_budget(name: str
     found = load_layout(FOUND / f"{name}.json", scenario)
     budget = scenario.zone.budget
     assert budget is not None
-    assert 0.0 < Placement.of(scenario, found).cost <= budget
+    assert 0.0 < LayoutState.of(scenario, found).cost <= budget
     assert all(each.facade is not None for each in scenario.structures if each.protected)
 
 

@@ -43,7 +43,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.vehicles import source_of
 
@@ -279,7 +279,7 @@ class TrainedAgent:
         check_size(scenario, self.representative)
         episode = self._episode(scenario, charge)
         catalogue = scenario.zone.catalogue
-        placements = [Placement.empty(scenario)] * count
+        placements = [LayoutState.empty(scenario)] * count
         open_ones = [index for index in range(count) if not placements[index].is_full]
         while open_ones:
             # Many layouts have the same beginning: the policy evaluates it once.

@@ -50,7 +50,7 @@ class Selection:
             BlastEnvError: If there are fewer seeds or sites than cases.
         """
         count = settings.evaluation_cases
-        seeds = SeedRange.SELECTION.seeds(settings.evaluation_first_seed, count)
+        seeds = SeedRange.VALIDATION.seeds(settings.evaluation_first_seed, count)
         if isinstance(source, SingleScenario):
             scenarios: Sequence[Scenario] = (source.scenario,) * count
         else:
@@ -117,7 +117,7 @@ def unseen_cases(
         settings: Settings of the run.
         source: Source of the run: its scenario, or generated sites. The sites are the first ones
             of the held-out sites; the last ones selected the weights.
-        seeds: At least one, all distinct, usually of `SeedRange.JUDGEMENT`; each draws the charge,
+        seeds: At least one, all distinct, usually of `SeedRange.TEST`; each draws the charge,
             the fan and the air.
 
     Raises:
@@ -150,6 +150,8 @@ def _cases(
         threats = [*in_turn(scenarios[0], threats)]
     cases = []
     for number, (scenario, threat) in enumerate(zip(scenarios, threats, strict=True), start=1):
-        told = threat.charge if settings.threat == "visible" else None
-        cases.append(Case(scenario, (threat,), charge=told, name=f"{scenario.name} {number}"))
+        known_charge = threat.charge if settings.threat == "visible" else None
+        cases.append(
+            Case(scenario, (threat,), charge=known_charge, name=f"{scenario.name} {number}")
+        )
     return tuple(cases)

@@ -72,7 +72,7 @@ class TrainingSettings(BaseModel):
         evaluation_engine: Engine that selects the best weights; by default that of the training,
             or gas dynamics if a surrogate trains.
         evaluation_first_seed: Offset of the seeds of these threats within the range for the
-            selection of weights (`SeedRange.SELECTION`).
+            selection of weights (`SeedRange.VALIDATION`).
         torch_threads: Threads for the network.
         start_from: Run folder whose best weights initialise the training; `None` for random ones.
     """

@@ -40,7 +40,7 @@ from blast_env.evaluation import Case, Evaluators
 from blast_env.evaluation.evaluator import run_together
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site.scene import Charge
 from blast_env.site.vehicles import source_of
 from blast_env.statistics import reductions
@@ -95,7 +95,7 @@ class Demonstration:
         standing = int(rng.integers(elements + (0 if self._is_full else 1))) if elements else 0
         order = rng.permutation(elements)
         part = tuple(self.layout[index] for index in sorted(order[:standing].tolist()))
-        placement = Placement(self.case.scenario, part)
+        placement = LayoutState(self.case.scenario, part)
         catalogue = placement.catalogue
         legal = np.append(placement.legal.ravel(), True)
         wanted = np.zeros_like(legal)
@@ -105,7 +105,7 @@ class Demonstration:
 
     @cached_property
     def _is_full(self) -> bool:
-        return Placement(self.case.scenario, self.layout).is_full
+        return LayoutState(self.case.scenario, self.layout).is_full
 
     @cached_property
     def _episode(self) -> EpisodeObservation:
@@ -265,7 +265,7 @@ def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]
             known[number][layout] += of_layout
         for number, case in enumerate(cases):
             own = known[number]
-            alive[number].sort(key=lambda each: case.counted(own[each], each))
+            alive[number].sort(key=lambda each: case.objective_value(own[each], each))
             alive[number] = alive[number][: ceil(len(alive[number]) / 2)]
         met = upto
     return [*known]
@@ -300,8 +300,8 @@ class Lessons:
             for case in self.cases
         ]
         whole = slice(None)
-        bare = judge.loads([(case, ()) for case in self.cases], whole)
-        self.labels = [CaseLabel((), each, each) for each in bare]
+        unprotected = judge.loads([(case, ()) for case in self.cases], whole)
+        self.labels = [CaseLabel((), each, each) for each in unprotected]
         return self.improve(judge, range(len(self.cases)), by_rule)
 
     def improve(
@@ -323,11 +323,11 @@ class Lessons:
         for index, met in zip(indices, raced, strict=True):
             case, label = self.cases[index], self.labels[index]
             for layout, load in met.items():
-                bare = label.unprotected[: len(load)]
-                tried.append(_reduction(case, layout, load, bare))
+                unprotected = label.unprotected[: len(load)]
+                tried.append(_reduction(case, layout, load, unprotected))
                 whole = len(load) == len(case.threats)
-                best = case.counted(self.labels[index].load, self.labels[index].layout)
-                if whole and case.counted(load, layout) < best:
+                best = case.objective_value(self.labels[index].load, self.labels[index].layout)
+                if whole and case.objective_value(load, layout) < best:
                     self.labels[index] = replace(label, layout=layout, load=load)
         return tried
 
@@ -543,5 +543,5 @@ def _reduction(
     case: Case, layout: Layout, load: tuple[float, ...], unprotected: tuple[float, ...]
 ) -> float:
     """Return a relative reduction; 0 if nothing arrives without a barrier."""
-    share = reductions(case.counted(load, layout), case.counted(unprotected))
+    share = reductions(case.objective_value(load, layout), case.objective_value(unprotected))
     return float(np.nan_to_num(share))

@@ -99,8 +99,8 @@ class ResultsView:
             self._threats.on_value_change(lambda e: self._set("_threat", e.value))
             for element in (self._pictures, self._threats):
                 element.props("dense outlined options-dense").classes("w-52")
-            bare = ui.switch("compare with no barrier", value=True)
-            bare.on_value_change(lambda e: self._set("_with_bare", e.value))
+            unprotected = ui.switch("compare with no barrier", value=True)
+            unprotected.on_value_change(lambda e: self._set("_with_bare", e.value))
             large = ui.switch("large", value=False)
             large.on_value_change(lambda e: self._set("_large", e.value))
         with ui.element("div").classes("be-results"):

@@ -77,9 +77,9 @@ def load(name: str = "gas_blasts", paths: Sequence[str | Path] = ()) -> "pd.Data
         tables.append(own.assign(table=path_of(path).stem))
     rows = pd.concat(tables, ignore_index=True)
     keys = [*_BLAST, "structure"]
-    bare = rows.loc[rows["layout"] == "[]", [*keys, *_LOADS]].drop_duplicates(keys)
+    unprotected = rows.loc[rows["layout"] == "[]", [*keys, *_LOADS]].drop_duplicates(keys)
     rows = rows.merge(
-        bare.rename(columns={each: f"unprotected_{each}" for each in _LOADS}), "left", keys
+        unprotected.rename(columns={each: f"unprotected_{each}" for each in _LOADS}), "left", keys
     )
     splits = {each: split_of(each) for each in rows["scenario_hash"].unique()}
     rows["split"] = rows["scenario_hash"].map(splits)
@@ -120,6 +120,6 @@ def as_tensors(rows: "pd.DataFrame") -> tuple[Any, Any]:
 
     known = rows.dropna(subset=["unprotected_impulse_pa_s", "unprotected_peak_pa"])
     inputs = known[[*_BLAST[1:], "unprotected_impulse_pa_s", "unprotected_peak_pa"]]
-    bare = known[["unprotected_impulse_pa_s", "unprotected_peak_pa"]].to_numpy()
-    shares = known[list(_LOADS)].to_numpy() / bare
+    unprotected = known[["unprotected_impulse_pa_s", "unprotected_peak_pa"]].to_numpy()
+    shares = known[list(_LOADS)].to_numpy() / unprotected
     return torch.tensor(inputs.to_numpy()).float(), torch.tensor(shares).float()

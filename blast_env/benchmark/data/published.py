@@ -11,7 +11,7 @@ import numpy as np
 from blast_env.benchmark.data.gas_blasts import load
 from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
 from blast_env.evaluation.engines import BlastLoads, StructureLoad, find_engine
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Charge, Scenario
 
 _BLAST: Final = ("layout", "charge_x_m", "charge_y_m", "tnt_kg", "charge_height_m")
@@ -32,7 +32,7 @@ def remember_published(store: BlastStore, scenarios: Iterable[Scenario]) -> int:
     table = table[table["engine"].map(_version) == _version(engine.version)]
     for scenario in scenarios:
         evaluator = BlastEvaluator(scenario, engine, cache=store)
-        catalogue = Placement.empty(scenario).catalogue
+        catalogue = LayoutState.empty(scenario).catalogue
         found: dict[tuple[Any, ...], dict[str, tuple[float, float]]] = defaultdict(dict)
         rows = table[table["scenario_hash"] == scenario.content_hash]
         columns = [rows[name].tolist() for name in (*_BLAST, *_LOADS)]

@@ -19,8 +19,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BudgetError, DesignProblem
 from blast_env.evaluation.consequences import Verdict
 from blast_env.geometry import Layout, Measure
-from blast_env.layout import Placement
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout import LayoutState
+from blast_env.layout.placement import load_relevant
 from blast_env.response.damage import worst
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import generator
@@ -60,7 +60,7 @@ class Tried:
 
     Attributes:
         worth: Value of the objective with its target: at most 1 if it passes; see
-            `ObjectiveSection.counted`.
+            `ObjectiveSection.objective_value`.
         cost: Its cost, in the unit of the zone's budget.
         damage: The worst damage of all components under all charges, from 0 to 5; see
             `blast_env.response.damage`.
@@ -185,11 +185,11 @@ def advise(
     def drawn() -> Iterator[Layout]:
         yield ()
         for layout in begin_with:
-            yield met_by_blasts(layout)
+            yield load_relevant(layout)
         if _items_of(scenario, kind):
-            bare = scenario.zone.model_copy(update={"hardening": ()})
-            unhardened = scenario.model_copy(update={"build_zone": bare})
-            ruled = layouts_by_rule(unhardened, problem.told)
+            unprotected = scenario.zone.model_copy(update={"hardening": ()})
+            unhardened = scenario.model_copy(update={"build_zone": unprotected})
+            ruled = layouts_by_rule(unhardened, problem.known_charge)
             yield from ruled.values()
             yield from against_each(unhardened, problem.case.charges)
             for layout in ruled.values():
@@ -197,7 +197,7 @@ def advise(
             while True:
                 ranked = sorted(best, key=lambda each: best[each])[:_KEPT]
                 chosen = ranked[int(rng.integers(len(ranked)))]
-                yield met_by_blasts(_changed(moves, chosen, rng))
+                yield load_relevant(_changed(moves, chosen, rng))
 
     tries = 0
     try:
@@ -305,7 +305,7 @@ def _hardened(
     """
     names = [each.name for each in scenario.zone.hardening]
     counts = range(len(names) + 1) if len(names) <= _MOST_LOOKED_AT else (0, 1, len(names))
-    placement = Placement(scenario, barrier)
+    placement = LayoutState(scenario, barrier)
     left = placement.budget_left
     prices = {each.name: each.cost for each in scenario.zone.hardening}
     found: list[Tried] = []

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import BoolArray
 from blast_env.design.rules import random_element
 from blast_env.geometry import Element, Layout, Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Catalogue, Scenario
 
 Draw = Callable[[Scenario, np.random.Generator], Layout]
@@ -20,14 +20,14 @@ Draw = Callable[[Scenario, np.random.Generator], Layout]
 _LEAST_WALL: Final = 2
 
 
-def legal_part(scenario: Scenario, layout: Iterable[Element]) -> Placement:
+def legal_part(scenario: Scenario, layout: Iterable[Element]) -> LayoutState:
     """Return the placement of a layout, in its order, without its illegal elements.
 
     Args:
         scenario: The scenario.
         layout: Modules or pieces; those on cells outside the zone are illegal.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     for element in layout:
         if _is_legal(placement, element):
             placement = placement.place(element)
@@ -41,14 +41,14 @@ def random_walls(scenario: Scenario, rng: np.random.Generator) -> Layout:
     isolated modules. A wall ends at the first illegal cell, and walls are added until the stock is
     used up. With a catalogue, each wall consists of one item, drawn at random, in line.
     """
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     grow = _with_pieces if placement.catalogue.has_items else _with_modules
     while not placement.is_full:
         placement = grow(placement, rng)
     return placement.layout
 
 
-def _with_modules(placement: Placement, rng: np.random.Generator) -> Placement:
+def _with_modules(placement: LayoutState, rng: np.random.Generator) -> LayoutState:
     """Add a straight wall of modules in any direction."""
     row, column = random_element(placement, rng)[:2]
     angle = rng.uniform(0.0, pi)
@@ -59,7 +59,7 @@ def _with_modules(placement: Placement, rng: np.random.Generator) -> Placement:
     return _as_far_as_legal(placement, [(cell[0], cell[1]) for cell in cells])
 
 
-def _with_pieces(placement: Placement, rng: np.random.Generator) -> Placement:
+def _with_pieces(placement: LayoutState, rng: np.random.Generator) -> LayoutState:
     """Add pieces of one item in line, from one end to the other."""
     first = random_element(placement, rng)
     variant = placement.catalogue.variant(first)
@@ -72,7 +72,7 @@ def _with_pieces(placement: Placement, rng: np.random.Generator) -> Placement:
     return _as_far_as_legal(placement, wall)
 
 
-def _as_far_as_legal(placement: Placement, wall: Iterable[Element]) -> Placement:
+def _as_far_as_legal(placement: LayoutState, wall: Iterable[Element]) -> LayoutState:
     """Place the elements of a wall up to the first illegal one."""
     for element in wall:
         if not _is_legal(placement, element):
@@ -81,7 +81,7 @@ def _as_far_as_legal(placement: Placement, wall: Iterable[Element]) -> Placement
     return placement
 
 
-def _is_legal(placement: Placement, element: Element) -> bool:
+def _is_legal(placement: LayoutState, element: Element) -> bool:
     """Return whether an element may be placed; one outside the zone may not."""
     rows, columns = placement.usable.shape
     row, column = element[:2]
@@ -147,7 +147,7 @@ class Moves:
 
     def _added(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Add an element near an existing one, or move one if none may be added."""
-        placement = Placement(self.scenario, layout)
+        placement = LayoutState(self.scenario, layout)
         if placement.is_full:
             return self._moved(layout, rng) if layout else layout
         if not layout:
@@ -160,14 +160,14 @@ class Moves:
     def _moved(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Move an element near its present place or near another element; its item is kept."""
         index = int(rng.integers(len(layout)))
-        rest = Placement(self.scenario, _without(layout, index))
+        rest = LayoutState(self.scenario, _without(layout, index))
         to_another = len(layout) > 1 and rng.random() < 0.5
         beside = _any_of(rest.layout, rng) if to_another else layout[index]
         return rest.place(self._near(rest, beside, rng, layout[index], like=layout[index])).layout
 
     def _swapped(self, layout: Layout, rng: np.random.Generator) -> Layout:
         """Remove an element and place another one at random."""
-        rest = Placement(self.scenario, _without(layout, int(rng.integers(len(layout)))))
+        rest = LayoutState(self.scenario, _without(layout, int(rng.integers(len(layout)))))
         return rest.place(random_element(rest, rng)).layout
 
     def _exchanged(self, layout: Layout, rng: np.random.Generator) -> Layout:
@@ -179,7 +179,7 @@ class Moves:
         there, rest = layout[index], _without(layout, index)
         if rest and rng.random() < 0.5:
             rest = _without(rest, int(rng.integers(len(rest))))
-        placement = Placement(self.scenario, rest)
+        placement = LayoutState(self.scenario, rest)
         wanted = 1 + int(rng.integers(3))
         while wanted and not placement.is_full:
             placement = placement.place(self._near(placement, there, rng, there))
@@ -205,7 +205,7 @@ class Moves:
 
     def _near(
         self,
-        placement: Placement,
+        placement: LayoutState,
         beside: Element,
         rng: np.random.Generator,
         but: Element | None = None,
@@ -252,7 +252,9 @@ class Moves:
         return found
 
 
-def _of_one_item(placement: Placement, rng: np.random.Generator, like: Element | None) -> BoolArray:
+def _of_one_item(
+    placement: LayoutState, rng: np.random.Generator, like: Element | None
+) -> BoolArray:
     """Return the legal places (variants, rows, columns) of one item.
 
     It is the item of `like`, or a random one if that has no legal place or `like` is `None`.

@@ -15,7 +15,7 @@ from blast_env.design.search.moves import Moves, legal_part
 from blast_env.design.search.session import SearchSession
 from blast_env.errors import LayoutError, import_extra
 from blast_env.geometry import Element, Layout
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 
 with import_extra("search", "genetic search"):
@@ -147,7 +147,7 @@ def repaired(scenario: Scenario, layout: Layout, rng: np.random.Generator) -> La
         kept = rng.choice(len(layout), size=stock, replace=False)
         layout = tuple(layout[index] for index in sorted(kept))
     try:
-        return Placement.of(scenario, layout).layout
+        return LayoutState.of(scenario, layout).layout
     except LayoutError:
         order = rng.permutation(len(layout))
         return legal_part(scenario, [layout[index] for index in order]).layout

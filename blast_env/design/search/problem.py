@@ -33,8 +33,8 @@ class Candidate:
 
     def reduction(self, problem: DesignProblem) -> float:
         """Return the relative reduction of the load, under the threats of the candidate."""
-        bare = problem.case.counted(problem.unprotected[: self.threats])
-        return reductions(self.load, bare).item()
+        unprotected = problem.case.objective_value(problem.unprotected[: self.threats])
+        return reductions(self.load, unprotected).item()
 
 
 @dataclass(frozen=True)

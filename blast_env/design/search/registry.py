@@ -84,7 +84,7 @@ def _rules(module: str, *titles: str, needs: Collection[Need] = ()) -> Mapping[s
 _METHODS: Final = "blast_env.design.search.methods"
 _EVOLUTION: Final = "blast_env.design.search.evolution"
 _RULES: Final = "blast_env.design.rules"
-_POSTS: Final = "blast_env.design.posts"
+_POSTS: Final = "blast_env.design.bollards"
 
 _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
     {
@@ -217,7 +217,7 @@ class RuleProposer:
             BlastEnvError: If the rule has no layout for the site, for example without a line of
                 sight.
         """
-        layout = tuple(sorted(self.rule(problem.scenario, problem.told)))
+        layout = tuple(sorted(self.rule(problem.scenario, problem.known_charge)))
         return SearchResult(layout, self.name, budget=budget, seed=seed)
 
 
@@ -239,4 +239,4 @@ def layouts_by_rule(scenario: AnyScenario, charge: AnyCharge | None = None) -> d
 
 def rule_layouts(problem: DesignProblem) -> tuple[Layout, ...]:
     """Return the distinct layouts of the rules for a problem."""
-    return tuple(dict.fromkeys(layouts_by_rule(problem.scenario, problem.told).values()))
+    return tuple(dict.fromkeys(layouts_by_rule(problem.scenario, problem.known_charge).values()))

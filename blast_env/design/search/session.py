@@ -13,7 +13,7 @@ from blast_env.design.search.problem import Candidate, Progress, Report, SearchR
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem
 from blast_env.geometry import Layout
-from blast_env.layout.placement import met_by_blasts
+from blast_env.layout.placement import load_relevant
 from blast_env.values import generator
 
 LAYOUTS_PER_REALISATION: Final = 500
@@ -269,7 +269,7 @@ class SearchSession:
         Measures that harden facades need no blasts.
         """
         return {
-            (met_by_blasts(key), number)
+            (load_relevant(key), number)
             for key in layouts
             for number in range(len(self._known.get(key, ())), threats)
         } - self._met
@@ -310,7 +310,7 @@ class SearchSession:
         return Candidate(self.blasts, key, load, threats, self.problem.cost(key))
 
     def _load(self, key: Layout, threats: int) -> float:
-        return self.problem.case.counted(self._known[key][:threats], key)
+        return self.problem.case.objective_value(self._known[key][:threats], key)
 
 
 @dataclass(frozen=True)

@@ -302,14 +302,14 @@ def predictions(
     counts, solids = samples.counts[chosen], samples.solids[chosen]
     points = np.repeat(chosen, samples.counts)
     starts = np.cumsum([0, *counts[:-1]])
-    told = networks.messages(
+    messages = networks.messages(
         surrogate.related(samples.relations[np.repeat(chosen, samples.counts * samples.solids)])
     )
-    heard = np.zeros((len(told), points.sum(), told.shape[2]))
+    heard = np.zeros((len(messages), points.sum(), messages.shape[2]))
     first = 0
     for start, count, number in zip(starts, counts, solids, strict=True):
-        own = told[:, first : first + number * count]
-        own = own.reshape(len(told), number, count, -1)
+        own = messages[:, first : first + number * count]
+        own = own.reshape(len(messages), number, count, -1)
         heard[:, start : start + count] = own.sum(axis=1)
         first += number * count
     differs = networks(surrogate.scaled(samples.features[points]), heard)

@@ -396,11 +396,11 @@ class Surrogate:
                 related[number] = own[np.newaxis]
         networks = senders[0].networks
         rows = np.concatenate([each.reshape(-1, RELATIONS) for each in related])
-        told = networks.messages(self.related(rows))
+        messages = networks.messages(self.related(rows))
         ends = np.cumsum([each.shape[0] * each.shape[1] for each in related])
         return [
             own.reshape(len(own), *each.shape[:2], MESSAGE).sum(axis=1)
-            for own, each in zip(np.split(told, ends[:-1], axis=1), related, strict=True)
+            for own, each in zip(np.split(messages, ends[:-1], axis=1), related, strict=True)
         ]
 
     def scaled(self, features: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Case, DesignProblem, LoadCase
-from blast_env.evaluation.cases import one_of_each_charge, practice_hidden, practice_visible
+from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import generator
@@ -75,7 +75,7 @@ class Guesses:
         if new:
             by_threat = [self._weighted(new, threat) for threat in self.case.threats]
             for layout, loads in zip(new, np.transpose(by_threat), strict=True):
-                self._known[layout] = self.case.counted(loads, layout)
+                self._known[layout] = self.case.objective_value(loads, layout)
         return np.array([self._known[each] for each in layouts])
 
     @property
@@ -191,7 +191,7 @@ class LearntSearch(Search):
             if report is not None:
                 report(Progress(0, 0, guessed=share))
 
-        layout = self.at_once(problem.scenario, problem.told, tell)
+        layout = self.at_once(problem.scenario, problem.known_charge, tell)
         return SearchResult(layout, self.name, seed=seed)
 
     def at_once(
@@ -232,7 +232,7 @@ class LearntSearch(Search):
         plan = Plan.of(problem, budget)
         most = len(problem.threats)
         places = min(max(plan.threats, _LEAST_PLACES), most, budget)
-        if self.surrogate is None or problem.told is not None or places == most:
+        if self.surrogate is None or problem.known_charge is not None or places == most:
             return plan
         return Plan(places, budget - min(round(_CHOOSING_SHARE * budget), budget - places))
 
@@ -250,12 +250,16 @@ class LearntSearch(Search):
 
     def explore(self, session: SearchSession) -> None:
         """Simulate the rules' layouts and the agent's samples, then changes of the best."""
-        scenario, told, plan = session.problem.scenario, session.problem.told, session.plan
+        scenario, known_charge, plan = (
+            session.problem.scenario,
+            session.problem.known_charge,
+            session.plan,
+        )
         agent = _given(self.agent)
         count = max(1, round(self.drawn_share * plan.exploring_layouts))
-        session.assess([agent.propose(scenario, told)])
-        session.assess([*layouts_by_rule(scenario, told).values()])
-        session.assess(agent.sample(scenario, told, count, session.seed))
+        session.assess([agent.propose(scenario, known_charge)])
+        session.assess([*layouts_by_rule(scenario, known_charge).values()])
+        session.assess(agent.sample(scenario, known_charge, count, session.seed))
         moves = Moves(scenario)
         while True:
             best = session.ranked(plan.threats)[:_KEPT]
@@ -263,13 +267,13 @@ class LearntSearch(Search):
 
     def _explore_by_guesses(self, session: SearchSession, estimates: "_Estimates") -> None:
         """Simulate the layouts with the best predictions, then changes of the best."""
-        scenario, told = session.problem.scenario, session.problem.told
+        scenario, known_charge = session.problem.scenario, session.problem.known_charge
         guesses = estimates.everywhere
-        rules = layouts_by_rule(scenario, told).values()
+        rules = layouts_by_rule(scenario, known_charge).values()
         proposed: list[Layout] = []
         if self.agent is not None:
-            drawn = self.agent.sample(scenario, told, self.agent_draws, session.seed)
-            proposed = [self.agent.propose(scenario, told), *drawn]
+            drawn = self.agent.sample(scenario, known_charge, self.agent_draws, session.seed)
+            proposed = [self.agent.propose(scenario, known_charge), *drawn]
         session.assess(proposed[:1])
         found = improved(guesses, [(), *rules, *proposed], self.guesses, session.rng)
         layouts = session.plan.exploring_layouts
@@ -311,8 +315,8 @@ def _given(agent: SamplingAgent | None) -> SamplingAgent:
 def case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
     """Return the case of a proposal without blasts: the charge, or some of the possible ones."""
     if charge is not None:
-        return practice_visible(scenario, charge, 1, 0)
-    drawn = practice_hidden(scenario, _DRAWN_CHARGES, 1, 0)
+        return known_search_set(scenario, charge, 1, 0)
+    drawn = hidden_search_set(scenario, _DRAWN_CHARGES, 1, 0)
     return replace(drawn, threats=one_of_each_charge(drawn.threats)[:_HIDDEN_CHARGES])
 
 

@@ -540,7 +540,7 @@ class GasResult:
             "numpy version": known["numpy"],
             "cells": int(np.prod(self.run.grid.shape)),
             "cell updates": self.run.solver.cell_updates,
-            "cells raised to the floor": self.run.solver.lifted,
+            "cells raised to the floor": self.run.solver.floored_cells,
             "steps": self.steps,
             "simulated time (s)": self.time_s,
             "ended because": str(self.end_reason),
@@ -600,6 +600,8 @@ class GasResult:
             waited = self.end_reason is not EndReason.LOADS_KNOWN
             why = str(self.end_reason) if waited else "take until='walls' to wait for it"
             notes.append(f"{NOT_KNOWN}: {why}")
-        if self.run.solver.lifted:
-            notes.append(f"{self.run.solver.lifted} cells were raised to the floor of pressure")
+        if self.run.solver.floored_cells:
+            notes.append(
+                f"{self.run.solver.floored_cells} cells were raised to the floor of pressure"
+            )
         return tuple(notes)

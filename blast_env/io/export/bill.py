@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from blast_env.geometry import Element, Layout, Measure, Piece
-from blast_env.layout import Placement, check_layout
+from blast_env.layout import LayoutState, check_layout
 from blast_env.layout.build_scene import barrier_outline
 from blast_env.plots.plan import Feature, rounded_m, site_features
 from blast_env.provenance import package_version
@@ -166,7 +166,7 @@ def _piece_rows(plan: LayoutPlan) -> Iterator[dict[str, object]]:
 
 def _with_costs(plan: LayoutPlan) -> list[tuple[Element, float]]:
     """Return the elements of a layout, each with its cost at its place."""
-    placement = Placement.of(plan.scenario, plan.layout)
+    placement = LayoutState.of(plan.scenario, plan.layout)
     number, costs = placement.catalogue.variant_number, placement.costs
     return [(each, float(costs[number(each), each[0], each[1]])) for each in placement.layout]
 

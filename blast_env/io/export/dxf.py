@@ -12,7 +12,7 @@ from blast_env.errors import import_extra
 from blast_env.files import write_atomically
 from blast_env.geometry import Piece, Rectangle
 from blast_env.io.export.bill import LayoutPlan
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.labels import Label, settled_labels
 from blast_env.plots.plan import SITE_KINDS, Feature, FeatureKind, Kinds, on_levels
 from blast_env.site import BuildZone
@@ -41,7 +41,7 @@ def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
     lines += _items(plan, zone) if zone.items else [_modules(plan, zone)]
     lines += _conditions(zone)
     if zone.budget is not None:
-        cost = Placement.of(plan.scenario, plan.layout).cost
+        cost = LayoutState.of(plan.scenario, plan.layout).cost
         what = "pieces" if zone.items else "modules"
         lines.append(f"Budget: {_number(zone.budget)}, of which the {what} take {_number(cost)}")
     return tuple(lines)

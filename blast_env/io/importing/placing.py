@@ -1,4 +1,4 @@
-"""Placement of the site on a map: its rectangle, its direction and its objects.
+"""LayoutState of the site on a map: its rectangle, its direction and its objects.
 
 The site has the direction of most walls; the grid is aligned with as many walls as possible.
 """

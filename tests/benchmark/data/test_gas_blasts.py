@@ -36,9 +36,11 @@ def test_a_site_is_in_one_part_only_and_no_part_is_empty(rows: pd.DataFrame) -> 
 
 
 def test_without_a_barrier_a_load_is_that_without_a_barrier(rows: pd.DataFrame) -> None:
-    bare = rows[rows["layout"] == "[]"]
-    assert (bare["unprotected_peak_pa"] > 0.0).all()
-    np.testing.assert_allclose(bare["impulse_pa_s"], bare["unprotected_impulse_pa_s"], rtol=0.01)
+    unprotected = rows[rows["layout"] == "[]"]
+    assert (unprotected["unprotected_peak_pa"] > 0.0).all()
+    np.testing.assert_allclose(
+        unprotected["impulse_pa_s"], unprotected["unprotected_impulse_pa_s"], rtol=0.01
+    )
 
 
 def test_loads_are_positive_and_layouts_can_be_read(rows: pd.DataFrame) -> None:

@@ -36,11 +36,11 @@ def result() -> GasResult:
 
 def test_bays_change_nothing_but_what_is_recorded(result: GasResult) -> None:
     """But for the time that they have to respond."""
-    bare = blast_env.simulate(site(None), engine="gas", charge=CHARGE, until=result.time_s)
-    assert result.digest == bare.digest
-    assert len(bare.bays) == 0
+    unprotected = blast_env.simulate(site(None), engine="gas", charge=CHARGE, until=result.time_s)
+    assert result.digest == unprotected.digest
+    assert len(unprotected.bays) == 0
     with pytest.raises(UnknownNameError, match="no bay"):
-        bare.bay_history("control_room/west/1/1")
+        unprotected.bay_history("control_room/west/1/1")
 
 
 def test_the_bays_of_a_wall_have_its_load(result: GasResult) -> None:

@@ -17,7 +17,7 @@ from blast_env.design.rules import random_layout
 from blast_env.geometry import Rectangle
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import key_of, note_lines, texts_of
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.plots.plan import Kinds
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -32,7 +32,7 @@ PointM = tuple[float, float]
 
 
 def some_cells(scenario: Scenario, count: int) -> tuple[tuple[int, int], ...]:
-    placement = Placement.empty(scenario)
+    placement = LayoutState.empty(scenario)
     for _ in range(count):
         row, column = np.argwhere(placement.free)[0]
         placement = placement.place((int(row), int(column)))
@@ -103,7 +103,7 @@ def test_notes_say_what_has_no_place_on_the_site(tmp_path: Path) -> None:
 
 def test_the_budget_is_there_with_what_the_modules_take(tmp_path: Path) -> None:
     plan = LayoutPlan(JUNCTION, some_cells(JUNCTION, 4))
-    cost = Placement.of(JUNCTION, plan.layout).cost
+    cost = LayoutState.of(JUNCTION, plan.layout).cost
     lines = notes_of(drawn(plan, tmp_path)).plain_text(split=True)
     budget = lines.index(f"Budget: 16, of which the modules take {cost:g}")
     assert lines[budget - 2 : budget] == ["Clearance: none required", "Access way: none required"]
@@ -223,7 +223,7 @@ def test_the_line_is_the_scenario_s_own_rule(tmp_path: Path) -> None:
         [point for piece in line_pieces(outline) for point in piece[:-1]]
         for outline in outlines_of(document, "CLEARANCE")
     ]
-    empty = Placement.empty(GATE)
+    empty = LayoutState.empty(GATE)
     inside = set()
     for cell in zone.cells():
         reason = empty.explain(cell) or ""

@@ -14,7 +14,7 @@ from ezdxf.filemanagement import readfile
 from blast_env import load_scenario
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.bill import BILL_COLUMNS, PIECE_COLUMNS
-from blast_env.layout import Placement, load_layout
+from blast_env.layout import LayoutState, load_layout
 from blast_env.layout.build_scene import build_site
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -64,7 +64,7 @@ def test_the_bill_counts_and_adds_up_at_the_places_prices(tmp_path: Path) -> Non
     assert list(bill["count"]) == [2, 1, 3]
     assert list(bill["in_stock"].dropna()) == [3, 4]
     assert list(bill["cost"]) == [10.0 + 6.0, 2.0, 18.0]
-    assert bill.loc["total", "cost"] == Placement.of(dear.scenario, WALL).cost
+    assert bill.loc["total", "cost"] == LayoutState.of(dear.scenario, WALL).cost
     assert tuple(bill.loc["wall", ["length_m", "height_m", "unit_cost"]]) == (1.5, 2.0, 6.0)
     assert bill.loc["wall", "description"] == "half of a T-wall"
 

@@ -480,10 +480,10 @@ def test_the_bundled_car_park_is_what_the_page_s_command_imports() -> None:
 def test_a_point_with_a_diameter_is_a_circle(tmp_path: Path) -> None:
     tank = charge(30.0, 30.0)
     tank["properties"] = {"man_made": "storage_tank", "diameter": "10 m", "height": "6"}
-    bare = charge(45.0, 30.0)
-    bare["properties"] = {"man_made": "silo"}
+    unprotected = charge(45.0, 30.0)
+    unprotected["properties"] = {"man_made": "silo"}
     house = outline(rectangle(5.0, 5.0, 10.0, 8.0), name="House")
-    path = written(tmp_path, house, tank, bare, charge(40.0, 5.0))
+    path = written(tmp_path, house, tank, unprotected, charge(40.0, 5.0))
     found = imported(path, protect=("House",), rotation_deg=0.0)
     (_, circle) = sorted(found.buildings, key=lambda each: each.protected, reverse=True)
     assert circle.area_m2 == pytest.approx(0.25 * np.pi * 10.0**2, rel=0.04)

@@ -265,10 +265,10 @@ def test_exchanged_longitude_and_latitude_are_refused(tmp_path: Path) -> None:
 
 def test_heights_that_no_file_has_are_guessed_by_neighbours_and_kind(tmp_path: Path) -> None:
     row = [outline(rectangle(12 * k, 10, 8, 6), height=4.0 + 2.0 * k) for k in range(1, 5)]
-    bare = outline(rectangle(72, 10, 8, 6), name="Bare")
+    unprotected = outline(rectangle(72, 10, 8, 6), name="Bare")
     shed = outline(rectangle(72, 20, 4, 4), name="Shed")
     garage = outline(rectangle(84, 20, 6, 6), building="garages", name="Garages")
-    path = written(tmp_path, HOUSE, *row, bare, shed, garage, PLACE)
+    path = written(tmp_path, HOUSE, *row, unprotected, shed, garage, PLACE)
     heights = {each.title: each.height_m for each in imported(path).buildings}
     assert (heights["Bare"], heights["Shed"], heights["Garages"]) == (8.0, 3.0, 3.0)
     low = imported(path, low_heights=True)
@@ -581,9 +581,9 @@ def test_elevation_and_thickness_are_those_of_new_polylines(old: bool, tmp_path:
 def test_strict_refuses_guesses_and_omissions(tmp_path: Path) -> None:
     path = written(tmp_path, HOUSE, PLACE)
     assert imported(path, strict=True).buildings
-    bare = outline(rectangle(10, 0, 6, 4))
+    unprotected = outline(rectangle(10, 0, 6, 4))
     small = outline(rectangle(20, 0, 1, 1))
-    message = error_of(written(tmp_path, HOUSE, bare, small, PLACE), strict=True)
+    message = error_of(written(tmp_path, HOUSE, unprotected, small, PLACE), strict=True)
     assert "--strict allows no guess and no omission" in message
     assert "features[1]" in message
     assert "features[2]" in message
@@ -599,8 +599,8 @@ def test_guesses_about_what_is_not_on_the_site_do_not_count(tmp_path: Path) -> N
 
 
 def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
-    bare = outline(rectangle(10, 0, 6, 4), name="Bare")
-    site = imported(written(tmp_path, HOUSE, bare, PLACE))
+    unprotected = outline(rectangle(10, 0, 6, 4), name="Bare")
+    site = imported(written(tmp_path, HOUSE, unprotected, PLACE))
     (kind,) = site.ledger.record["guessed"]
     (entry,) = site.ledger.record["guessed"][kind]
     assert (entry["place"], entry["name"], entry["position"]) == (

@@ -136,9 +136,9 @@ def test_other_parameters_and_other_engines_are_refused() -> None:
 
 def test_a_scenario_without_a_calibration_says_which_there_are() -> None:
     document = BALLISTIC_COURTYARD.model_dump() | {"calibration": None}
-    bare = Scenario.from_document(document, "bare")
+    unprotected = Scenario.from_document(document, "bare")
     with pytest.raises(CalibrationError, match="ballistic_kb_100kg"):
-        simulate(bare).impulse("building")
+        simulate(unprotected).impulse("building")
     misnamed = Scenario.from_document(document | {"calibration": "balistic_ufc"}, "misnamed")
     with pytest.raises(UnknownNameError, match="did you mean 'ballistic_ufc'"):
         simulate(misnamed).impulse("building")

@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from blast_env.design.posts import line_of_posts, posts_and_wall
+from blast_env.design.bollards import line_of_posts, posts_and_wall
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import worst_places
 from blast_env.site import Scenario, load_scenario
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
@@ -57,7 +57,7 @@ def test_around_a_building_the_ring_is_as_far_out_as_the_stock_reaches() -> None
         scenario = open_site(stock)
         posts = line_of_posts(scenario)
         assert len(posts) <= stock
-        assert Placement.of(scenario, posts)
+        assert LayoutState.of(scenario, posts)
         stand_offs_m.append(stand_off_m(scenario, posts))
     assert stand_offs_m == sorted(stand_offs_m)
     assert stand_offs_m[0] < stand_offs_m[-1] - 2.0
@@ -97,7 +97,7 @@ def test_the_wall_is_added_to_the_posts_and_keeps_the_stand_off() -> None:
     assert both[: len(posts)] == posts
     assert len(both) == 9
     assert stand_off_m(scenario, both) >= stand_off_m(scenario, posts)
-    assert Placement.of(scenario, both)
+    assert LayoutState.of(scenario, both)
 
 
 def test_without_a_vehicle_there_is_no_line_of_posts() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.gas.doubling import DoublingSolver, shape_to_double, with_double_cells
+from blast_env.gas.coarsening import CoarseningSolver, shape_to_double, with_double_cells
 from blast_env.gas.faces import exposed_faces
 from blast_env.gas.grid import FaceKind, GasGrid
 from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
@@ -26,7 +26,7 @@ def site() -> GasGrid:
     solid = np.zeros(shape_to_double((32, 32, 16), 6, 2), dtype=bool)
     solid[14, 10:18, 0:4] = True
     solid[22:30, 10:22, 0:7] = True
-    return GasGrid(CELL_M, solid, skirt=6)
+    return GasGrid(CELL_M, solid, buffer_layers=6)
 
 
 class Run(NamedTuple):
@@ -54,7 +54,7 @@ def run(
         threads=threads,
     )
     set_charge(solver, CHARGE, 2.0)
-    gas: Gas = DoublingSolver(solver, doubled_s) if doubled_s else solver
+    gas: Gas = CoarseningSolver(solver, doubled_s) if doubled_s else solver
     gas.advance(until_s)
     return Run(gas, *looking)
 
@@ -83,7 +83,7 @@ def test_the_skirt_stays_where_it_is() -> None:
     """Its first layer becomes cells of the grid, and the open borders do not move."""
     fine = site()
     grid = with_double_cells(fine)
-    assert grid.skirt == fine.skirt - 1
+    assert grid.buffer_layers == fine.buffer_layers - 1
     for axis in range(3):
         low, high = (1.0 / each.narrowness(axis)[2:-2] for each in (fine, grid))
         assert fine.cell_m * low.sum() == pytest.approx(grid.cell_m * high.sum())
@@ -93,12 +93,12 @@ def test_the_skirt_stays_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("shape", [(31, 30, 13), (32, 33, 16), (5, 6, 7)])
-@pytest.mark.parametrize("skirt", [0, 6])
-def test_a_shape_can_be_doubled(shape: tuple[int, int, int], skirt: int) -> None:
+@pytest.mark.parametrize("buffer_layers", [0, 6])
+def test_a_shape_can_be_doubled(shape: tuple[int, int, int], buffer_layers: int) -> None:
     for times in range(4):
-        more = shape_to_double(shape, skirt, times)
+        more = shape_to_double(shape, buffer_layers, times)
         assert all(0 <= b - a < 2**times for a, b in zip(shape, more, strict=True))
-        grid = GasGrid(CELL_M, np.zeros(more, dtype=bool), skirt=skirt)
+        grid = GasGrid(CELL_M, np.zeros(more, dtype=bool), buffer_layers=buffer_layers)
         for _ in range(times):
             assert all(n % 2 == 0 for n in grid.shape)
             grid = with_double_cells(grid)
@@ -128,7 +128,7 @@ def test_loads_stay_near_those_of_the_smallest_cells() -> None:
 def test_a_mirrored_site_has_the_mirrored_loads() -> None:
     """To rounding in single precision; the charge is in the middle of the site."""
     grid = site()
-    turned = GasGrid(CELL_M, grid.solid[:, ::-1].copy(), skirt=6)
+    turned = GasGrid(CELL_M, grid.solid[:, ::-1].copy(), buffer_layers=6)
     plain = run(DOUBLED_S, 0.02, grid).ground.impulse_pa_s
     other = run(DOUBLED_S, 0.02, turned).ground.impulse_pa_s
     assert other[:, ::-1] == pytest.approx(plain, rel=1e-3, abs=0.1, nan_ok=True)
@@ -138,7 +138,7 @@ def test_a_blast_on_growing_cells_has_about_the_loads_of_uniform_ones() -> None:
     """On a street of 50 m, against cells that are small to the end; for a part of the work."""
     site = street(50.0)
     small, growing = (GasBlast(site, engine=GasEngine(cells=cells)).run() for cells in CELLS[:2])
-    assert isinstance(growing.run.solver, DoublingSolver)
+    assert isinstance(growing.run.solver, CoarseningSolver)
     assert growing.run.solver.current.grid.cell_m == 1.0
     assert growing.run.solver.cell_updates < 0.95 * small.run.solver.cell_updates
     for load, other in zip(small.loads().structures, growing.loads().structures, strict=True):

@@ -5,10 +5,10 @@ import pytest
 
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.gas.grid import GasGrid
-from blast_env.gas.opening import opening_of
 from blast_env.gas.probes import Gauges
 from blast_env.gas.solver import GasSolver
 from blast_env.gas.source import GasCharge, largest_radius_m, set_charge
+from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.geometry import Rectangle
 from blast_env.particles.calibration.references import kingery_bulmash
 from blast_env.site.scene import BlastSite, Charge, Gauge
@@ -26,7 +26,7 @@ def test_the_opening_continues_on_the_grid() -> None:
     solver = GasSolver(grid(), recorders=[gauges], with_fuel=True, burning=charge.burning)
     set_charge(solver, charge, 2.0)
     solver.advance(0.05)
-    opening = opening_of(charge, largest_radius_m(grid(), charge))
+    opening = spherical_stage(charge, largest_radius_m(grid(), charge))
     distance_m = np.hypot(3.75, 0.25)
     assert opening.front_m > 2.0 * distance_m
     assert opening.peak_pa(distance_m) > gauges.peak_pa[0]  # the grid's cells clip it
@@ -37,8 +37,8 @@ def test_the_opening_continues_on_the_grid() -> None:
 
 
 def test_mass_scales_the_opening() -> None:
-    small = opening_of(GasCharge(1.0, (1.0, 2.0, 0.0)), 6.0)
-    large_one = opening_of(GasCharge(8.0, (2.0, 4.0, 0.0)), 12.0)
+    small = spherical_stage(GasCharge(1.0, (1.0, 2.0, 0.0)), 6.0)
+    large_one = spherical_stage(GasCharge(8.0, (2.0, 4.0, 0.0)), 12.0)
     assert large_one.end_s == pytest.approx(2.0 * small.end_s)
     assert large_one.peak_pa(4.0) == pytest.approx(small.peak_pa(2.0), rel=1e-3)
 

@@ -25,7 +25,7 @@ _HALF: Final = 4
 """Number of solid cells, out of eight, that make a cell of twice the side solid."""
 
 
-class DoublingSolver:
+class CoarseningSolver:
     """A gas solver whose cells are doubled at given times.
 
     Args:
@@ -66,9 +66,9 @@ class DoublingSolver:
         return self.current.cell_updates
 
     @property
-    def lifted(self) -> int:
+    def floored_cells(self) -> int:
         """Number of cells raised to the floor of density or pressure."""
-        return self.current.lifted
+        return self.current.floored_cells
 
     @property
     def wall_pressure(self) -> Reals:
@@ -114,22 +114,25 @@ class DoublingSolver:
         faces = exposed_faces(grid, grid.solid)
         self.current = self.current.on_double_cells(grid, faces)
         self._cells = [
-            cells // 2 + (low > 0) for cells, (low, _) in zip(self._cells, fine.skirts, strict=True)
+            cells // 2 + (low > 0)
+            for cells, (low, _) in zip(self._cells, fine.buffer_layers_by_axis, strict=True)
         ]
         self._of_face = nearest_faces(self.faces, self.grid, faces, grid)
         nearest = distance_transform_edt(grid.solid, return_distances=False, return_indices=True)
         self._nearest_air = np.asarray(nearest, dtype=np.int64)
 
 
-def shape_to_double(shape: tuple[int, int, int], skirt: int, times: int) -> tuple[int, int, int]:
+def shape_to_double(
+    shape: tuple[int, int, int], buffer_layers: int, times: int
+) -> tuple[int, int, int]:
     """Extend a shape at its high ends so that its cells can be doubled `times` times.
 
     Args:
         shape: Cells along x, y and z of a grid with ground below and otherwise open borders.
-        skirt: Layers of the skirt; each doubling takes one.
+        buffer_layers: Layers of the skirt; each doubling takes one.
         times: Number of doublings.
     """
-    ends = (2, 2, 1) if skirt else (0, 0, 0)
+    ends = (2, 2, 1) if buffer_layers else (0, 0, 0)
     nx, ny, nz = (n + (2 * taken - n) % 2**times for n, taken in zip(shape, ends, strict=True))
     return nx, ny, nz
 
@@ -141,7 +144,7 @@ def with_double_cells(grid: GasGrid) -> GasGrid:
     """
     nx, ny, nz = (n // 2 for n in grid.shape)
     eighths = grid.solid.reshape(nx, 2, ny, 2, nz, 2).sum(axis=(1, 3, 5))
-    taken = [(int(low > 0), int(high > 0)) for low, high in grid.skirts]
+    taken = [(int(low > 0), int(high > 0)) for low, high in grid.buffer_layers_by_axis]
     origin = [
         at - 2.0 * grid.cell_m * low for at, (low, _) in zip(grid.origin_m, taken, strict=True)
     ]
@@ -150,7 +153,7 @@ def with_double_cells(grid: GasGrid) -> GasGrid:
         cell_m=2.0 * grid.cell_m,
         solid=np.pad(eighths >= _HALF, taken, mode="edge"),
         origin_m=(origin[0], origin[1], origin[2]),
-        skirt=max(grid.skirt - 1, 0),
+        buffer_layers=max(grid.buffer_layers - 1, 0),
     )
 
 

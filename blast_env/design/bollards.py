@@ -13,7 +13,7 @@ from blast_env.arrays import BoolArray
 from blast_env.design.rules import NEAR_CHARGE, wall_added_to
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Cell, Layout, Rectangle
-from blast_env.layout import Placement
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import worst_places
 from blast_env.site import AnyCharge, AnyScenario, Scenario, VehicleSource, find_scenario
 from blast_env.units import MODULE_SIDE_M
@@ -35,7 +35,7 @@ def line_of_posts(
     the largest scaled distance of the nearest vehicle is chosen, and of several the cheapest. Posts
     that do not increase this distance are removed.
 
-    `Placement` checks every post: budget, access way and all other conditions hold.
+    `LayoutState` checks every post: budget, access way and all other conditions hold.
 
     Args:
         scenario: The scenario, or its bundled name or path; it has a build zone and a vehicle.
@@ -87,7 +87,7 @@ class _TheVery:
 
 
 @lru_cache(maxsize=4)
-def _line_on(very: _TheVery) -> Placement:
+def _line_on(very: _TheVery) -> LayoutState:
     """Return the line of posts of a scenario, cached for the two rules that need it."""
     scenario = very.scenario
     scenario.zone  # noqa: B018  # refuses a scenario without one
@@ -96,7 +96,7 @@ def _line_on(very: _TheVery) -> Placement:
             f"{scenario.name} has no vehicle (a source of kind 'vehicle'): no line of posts to set"
         )
     vehicles = _Vehicles(scenario)
-    best = Placement.empty(scenario)
+    best = LayoutState.empty(scenario)
     farthest = vehicles.farthest(best)
     for item, line in product(vehicles.items(), vehicles.lines()):
         placement = vehicles.with_posts(line, item)
@@ -135,7 +135,7 @@ class _Vehicles:
         distance_m = worst_places(scenario, source, layout).stand_off_m
         return float(distance_m / np.cbrt(source.tnt_kg))
 
-    def farthest(self, placement: Placement, without_speed: bool = False) -> float:
+    def farthest(self, placement: LayoutState, without_speed: bool = False) -> float:
         """Return the least scaled distance of all vehicles, m / kg^(1/3).
 
         Args:
@@ -149,9 +149,9 @@ class _Vehicles:
         return min(self.scaled_m(self.scenario, source, placement.layout) for source in sources)
 
     @cached_property
-    def _empty(self) -> Placement:
+    def _empty(self) -> LayoutState:
         """The empty placement."""
-        return Placement.empty(self.scenario)
+        return LayoutState.empty(self.scenario)
 
     @cached_property
     def _without_speed(self) -> tuple[VehicleSource, ...]:
@@ -199,7 +199,7 @@ class _Vehicles:
         variants = self._empty.catalogue.variants
         return sorted({each.item for each in variants if each.stops_vehicles})
 
-    def with_posts(self, line: Line, item: int) -> Placement | None:
+    def with_posts(self, line: Line, item: int) -> LayoutState | None:
         """Return the placement of the fewest posts that close a line, or `None` if none do."""
         placement = self._empty
         for run in line:
@@ -219,12 +219,12 @@ class _Vehicles:
                 end = index + 1
         return placement
 
-    def without_idle_posts(self, placement: Placement) -> Placement:
+    def without_idle_posts(self, placement: LayoutState) -> LayoutState:
         """Return the placement without posts that do not increase the least scaled distance."""
         farthest = self.farthest(placement)
         for post in placement.layout:
             fewer = tuple(each for each in placement.layout if each != post)
-            without = Placement.of(self.scenario, fewer)
+            without = LayoutState.of(self.scenario, fewer)
             if self.farthest(without) > farthest - _TOLERANCE:
                 placement = without
         return placement
@@ -245,7 +245,7 @@ class _Vehicles:
         ]
         return max(posts, key=lambda post: post.length)
 
-    def _is_legal(self, post: _Post, placement: Placement, cell: Cell) -> bool:
+    def _is_legal(self, post: _Post, placement: LayoutState, cell: Cell) -> bool:
         """Return whether a post may be placed with its first module on a cell."""
         on_empty = self.scenario.zone.has(cell) and self._empty.legal[post.variant, *cell]
         if not on_empty:  # then neither on any other placement
@@ -253,7 +253,7 @@ class _Vehicles:
         # A single check, which on a large zone is a thousand times faster than the whole mask.
         return placement.explain(placement.catalogue.element_at(post.variant, *cell)) is None
 
-    def _closed_along(self, run: tuple[Cell, ...], placement: Placement) -> list[int]:
+    def _closed_along(self, run: tuple[Cell, ...], placement: LayoutState) -> list[int]:
         """Return the indices of a run's squares closed to every vehicle, and the run's length."""
         rows, columns = self.span
         row, column = np.transpose(run)

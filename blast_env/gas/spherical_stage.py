@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Opening:
+class SphericalStage:
     """Overpressure over time and distance from the charge until the grid takes over.
 
     Attributes:
@@ -69,7 +69,7 @@ class Opening:
 
 
 @lru_cache(maxsize=4)
-def opening_of(charge: GasCharge, radius_m: float) -> Opening:
+def spherical_stage(charge: GasCharge, radius_m: float) -> SphericalStage:
     """Compute the first stage of a blast, in somewhat less than a second.
 
     Args:
@@ -87,4 +87,6 @@ def opening_of(charge: GasCharge, radius_m: float) -> Opening:
         history = np.zeros((1, 1 + _RADII))
     x_m, y_m, z_m = charge.position_m
     centre_m = (x_m, y_m, 0.0 if charge.on_ground else z_m)
-    return Opening(centre_m, profile.time_s, profile.front_m, history[:, 0], radii, history[:, 1:])
+    return SphericalStage(
+        centre_m, profile.time_s, profile.front_m, history[:, 0], radii, history[:, 1:]
+    )
