@@ -52,7 +52,7 @@ def test_the_module_is_the_command_and_completes_its_words() -> None:
 def test_simulate_prints_loads_with_units_and_writes_all_files(
     sparse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(film, "write_film", partial(film.write_film, frames_per_s=3.0))
+    monkeypatch.setattr(film, "write_film", partial(film.write_film, frames_per_s=0.5))
     names = ("film.mp4", "table.xlsx", "table.parquet", "map.png")
     options = ("--film", "--excel", "--parquet", "--heat-map")
     written = [tmp_path / name for name in names]
