@@ -347,7 +347,8 @@ class Task:
             bool(self.source.representative.vehicles),
         )
         placement = prepared.empty
-        if possible is not scenario or len(options.layout):
+        is_empty = isinstance(options.layout, Sequence) and not options.layout
+        if possible is not scenario or not is_empty:  # another type is refused by name
             placement = LayoutState.of(possible, options.layout)
         return Episode(
             observable=observable,
