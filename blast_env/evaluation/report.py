@@ -228,13 +228,14 @@ class ThreatOutcome:
     @classmethod
     def of(
         cls,
-        scenario: Scenario,
+        scenario: AnyScenario,
         layout: Layout,
         threat: LoadCase,
         loads: BlastLoads,
         unprotected: BlastLoads,
     ) -> Self:
         """Return the outcome of a threat from its loads with a layout and without a barrier."""
+        scenario = find_scenario(scenario)
         charge, elsewhere = (threat.charge_against(scenario, each) for each in (layout, ()))
         return cls(
             threat=threat,

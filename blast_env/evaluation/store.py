@@ -19,7 +19,7 @@ from blast_env.evaluation.engines import BlastLoads, Engine, ParticleLoad, Struc
 from blast_env.geometry import Layout
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.damage import BayDamage
-from blast_env.site import Scenario
+from blast_env.site import AnyScenario, find_scenario
 from blast_env.site.scene import Charge
 from blast_env.store import Store
 
@@ -106,7 +106,7 @@ class BlastStore:
         """Number of damaged blasts found in the file by this object."""
         return 0 if self._file is None else self._file.damaged
 
-    def get(self, key: BlastKey, scenario: Scenario | None = None) -> BlastLoads | None:
+    def get(self, key: BlastKey, scenario: AnyScenario | None = None) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are missing or damaged.
 
         Args:
@@ -120,7 +120,7 @@ class BlastStore:
                 self._loads.move_to_end(key)
             return loads
         loads = self.read(json.dumps(key), _decoded)
-        if loads is None or not (scenario is None or loads.are_for(scenario)):
+        if loads is None or not (scenario is None or loads.are_for(find_scenario(scenario))):
             return None
         self.remember(key, loads)
         return loads

@@ -53,8 +53,8 @@ def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
         ({"risk": "cvra"}, "no risk 'cvra', did you mean 'cvar'"),
         ({"risk": "cvar", "cvar_level": 1.0}, "cvar_level is 1, must be"),
         ({"cvar_level": "high"}, "cvar_level is 'high', must be a number"),
-        ({"invalid_action_cost": -1.0}, "illegal_action_cost is -1, must be a number from 0"),
-        ({"invalid_action_limit": 0}, "illegal_action_limit is 0, must be an integer from 1"),
+        ({"invalid_action_cost": -1.0}, "invalid_action_cost is -1, must be a number from 0"),
+        ({"invalid_action_limit": 0}, "invalid_action_limit is 0, must be an integer from 1"),
         ({"engine": "pymunck"}, "did you mean 'pymunk'"),
         ({"scenario": 3}, "scenario is 3, must be a name, a path, a Scenario"),
         (

@@ -254,7 +254,7 @@ def test_an_observation_without_an_episode_is_refused() -> None:
 def test_a_reward_must_not_name_the_term_of_the_environment() -> None:
     env = make(reward=lambda _: {"invalid_actions": 1.0})
     env.reset(seed=1)
-    with pytest.raises(BlastEnvError, match="'illegal_actions', which the environment adds"):
+    with pytest.raises(BlastEnvError, match="'invalid_actions', which the environment adds"):
         env.step(0)
 
 

@@ -60,6 +60,7 @@ def test_the_access_way_is_drawn_where_no_structure_stands(sites: tuple[Scenario
             assert not structure.rectangle_m.meets_segment(start, end)
 
 
+@pytest.mark.usefixtures("laid_out")
 def test_bundled_scenarios_can_be_drawn_too(tmp_path: Path) -> None:
     scenarios = [load_scenario(name) for name in ("perimeter_gate", "free_field")]
     picture = save_figure(contact_sheet(scenarios), tmp_path / "sheet.png")
