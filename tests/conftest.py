@@ -14,6 +14,8 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from tests.figures import DRAW, undrawn_figures
+
 # The modules that tests import, and the tests, all stay: it would look through them for nothing,
 # which takes a third of their time. Afterwards most of what becomes garbage needs no collector.
 gc.disable()
@@ -55,7 +57,7 @@ def apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("BLAST_ENV_READING")
 
 
-LAY_OUT, DRAW = ConstrainedLayoutEngine.execute, Figure.draw
+LAY_OUT = ConstrainedLayoutEngine.execute
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -72,17 +74,16 @@ def laid_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ConstrainedLayoutEngine, "execute", LAY_OUT)
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture
 def undrawn() -> Iterator[None]:
-    """Leave figures empty: for tests of what is around them; tests/plots draws each of them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "draw", lambda *_: None)
+    """Leave figures empty. Packages of tests have a fixture of their own, which ends with them."""
+    with undrawn_figures():
         yield
 
 
 @pytest.fixture
-def drawn(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw figures, among tests that are `undrawn`."""
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw figures, among tests that leave them empty."""
     monkeypatch.setattr(Figure, "draw", DRAW)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from blast_env.app import blasts
+from tests.figures import undrawn_figures
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -17,8 +18,10 @@ def short_films() -> Iterator[None]:
 
 
 @pytest.fixture(scope="package", autouse=True)
-def _undrawn(undrawn: None) -> None:
+def _undrawn() -> Iterator[None]:
     """Leave the figures of these tests empty, unless one asks for `drawn`."""
+    with undrawn_figures():
+        yield
 
 
 @pytest.fixture

@@ -7,11 +7,14 @@ import pytest
 
 from blast_env.cli import advise, assessment
 from blast_env.evaluation.probability import level_probability
+from tests.figures import undrawn_figures
 
 
 @pytest.fixture(scope="package", autouse=True)
-def _undrawn(undrawn: None) -> None:
+def _undrawn() -> Iterator[None]:
     """Leave the figures of these tests empty, unless one asks for `drawn`."""
+    with undrawn_figures():
+        yield
 
 
 @pytest.fixture(scope="package", autouse=True)

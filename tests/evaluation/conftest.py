@@ -1,9 +1,12 @@
 """One evaluator for all tests here: what it remembers keeps them fast."""
 
+from collections.abc import Iterator
+
 import pytest
 
 from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, evaluate_against
 from tests.evaluation.cases import COURTYARD, THREATS, WALL
+from tests.figures import undrawn_figures
 
 
 @pytest.fixture(scope="session")
@@ -17,5 +20,7 @@ def evaluation(evaluator: BlastEvaluator) -> LayoutEvaluation:
 
 
 @pytest.fixture(scope="package", autouse=True)
-def _undrawn(undrawn: None) -> None:
+def _undrawn() -> Iterator[None]:
     """Leave figures empty, unless a test asks for `drawn`."""
+    with undrawn_figures():
+        yield

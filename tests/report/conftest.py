@@ -7,6 +7,7 @@ import pytest
 
 from blast_env.evaluation.probability import level_probability
 from blast_env.report import Limit, Study, StudyOptions, page, run_study
+from tests.figures import undrawn_figures
 from tests.report.sites import LAYOUT, glazed_hut
 
 
@@ -29,5 +30,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
 
 
 @pytest.fixture(scope="package", autouse=True)
-def _undrawn(undrawn: None) -> None:
+def _undrawn() -> Iterator[None]:
     """Leave the figures of these tests empty, unless one asks for `drawn`."""
+    with undrawn_figures():
+        yield

@@ -1,0 +1,18 @@
+"""Figures that are left empty, for tests of code around them; tests/plots draws each of them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+import pytest
+from matplotlib.figure import Figure
+
+DRAW: Final = Figure.draw
+
+
+@contextmanager
+def undrawn_figures() -> Iterator[None]:
+    """Leave figures empty."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "draw", lambda *_: None)
+        yield
