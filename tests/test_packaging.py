@@ -98,15 +98,15 @@ def test_a_search_runs_beside_a_package_named_agents_and_without_extras(
         [*search, "--method", "genetic"],
         ["train", "--run", "run"],
     ]
-    known_charge = call(python, "-c", COMMANDS, json.dumps(commands), cwd=tmp_path).splitlines()
-    drawn, genetic, training = map(json.loads, known_charge[:3])
+    lines = call(python, "-c", COMMANDS, json.dumps(commands), cwd=tmp_path).splitlines()
+    drawn, genetic, training = map(json.loads, lines[:3])
     assert drawn[0] == 0, drawn[1]
     assert json.loads((tmp_path / "found" / "layout.json").read_text())["cells"]
     assert "pip install blast-env[render]" in drawn[1]  # no picture, and no blast lost for it
     assert genetic[0] == training[0] == 2
     assert "'pymoo': pip install blast-env[search]" in genetic[1]
     assert "'torch': pip install blast-env[agents,render]" in training[1]
-    assert known_charge[3] == "<class 'agents.Agent'>"
+    assert lines[3] == "<class 'agents.Agent'>"
 
 
 def test_the_description_on_a_package_page_links_to_no_file(clean: Path) -> None:

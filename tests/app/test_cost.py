@@ -24,11 +24,11 @@ def test_steps_are_about_those_of_a_blast() -> None:
     """Within a third; of the seconds a clock would have to say."""
     scenario = load_scenario("visitor_entrance")
     charge = threats_of(scenario)[0].charge
-    known_charge = GasEngine().cost(scenario, charge)
+    estimate = GasEngine().cost(scenario, charge)
     run = GasBlast(scenario, (), 0, GasEngine(), charge).run()
-    assert known_charge.steps == pytest.approx(run.steps, rel=0.33)
-    assert known_charge.cells == pytest.approx(np.prod(run.run.grid.array_shape), rel=0.01)
-    assert known_charge.moved == pytest.approx(run.run.solver.cell_updates / 2.0, rel=0.4)
+    assert estimate.steps == pytest.approx(run.steps, rel=0.33)
+    assert estimate.cells == pytest.approx(np.prod(run.run.grid.array_shape), rel=0.01)
+    assert estimate.moved == pytest.approx(run.run.solver.cell_updates / 2.0, rel=0.4)
 
 
 def test_half_the_cells_cost_sixteen_times_as_much_inside() -> None:

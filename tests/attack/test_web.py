@@ -16,8 +16,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Victim]:
 @pytest.mark.parametrize("name", ["host", "frame", "token"])
 def test_a_real_server_holds(server: Victim, name: str) -> None:
     """Every seventh: all of them take `make attack`."""
-    for known_charge, attempt in [*ATTACKS[name](server)][::7]:
-        assert not attempt(), known_charge
+    for attack, attempt in [*ATTACKS[name](server)][::7]:
+        assert not attempt(), attack
     assert not server.is_well()
 
 

@@ -424,8 +424,8 @@ def uploads(server: Victim) -> Iterator[Attempt]:
     )
     for name in names:
         for content in contents:
-            known_charge = f"{name[:20]!r} with {content[:12]!r}"
-            yield known_charge, partial(_survives, server, [(name, content)])
+            attack = f"{name[:20]!r} with {content[:12]!r}"
+            yield attack, partial(_survives, server, [(name, content)])
     yield "100 files at once", partial(_survives, server, [("x.toml", b"a")] * 100)
     yield "no form", partial(_survives, server, [])
 
@@ -566,11 +566,11 @@ def scripts(server: Victim) -> Iterator[Attempt]:
     """A script in every name and tag: pages that show it, and plans that are drawn of it."""
     work = WorkFolder(server.folder)
     tried = [*scenarios_with_scripts()]
-    for known_charge, scenario in tried:
-        yield f"plan: {known_charge}", partial(_plan_runs, scenario)
-    for known_charge, scenario in tried[:: max(len(tried) // MOST_PAGES, 1)]:
+    for attack, scenario in tried:
+        yield f"plan: {attack}", partial(_plan_runs, scenario)
+    for attack, scenario in tried[:: max(len(tried) // MOST_PAGES, 1)]:
         design_id = work.create(scenario, "script").design_id
-        yield f"page: {known_charge}", partial(_page_runs, server, f"/design/{design_id}")
+        yield f"page: {attack}", partial(_page_runs, server, f"/design/{design_id}")
     yield "list of designs", partial(_page_runs, server, "/")
 
 
@@ -606,10 +606,10 @@ ATTACKS: Final[Mapping[str, Callable[[Victim], Iterator[Attempt]]]] = MappingPro
 def attempts_of(name: str, server: Victim) -> tuple[int, list[str]]:
     """Attack a server; return how often, and what got through."""
     count, through = 0, []
-    for known_charge, attempt in ATTACKS[name](server):
+    for attack, attempt in ATTACKS[name](server):
         count += 1
         problem = attempt()
         if problem:
-            through.append(f"{known_charge[:_MOST_TOLD]}: {problem}")
+            through.append(f"{attack[:_MOST_TOLD]}: {problem}")
     problem = server.is_well()
     return count, [*through, *([problem] if problem else [])]

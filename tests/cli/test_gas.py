@@ -147,15 +147,13 @@ def test_parts_of_a_building_are_one_row(tmp_path: Path) -> None:
     rows = run("simulate", path, "--engine", "event").stdout.splitlines()
     (row,) = (line.split() for line in rows if "half" in line or "town_hall" in line)
     assert row[:3] == ["town_hall", "yes", "16"]
-    known_charge = json.loads(run("simulate", path, "--engine", "event", "--json").stdout)
-    (hall,) = (each for each in known_charge["buildings"] if each["building"] == "town_hall")
-    halves = [each for each in known_charge["structures"] if each["structure"].endswith("half")]
+    printed = json.loads(run("simulate", path, "--engine", "event", "--json").stdout)
+    (hall,) = (each for each in printed["buildings"] if each["building"] == "town_hall")
+    halves = [each for each in printed["structures"] if each["structure"].endswith("half")]
     assert len(halves) == 2
     for name in ("modules", "hits"):
         assert hall[name] == sum(each[name] for each in halves)
     assert hall["impulse_sim"] == pytest.approx(sum(each["impulse_sim"] for each in halves))
-    known_charge = json.loads(
-        run("simulate", path, "--engine", "gas", "--until", 0.01, "--json").stdout
-    )
-    assert [each["parts"] for each in known_charge["buildings"]] == ["south_half north_half"]
-    assert set(known_charge["impulse"]) == {"south_half", "north_half"}
+    printed = json.loads(run("simulate", path, "--engine", "gas", "--until", 0.01, "--json").stdout)
+    assert [each["parts"] for each in printed["buildings"]] == ["south_half north_half"]
+    assert set(printed["impulse"]) == {"south_half", "north_half"}

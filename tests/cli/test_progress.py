@@ -15,8 +15,8 @@ def test_a_log_file_gets_a_line_now_and_then(
             passed_s += 1.0
             progress(step / 100)
             if step == 30:
-                known_charge = capsys.readouterr().err
-    assert known_charge == "training runs/a: 30% after 30 s\n"
+                printed = capsys.readouterr().err
+    assert printed == "training runs/a: 30% after 30 s\n"
     assert capsys.readouterr().err == (
         "training runs/a: 60% after 60 s\ntraining runs/a: 90% after 90 s\n"
     )

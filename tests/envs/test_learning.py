@@ -18,7 +18,7 @@ from tests.evaluation.engines.shade import ShadeEngine
 
 STEPS = 2048
 HELD_OUT = range(10_000, 10_024)
-LEAST_LEAD = 0.05
+LEAST_LEAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,12 @@ def one_thread() -> Iterator[None]:
 @pytest.mark.usefixtures("one_thread")
 @pytest.mark.slow
 def test_it_learns_with_the_defaults_of_the_library() -> None:
-    """Deterministic and without a mask: it does not get stuck on an occupied cell."""
+    """Deterministic and without a mask: it does not get stuck on an occupied cell.
+
+    Some first weights are as good as what is learnt; those of this seed are worse than chance.
+    """
     env = environment()
-    agent = PPO("MlpPolicy", env, seed=0, device="cpu")
+    agent = PPO("MlpPolicy", env, seed=2, device="cpu")
+    random, untrained = reduction(env, None), reduction(env, agent)
     agent.learn(STEPS)
-    learnt, random = reduction(env, agent), reduction(env, None)
-    assert learnt > random + LEAST_LEAD
+    assert reduction(env, agent) > max(random, untrained) + LEAST_LEAD

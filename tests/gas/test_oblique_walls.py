@@ -72,8 +72,8 @@ def test_tables_have_the_area_and_the_load_of_the_real_wall(turned: GasResult) -
     assert block["peak_pa"] < 0.85 * turned.faces["peak_pa"].max()
     assert turned.walls["peak_pa"].max() == block["peak_pa"]
     assert turned.loads().protected_peak_pa == block["peak_pa"]
-    known_charge = turned.structures.set_index("structure")["impulse_pa_s"]
-    assert turned.impulse("block").pa_s == pytest.approx(known_charge["block"])
+    of_structures_pa_s = turned.structures.set_index("structure")["impulse_pa_s"]
+    assert turned.impulse("block").pa_s == pytest.approx(of_structures_pa_s["block"])
 
 
 def test_each_wall_has_its_length_on_the_side_that_it_faces(turned: GasResult) -> None:
@@ -107,8 +107,8 @@ def test_means_are_over_the_area_of_the_real_walls(turned: GasResult) -> None:
         load, area = table["impulse_pa_s"], table["area_m2"]
         assert (load * area).sum() == pytest.approx(momentum, rel=1e-12)
     loads = {each.name: each.impulse_pa_s for each in turned.loads().structures}
-    known_charge = turned.structures.set_index("structure")["impulse_pa_s"]
-    assert loads == pytest.approx(known_charge.to_dict())
+    of_structures_pa_s = turned.structures.set_index("structure")["impulse_pa_s"]
+    assert loads == pytest.approx(of_structures_pa_s.to_dict())
 
 
 def test_bays_are_as_wide_as_the_facade_says_on_every_wall(turned: GasResult) -> None:

@@ -145,7 +145,7 @@ def test_what_cannot_be_taken_away_is_refused(
 def test_without_items_it_is_refused_and_names_do_not_count_for_the_hash() -> None:
     with pytest.raises(ScenarioError, match="removable: must be left out"):
         fenced(items=[], height_m=2.0, stock=3)
-    known_charge = document()
-    known_charge["build_zone"]["removable"][0]["description"] = "the old fence"
-    assert Scenario.from_document(known_charge, "yard").content_hash == fenced().content_hash
+    changed = document()
+    changed["build_zone"]["removable"][0]["description"] = "the old fence"
+    assert Scenario.from_document(changed, "yard").content_hash == fenced().content_hash
     assert fenced().content_hash != fenced(removable=[]).content_hash
