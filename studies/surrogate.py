@@ -38,6 +38,7 @@ from blast_env.design.surrogate.network import Check, Fit, Surrogate, load_surro
 from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Case, LoadCase, SeedRange, draw_threats
+from blast_env.evaluation.cases import in_turn
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
@@ -443,7 +444,7 @@ def judge(
         for name in scenarios:
             scenario = load_scenario(name)
             evaluator = BlastEvaluator(scenario, "gas", cache=cache)
-            threats = draw_threats(scenario, SeedRange.TEST.seeds(0, charges))
+            threats = in_turn(scenario, draw_threats(scenario, SeedRange.TEST.seeds(0, charges)))
             found = []
             with progress_bar(scenario.name) as progress:
                 for done, threat in enumerate(threats, start=1):

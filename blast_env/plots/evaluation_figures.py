@@ -294,8 +294,8 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
     modules = evaluation.module_table
     own = modules[modules.structure.isin(parts.index)]
     outlines = [each for each in scene.structures if each.name in parts.index]
-    *_, behind, without, _ = modules.columns
-    columns = (without, behind)
+    *_, with_barrier, without_barrier, _ = modules.columns
+    columns = (without_barrier, with_barrier)
     highest = float(own[list(columns)].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
     for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
@@ -305,7 +305,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: B
             for part, impulse in zip(obstacle.parts, impulses, strict=True):
                 part.impulse, part.hits = float(impulse), int(impulse > 0.0)
         draw_enlarged(axes, obstacles, scale, 0.4)
-        pa_s = building["impulse_pa_s" if column == behind else "unprotected_impulse_pa_s"]
+        pa_s = building["impulse_pa_s" if column == with_barrier else "unprotected_impulse_pa_s"]
         axes.set_title(
             f"{evaluation.scenario.title_of(name)} {words} barrier\n{pa_s:,.0f} Pa·s",
             fontsize=11,
