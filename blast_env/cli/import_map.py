@@ -19,7 +19,7 @@ from blast_env.cli.output import (
     titled,
 )
 from blast_env.cli.targets import PICTURES
-from blast_env.io.importing.options import ImportOptions
+from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions
 from blast_env.site import save_scenario
 
 if TYPE_CHECKING:
@@ -59,8 +59,11 @@ def import_map(
         metavar="WIDTH,HEIGHT",
         show_default="as much as everything in the file needs",
     ),
-    margin_m: float = typer.Option(
-        10.0, "--margin", help="Ground around everything without --size, m."
+    margin_m: float | None = typer.Option(
+        None,
+        "--margin",
+        help="Ground around everything without --size, m.",
+        show_default=f"{MARGIN_M:g}, or to a street within {MOST_MARGIN_M:g}",
     ),
     rotation_deg: float | None = typer.Option(
         None,

@@ -22,6 +22,12 @@ CALIBRATIONS: Final[Mapping[str, str]] = MappingProxyType(
 MOST_SITE_M: Final = 2000.0
 """Longest side of a site in a scenario file, m."""
 
+MARGIN_M: Final = 10.0
+"""Ground around everything, m, if a street is on it."""
+
+MOST_MARGIN_M: Final = 100.0
+"""Most ground around everything to reach the nearest street, m."""
+
 _BOUNDS: Final[Mapping[str, tuple[float, float]]] = MappingProxyType(
     {
         "margin_m": (0.0, MOST_SITE_M),
@@ -46,7 +52,8 @@ class ImportOptions:
         origin: The site's lower left corner.
         centre: The site's middle, instead of `origin`.
         size_m: The site's extents; by default as much as everything in the file needs.
-        margin_m: Ground around everything without `size_m`.
+        margin_m: Ground around everything without `size_m`; by default `MARGIN_M`, or as much as
+            the nearest street needs, to `MOST_MARGIN_M`.
         rotation_deg: Direction of the site's x axis from east, counterclockwise; by default that of
             most walls.
         crs: Reference system of the coordinates: EPSG:25832, or local for plain metres; by default
@@ -82,7 +89,7 @@ class ImportOptions:
     origin: PlaceXY | None = None
     centre: PlaceXY | None = None
     size_m: PlaceXY | None = None
-    margin_m: float = 10.0
+    margin_m: float | None = None
     rotation_deg: float | None = None
     crs: str | None = None
     units: str | None = None

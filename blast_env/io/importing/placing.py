@@ -16,7 +16,12 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.io.importing.joining import closed, with_courtyards
 from blast_env.io.importing.ledger import Deed, Ledger
-from blast_env.io.importing.options import MOST_SITE_M, ImportOptions
+from blast_env.io.importing.options import (
+    MARGIN_M,
+    MOST_MARGIN_M,
+    MOST_SITE_M,
+    ImportOptions,
+)
 from blast_env.io.importing.plane import Plane, plane_around, rotated
 from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role, Thing
@@ -98,6 +103,9 @@ OUTSIDE: Final = "outside the site"
 _EXCHANGED: Final = ": are longitude and latitude exchanged?"
 _HAIR_M: Final = 0.01
 _ROUNDING: Final = 0.1  # of a module: rounding of a map must not add a row of modules
+_WIDER: Final = "ground around buildings, widened to the nearest street"
+_LEAST_STREET_M: Final = 1.0
+_TO_BORDER_M: Final = 1.0  # of charges
 
 
 @dataclass(frozen=True)
@@ -184,7 +192,7 @@ def place_site(
         raise _nothing(site_map, [*faulty, *open_lines], options)
     rotation_deg = _rotation_deg(near, options)
     turned = _moved(near, lambda places: rotated(places, -rotation_deg))
-    left, bottom, right, top = _bounds_m(turned, plane, rotation_deg, options)
+    left, bottom, right, top = _bounds_m(turned, plane, rotation_deg, options, ledger)
     size_m = np.array([right - left, top - bottom])
     if size_m.max() > MOST_SITE_M:
         raise BlastEnvError(
@@ -350,6 +358,7 @@ def _bounds_m(
     plane: Plane,
     rotation_deg: float,
     options: ImportOptions,
+    ledger: Ledger,
 ) -> tuple[float, float, float, float]:
     """Return the site's rectangle in the turned plane."""
     if options.size_m is not None:
@@ -360,11 +369,41 @@ def _bounds_m(
         far = low + size
         return float(low[0]), float(low[1]), float(far[0]), float(far[1])
     chief = _chief(things)
-    left, bottom, right, top = (
-        float(each) for each in shapely.total_bounds([each.geometry for each in chief])
-    )
-    margin_m = 0.0 if chief[0].role is Role.SITE else options.margin_m
+    bounds_m = shapely.total_bounds([each.geometry for each in chief])
+    margin_m = options.margin_m
+    if chief[0].role is Role.SITE:
+        margin_m = 0.0
+    elif margin_m is None:
+        margin_m = _margin_m(things, bounds_m, options, ledger)
+    left, bottom, right, top = (float(each) for each in bounds_m)
     return left - margin_m, bottom - margin_m, right + margin_m, top + margin_m
+
+
+def _margin_m(
+    things: Sequence[Thing], bounds_m: FloatArray, options: ImportOptions, ledger: Ledger
+) -> float:
+    """Return the usual margin, or one that reaches beyond the nearest street if that has none.
+
+    A wider margin is a guess in the ledger.
+    """
+    streets = [each for each in things if each.role is Role.CHARGE]
+    if options.charge_at or not streets or not all(each.is_line for each in streets):
+        return MARGIN_M
+    lines = [shapely.union_all(list(each.kerbs)) for each in streets]
+    for margin_m in np.arange(MARGIN_M, MOST_MARGIN_M + 1.0):
+        inside_m = margin_m - _TO_BORDER_M
+        box = shapely.box(*(bounds_m + inside_m * np.array([-1.0, -1.0, 1.0, 1.0])))
+        lengths_m = shapely.length(shapely.intersection(lines, box))
+        if lengths_m.max() >= _LEAST_STREET_M:
+            break
+    else:
+        return MARGIN_M
+    if margin_m > MARGIN_M:
+        nearest = streets[lengths_m.argmax()]
+        margin_m += np.ceil(nearest.width_m or 0.0)
+        detail = f"--margin {margin_m:g} for {MARGIN_M:g}"
+        ledger.add(Deed.GUESSED, _WIDER, nearest.place, nearest.name, detail)
+    return float(margin_m)
 
 
 def _outlines(things: Sequence[Thing], bounds_m: tuple[float, float, float, float]) -> list[Thing]:

@@ -1,13 +1,17 @@
 """The objects of a map that matter to a site."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Final
 
 from blast_env.errors import import_extra
 
 with import_extra("maps", "maps and drawings"):
+    import shapely
     from shapely.geometry.base import BaseGeometry
+
+_TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
 
 
 class Role(StrEnum):
@@ -67,3 +71,15 @@ class Thing:
     def is_line(self) -> bool:
         """Whether it is a line, not an outline or a point."""
         return self.geometry.geom_type in ("LineString", "MultiLineString")
+
+    @property
+    def kerbs(self) -> Iterator[BaseGeometry]:
+        """The lines of vehicles at both kerbs of a street; a line without a width itself."""
+        aside_m = 0.0 if self.width_m is None else 0.5 * self.width_m - _TO_KERB_M
+        if aside_m < _TO_KERB_M:  # too narrow for two rows of vehicles
+            yield self.geometry
+            return
+        for side in (aside_m, -aside_m):
+            yield from shapely.get_parts(
+                shapely.offset_curve(self.geometry, side, join_style="mitre")
+            )

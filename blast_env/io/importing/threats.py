@@ -33,7 +33,6 @@ _LEAST_LENGTH_M: Final = 1.0
 _CLEAR_M: Final = 0.01  # more than the charge's radius, for rounding
 _DIGITS: Final = 3
 _AREA_BLOCK: Final = 4  # modules: scale of the blocks of an area, per m of tolerance
-_TO_KERB_M: Final = 1.0  # from the middle of a parked vehicle
 _BUILT_OVER: Final = "places of charges that are built over, or too near to a building or border"
 _POINT_SHARE_M: Final = 5.0
 
@@ -162,18 +161,8 @@ def _sources(
             if shapely.intersects(free, part):
                 yield _point(part.x, part.y, tnt_kg)
         else:
-            for line in _kerbs(part, thing.width_m):
+            for line in replace(thing, geometry=part).kerbs:
                 yield from _segments(line, free, tolerance_m, tnt_kg)
-
-
-def _kerbs(line: BaseGeometry, width_m: float | None) -> Iterator[BaseGeometry]:
-    """Yield the lines of vehicles at both kerbs of a street; a line without a width itself."""
-    aside_m = 0.0 if width_m is None else 0.5 * width_m - _TO_KERB_M
-    if aside_m < _TO_KERB_M:  # too narrow for two rows of vehicles
-        yield line
-        return
-    for side in (aside_m, -aside_m):
-        yield from shapely.get_parts(shapely.offset_curve(line, side, join_style="mitre"))
 
 
 def _segments(

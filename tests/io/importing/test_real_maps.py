@@ -291,15 +291,16 @@ def test_options_hold_in_a_map_without_roles(tmp_path: Path) -> None:
     assert other.height_m == 2.0
 
 
+def kerbs_m(site: ImportedSite) -> list[float]:
+    sources = (each for each in site.scenario.charge if not isinstance(each, RectangleSource))
+    return [each.lines_m[0][0][1] for each in sources]
+
+
 def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
     extract = town()
     site = imported(extract.write(tmp_path), rotation_deg=0.0, margin_m=20.0, **HOUSE_1)
     (house,) = site.buildings
-    near = [
-        each.lines_m[0][0][1]
-        for each in site.scenario.charge
-        if not isinstance(each, RectangleSource)
-    ]
+    near = kerbs_m(site)
     south = house.outline.bounds[1]
     assert sorted(south - y for y in near) == pytest.approx([9.0, 15.0], abs=0.15)
     assert not entries(site, Deed.GUESSED, "widths of streets")
@@ -311,6 +312,34 @@ def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
 def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
     assert "--charge-at X,Y" in error_of(written(tmp_path, HOUSE))
     assert "--margin" in error_of(written(tmp_path, HOUSE))
+
+
+def street(y: float, **tags: str) -> dict[str, Any]:
+    line = {"type": "LineString", "coordinates": [[-300, y], [300, y]]}
+    tags = {"highway": "residential", "name": "Long Lane", "width": "8", **tags}
+    return {"type": "Feature", "properties": tags, "geometry": line}
+
+
+def test_ground_reaches_to_the_nearest_street_as_a_guess(tmp_path: Path) -> None:
+    path = written(tmp_path, HOUSE, street(-33.0), street(-60.0))
+    site = imported(path, rotation_deg=0.0)
+    (guess,) = entries(site, Deed.GUESSED, "ground around buildings")
+    assert (guess.place, guess.name) == ("features[1]", "Long Lane")
+    assert guess.detail == "--margin 39 for 10"
+    assert site.site.size_m == (6.0 + 78.0, 4.0 + 78.0)
+    assert sorted(39.0 - y for y in kerbs_m(site)) == pytest.approx([30.0, 36.0], abs=0.01)
+    assert "--margin 39 for 10" in error_of(path, strict=True)
+    for margin_m in (10.0, 29.0):  # a given one stays
+        assert "--margin for more ground" in error_of(path, margin_m=margin_m)
+    assert "--margin for more ground" in error_of(written(tmp_path, HOUSE, street(-150.0)))
+
+
+def test_ground_stays_if_it_has_a_place_for_a_charge(tmp_path: Path) -> None:
+    for features in ([street(-9.0), street(-33.0)], [street(-33.0), PLACE]):
+        site = imported(written(tmp_path, HOUSE, *features), rotation_deg=0.0)
+        assert not entries(site, Deed.GUESSED, "ground around buildings")
+    path = written(tmp_path, HOUSE, street(-33.0))
+    assert imported(path, charge_at=((-5.0, 2.0),)).site.shape == (48, 52)
 
 
 @pytest.mark.parametrize(
