@@ -16,7 +16,7 @@ from blast_env.provenance import package_version
 
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers
     from blast_env.design.proposal import propose, search
-    from blast_env.evaluation.cases import Case, LoadCase
+    from blast_env.evaluation.cases import LoadCase, LoadCaseSet
     from blast_env.evaluation.engines.contract import Engine
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
     from blast_env.evaluation.engines.particles import Blast, BlastResult
@@ -30,7 +30,7 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "Blast": "blast_env.evaluation.engines.particles",
         "BlastResult": "blast_env.evaluation.engines.particles",
-        "Case": "blast_env.evaluation.cases",
+        "LoadCaseSet": "blast_env.evaluation.cases",
         "Charge": "blast_env.site.scene",
         "Engine": "blast_env.evaluation.engines.contract",
         "GasBlast": "blast_env.evaluation.engines.gas",
@@ -55,7 +55,6 @@ __version__ = package_version()
 __all__ = [
     "Blast",
     "BlastResult",
-    "Case",
     "Charge",
     "Engine",
     "GasBlast",
@@ -63,6 +62,7 @@ __all__ = [
     "LayoutEvaluation",
     "LayoutState",
     "LoadCase",
+    "LoadCaseSet",
     "Scenario",
     "bundled_scenarios",
     "evaluate_layout",

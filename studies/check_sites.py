@@ -25,7 +25,7 @@ from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import DesignProblem, layouts_by_rule
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, Case, draw_threats
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet, draw_threats
 from blast_env.evaluation.engines.contract import Engine, find_engine
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
@@ -129,7 +129,7 @@ def measured(
     layouts += [random_layout(site, rng) for _ in range(random_layouts)]
     ruled = rule_layouts(site)
     drawn = draw_threats(site, range(threats))
-    problem = DesignProblem(BlastEvaluator(site, engine), Case(site, drawn))
+    problem = DesignProblem(BlastEvaluator(site, engine), LoadCaseSet(site, drawn))
     unprotected = problem.load(())
     reduction = {
         layout: 1.0 - problem.load(layout) / unprotected for layout in (*layouts, *ruled.values())

@@ -32,7 +32,14 @@ from blast_env.design.surrogate import SurrogateEngine, SurrogateSite, site_of
 from blast_env.design.surrogate.correction import Correction
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.strategies import ReductionReward, Transition
-from blast_env.evaluation import Case, Evaluation, Evaluators, SeedRange, compare, draw_threats
+from blast_env.evaluation import (
+    Evaluation,
+    Evaluators,
+    LoadCaseSet,
+    SeedRange,
+    compare,
+    draw_threats,
+)
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
@@ -146,7 +153,7 @@ class DemoTraining:
 
     def __post_init__(self) -> None:
         threats = one_of_each_charge(draw_threats(self.scenario, range(16)))
-        self._case, self._judge = Case(self.scenario, threats), Evaluators(JUDGE)
+        self._case, self._judge = LoadCaseSet(self.scenario, threats), Evaluators(JUDGE)
         self.reward = CorrectedReward(site_of(self.scenario))
         engine = SurrogateEngine()
         in_training, self._env = (
@@ -324,14 +331,14 @@ class AgentComparison:
         )
 
 
-def unseen_charges(settings: DemoSettings, scenario: Scenario) -> list[Case]:
+def unseen_charges(settings: DemoSettings, scenario: Scenario) -> list[LoadCaseSet]:
     """Return a case for each mass of the judgement, with one threat for each place."""
     count, cases = len(one_of_each_charge(draw_threats(scenario, range(16)))), []
     for index, tnt_kg in enumerate(settings.masses_kg):
         charge = tuple(each.model_copy(update={"tnt_kg": tnt_kg}) for each in scenario.charge)
         site = scenario.model_copy(update={"charge": charge})
         threats = draw_threats(site, SeedRange.TEST.seeds(count * index, count))
-        cases.append(Case(site, threats, name=f"{tnt_kg:g} kg", seed=index))
+        cases.append(LoadCaseSet(site, threats, name=f"{tnt_kg:g} kg", seed=index))
     return cases
 
 

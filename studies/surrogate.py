@@ -37,7 +37,7 @@ from blast_env.design.surrogate.intervals import covered, interval_factor
 from blast_env.design.surrogate.network import Check, Fit, Surrogate, load_surrogate
 from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, LoadCase, SeedRange, draw_threats
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.files import make_folder
@@ -144,7 +144,7 @@ class Recipe:
                     layout = moves.neighbour(layout, rng)
                 found.append(layout)
         if self.surrogate is not None:
-            guesses = Guesses.of(self.surrogate, Case(site, (threat,), charge=threat.charge))
+            guesses = Guesses.of(self.surrogate, LoadCaseSet(site, (threat,), charge=threat.charge))
             liked = improved(guesses, [(), *ruled], self.changes, rng)
             found += liked[: _EVERY * self.favourites : _EVERY]
         return list(dict.fromkeys(tuple(sorted(each)) for each in found))
@@ -398,7 +398,7 @@ def verdict(
     began_s = perf_counter()
     proposed = search.at_once(scenario, threat.charge)
     ms = MS_PER_S * (perf_counter() - began_s)
-    case = Case(scenario, (threat,), charge=threat.charge)
+    case = LoadCaseSet(scenario, (threat,), charge=threat.charge)
     rules = layouts_by_rule(scenario, threat.charge)
     reduction, *ruled = reductions_of(evaluator, case, [proposed, *rules.values()], processes)
     return LayoutsJudged(
@@ -455,14 +455,14 @@ def judge(
     print_line(markdown_table(headers, rows))
 
 
-def promise(surrogate: Surrogate, layout: Layout, case: Case) -> float:
+def promise(surrogate: Surrogate, layout: Layout, case: LoadCaseSet) -> float:
     """Return the share by which a layout lowers the case's load, as a surrogate predicts it."""
     unprotected, guessed = Guesses.of(surrogate, case).loads([(), layout])
     return float(1.0 - guessed / unprotected)
 
 
 def reductions_of(
-    evaluator: BlastEvaluator, case: Case, layouts: Sequence[Layout], processes: int
+    evaluator: BlastEvaluator, case: LoadCaseSet, layouts: Sequence[Layout], processes: int
 ) -> list[float]:
     """Return the share by which each layout lowers the case's load, by gas dynamics."""
     asked = [(each, threat) for each in ((), *layouts) for threat in case.threats]

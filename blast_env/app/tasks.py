@@ -26,7 +26,7 @@ from blast_env.app.work import (
 )
 from blast_env.design.proposal import chosen_proposer
 from blast_env.design.search import DesignProblem, Progress, find_proposer
-from blast_env.evaluation import BlastEvaluator, Case, LoadCase, SeedRange
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import JUDGE
 from blast_env.geometry import Layout
 from blast_env.site import Scenario
@@ -116,7 +116,9 @@ def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[L
         return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None)), ""
     if task.proposer != PACKAGED:
         return proposed(task.proposer, scenario, known), ""
-    case = Case(scenario, tuple(LoadCase(each, SeedRange.SEARCH.value.start) for each in known))
+    case = LoadCaseSet(
+        scenario, tuple(LoadCase(each, SeedRange.SEARCH.value.start) for each in known)
+    )
     problem = DesignProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
     report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
     found = chosen_proposer().propose(problem, report=report)
@@ -159,14 +161,14 @@ def _search(task: SearchTask, teller: Teller) -> None:
     teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
 
 
-def search_case(scenario: Scenario, task: SearchTask) -> Case:
+def search_case(scenario: Scenario, task: SearchTask) -> LoadCaseSet:
     """Return the load cases of a search: the threats, with several seeds each for particles."""
     charges = [each.charge for each in task.threats]
     noisy = task.engine.is_first_look
     realisations = max(_REALISATIONS // len(charges), 1) if noisy else 1
     first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
     threats = [LoadCase(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
-    return Case(scenario, tuple(threats), realisations)
+    return LoadCaseSet(scenario, tuple(threats), realisations)
 
 
 def _film(task: FilmTask, teller: Teller) -> None:

@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 from blast_env.bundled import ITEM_SITES
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import Case, LoadCase, SeedRange, draw_threats
+from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import (
     fixed_charges,
     hidden_search_set,
@@ -87,7 +87,7 @@ class Definition:
         return load_scenario(self.site)
 
     @cached_property
-    def case(self) -> Case:
+    def case(self) -> LoadCaseSet:
         """The case of the judge; its `search_set` is the case of `evaluate`.
 
         Both have the same charge in the family `known`. Otherwise each draws a few charges, at
@@ -110,7 +110,7 @@ class Definition:
         }
         return sha256(json.dumps(says, sort_keys=True).encode()).hexdigest()[:16]
 
-    def _known(self) -> Case:
+    def _known(self) -> LoadCaseSet:
         scenario = self.scenario
         drawn, number = divmod(self.place - 1, len(scenario.charge))
         seed = SeedRange.TEST.seeds(drawn * _STRIDE, 1)[0]
@@ -120,7 +120,7 @@ class Definition:
         judged = visible_case(scenario, charge, [seed])
         return replace(judged, search_set=known_search_set(scenario, charge, 1, 0))
 
-    def _hidden(self) -> Case:
+    def _hidden(self) -> LoadCaseSet:
         scenario = self.scenario
         few = all(isinstance(each, PointSource) for each in scenario.charge) or bool(
             scenario.vehicles
@@ -130,7 +130,7 @@ class Definition:
         threats = draw_threats(scenario, SeedRange.TEST.seeds(0, judged))
         search_set = hidden_search_set(scenario, met, 1, 0)
         search_set = replace(search_set, threats=one_of_each_charge(search_set.threats))
-        return Case(scenario, one_of_each_charge(threats), search_set=search_set)
+        return LoadCaseSet(scenario, one_of_each_charge(threats), search_set=search_set)
 
 
 def _charge(threat: LoadCase) -> object:

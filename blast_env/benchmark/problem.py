@@ -16,8 +16,8 @@ from blast_env.evaluation import (
     BlastEvaluator,
     BlastStore,
     BudgetError,
-    Case,
     LoadCase,
+    LoadCaseSet,
 )
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
@@ -164,7 +164,7 @@ class BenchmarkProblem(DesignProblem):
 
 
 def shares_of(
-    case: Case, layouts: Sequence[Layout], evaluator: BlastEvaluator, processes: int = 1
+    case: LoadCaseSet, layouts: Sequence[Layout], evaluator: BlastEvaluator, processes: int = 1
 ) -> list[float]:
     """Return the objective of each layout relative to that without a barrier.
 

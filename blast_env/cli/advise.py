@@ -44,7 +44,7 @@ from blast_env.design.search.advice import (
     kinds_for,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, draw_threats
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.consequences import Consequences, Verdict, consequences
 from blast_env.evaluation.engines.contract import JUDGE, Engine, find_engine
@@ -128,7 +128,7 @@ def advise(
         )
     engine = find_engine(JUDGE, cell_m, cells=cells)
     judge = final_engine(JUDGE, [site], judge_cell_m, cells=judge_cells)
-    problem = DesignProblem(BlastEvaluator(site, engine), Case(site, threats), processes)
+    problem = DesignProblem(BlastEvaluator(site, engine), LoadCaseSet(site, threats), processes)
     kinds = kinds_for(site)
     asked = [(engine, each.charge) for each in islice(cycle(threats), len(kinds) * rounds * budget)]
     asked += [(judge, each.charge) for each in threats] * (len(kinds) * rounds)

@@ -36,9 +36,9 @@ from blast_env.cli.output import (
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (
     BlastEvaluator,
-    Case,
     Evaluation,
     Evaluators,
+    LoadCaseSet,
     SeedRange,
     compare,
 )
@@ -113,7 +113,7 @@ def _report_cases(
     cases = [_fixed(case, options) for case in unseen_cases(settings, source, seeds)]
     used = options.engine_for(engine, [each.scenario for each in cases])
     if not used.has_noise:  # the same charge again would be the same blast
-        distinct: dict[object, Case] = {}
+        distinct: dict[object, LoadCaseSet] = {}
         for each in cases:
             distinct.setdefault((each.scenario.content_hash, each.charge), each)
         cases = [*distinct.values()]
@@ -161,7 +161,7 @@ def _report_cases(
     print_line(cache_text(evaluators, coarser))
 
 
-def _fixed(case: Case, options: EvaluateOptions) -> Case:
+def _fixed(case: LoadCaseSet, options: EvaluateOptions) -> LoadCaseSet:
     threats = tuple(
         replace(threat, charge=options.given.fixed(case.scenario, threat.charge))
         for threat in case.threats

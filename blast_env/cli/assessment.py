@@ -16,7 +16,7 @@ from blast_env.cli.output import (
     progress_bar,
     save_figures,
 )
-from blast_env.evaluation import BlastEvaluator, Case, LoadCase
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
 from blast_env.evaluation.consequences import (
     BAY_CASE_COLUMNS,
     CASE_COLUMNS,
@@ -92,7 +92,7 @@ class Assessed:
         number, unprotected = self.judged.worst_number, next(iter(self.found))
         threat = LoadCase(self.judged.barriers[number].charge)
         return GridError(
-            case=Case(self.scenario, (threat,)),
+            case=LoadCaseSet(self.scenario, (threat,)),
             layout=self.layouts[self.name],
             threat=threat,
             coarser=self.coarser,

@@ -23,10 +23,10 @@ from blast_env.cli.output import (
 )
 from blast_env.evaluation import (
     BlastEvaluator,
-    Case,
     Evaluators,
     LayoutEvaluation,
     LoadCase,
+    LoadCaseSet,
     draw_threats,
     evaluate_against,
 )
@@ -214,7 +214,7 @@ _HEADERS: Final = (
 
 
 def asked_blasts(
-    cases: Sequence[Case], engine: Engine
+    cases: Sequence[LoadCaseSet], engine: Engine
 ) -> Iterator[tuple[Engine | None, Scenario, AnyCharge]]:
     """Yield the blasts of an evaluation, for their cost: both layouts, and the worst threat."""
     for case in cases:
@@ -231,7 +231,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
     options.prepare_files(1)
     if not options.is_json:
         print_line(engine.describe([plan.scenario]))
-        print_cost(asked_blasts([Case(plan.scenario, threats)], engine))
+        print_cost(asked_blasts([LoadCaseSet(plan.scenario, threats)], engine))
     with progress_bar(f"{2 * len(threats)} blasts in {plan.scenario.name}") as progress:
         evaluation = evaluate_against(
             evaluator,

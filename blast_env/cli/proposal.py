@@ -25,7 +25,7 @@ from blast_env.design.proposal import PackageProposer, chosen_proposer, problem_
 from blast_env.design.rules import expected_charge
 from blast_env.design.search import DesignProblem, Progress, SearchResult, layouts_by_rule
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, Evaluation, Evaluators, compare
+from blast_env.evaluation import Evaluation, Evaluators, LoadCaseSet, compare
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.evaluation.grid_error import final_engine
 from blast_env.files import make_folder
@@ -131,7 +131,7 @@ def verify_proposal(
 
 
 def _compared(
-    evaluators: Evaluators, case: Case, layouts: Mapping[str, Layout], processes: int
+    evaluators: Evaluators, case: LoadCaseSet, layouts: Mapping[str, Layout], processes: int
 ) -> dict[str, Evaluation]:
     """Return each layout compared with no barrier, with its error of the cells."""
     engine, distinct = evaluators.engine, list(dict.fromkeys(layouts.values()))
@@ -152,7 +152,7 @@ def _compared(
     return {name: found[each] for name, each in layouts.items()}
 
 
-def _print_verdict(found: Mapping[str, Evaluation], case: Case) -> None:
+def _print_verdict(found: Mapping[str, Evaluation], case: LoadCaseSet) -> None:
     """Print one row per layout: no barrier, the rules with the best last, and the proposal."""
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     objective = case.scenario.objective

@@ -15,9 +15,9 @@ from blast_env.envs.episode import find_realisations
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
-    Case,
     DesignProblem,
     LoadCase,
+    LoadCaseSet,
     SeedRange,
     draw_threats,
 )
@@ -265,8 +265,8 @@ def problem_of(
         charge = Charge(only.position_m, only.tnt_kg, only.height_m)
     first = SeedRange.TEST.value.start
     if charge is not None:
-        case = Case(found, (LoadCase(charge, first),), charge=charge)
+        case = LoadCaseSet(found, (LoadCase(charge, first),), charge=charge)
     else:
         threats = draw_threats(found, range(first, first + HIDDEN_THREATS))
-        case = Case(found, one_of_each_charge(threats))
+        case = LoadCaseSet(found, one_of_each_charge(threats))
     return DesignProblem(BlastEvaluator(found, engine), case, processes)

@@ -28,7 +28,7 @@ from blast_env.envs.strategies import (
     check_size,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, LoadCase, SeedRange
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.comparison import Assessment
 from blast_env.evaluation.engines import Engine
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
@@ -373,14 +373,14 @@ class Task:
 
     def _case(
         self, scenario: Scenario, charges: Sequence[AnyCharge], seeds: NDArray[np.int64]
-    ) -> Case:
+    ) -> LoadCaseSet:
         """Return the load case of a layout; `seeds` has the shape (charges, realisations)."""
         threats = tuple(
             LoadCase(charge, int(seed))
             for of_realisation in seeds.T
             for charge, seed in zip(charges, of_realisation, strict=True)
         )
-        return Case(scenario, threats, self.realisations, self.risk)
+        return LoadCaseSet(scenario, threats, self.realisations, self.risk)
 
 
 def find_threat_model(threat: str | ThreatModel, threats: int | None) -> ThreatModel:

@@ -1,6 +1,6 @@
 """Evaluating layouts: loads under threats, and reductions with their uncertainty."""
 
-from blast_env.evaluation.cases import Case, LoadCase, SeedRange, draw_threats
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.comparison import (
     Assessment,
     Evaluation,
@@ -33,7 +33,6 @@ __all__ = [
     "BlastLoads",
     "BlastStore",
     "BudgetError",
-    "Case",
     "DesignProblem",
     "Estimate",
     "Evaluation",
@@ -41,6 +40,7 @@ __all__ = [
     "GridError",
     "LayoutEvaluation",
     "LoadCase",
+    "LoadCaseSet",
     "ParticleLoad",
     "SeedRange",
     "StructureLoad",

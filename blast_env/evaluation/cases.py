@@ -189,7 +189,7 @@ class SeedRange(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class LoadCaseSet:
     """A scenario and its threats, for comparing layouts.
 
     All layouts are under the same charges, fans and air (common random numbers), so that
@@ -204,7 +204,7 @@ class Case:
         charge: The charge, if it is known when a layout is proposed; `None` if it is hidden.
         name: Name for display.
         seed: Seed of the random numbers of a search or a random layout.
-        search_set: Case for the blasts of a search, without any of `threats`.
+        search_set: LoadCaseSet for the blasts of a search, without any of `threats`.
 
     Raises:
         BlastEnvError: If there are no threats, they are not as many for each charge, or one of
@@ -218,7 +218,7 @@ class Case:
     charge: AnyCharge | None = None
     name: str = ""
     seed: int = 0
-    search_set: "Case | None" = None
+    search_set: "LoadCaseSet | None" = None
 
     def __post_init__(self) -> None:
         if not self.threats:
@@ -287,10 +287,10 @@ class Case:
 
 def visible_case(
     scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk | None = None
-) -> Case:
+) -> LoadCaseSet:
     """Return the case of a known charge, with one realisation of fan and air per seed."""
     threats = tuple(LoadCase(charge, seed) for seed in seeds)
-    return Case(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
+    return LoadCaseSet(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
 
 
 def known_search_set(
@@ -299,7 +299,7 @@ def known_search_set(
     realisations: int,
     seed: int,
     risk: Risk | None = None,
-) -> Case:
+) -> LoadCaseSet:
     """Return the case for the blasts of a search with a known charge.
 
     Args:
@@ -307,7 +307,7 @@ def known_search_set(
         charge: The charge.
         realisations: Number of realisations of fan and air, at least 1.
         seed: Draws the seeds of the blasts, and seeds the search.
-        risk: Same as for `Case`.
+        risk: Same as for `LoadCaseSet`.
 
     Raises:
         BlastEnvError: If `realisations` is below 1.
@@ -319,7 +319,7 @@ def known_search_set(
 
 def hidden_search_set(
     scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk | None = None
-) -> Case:
+) -> LoadCaseSet:
     """Return the case for the blasts of a search with a hidden charge.
 
     Args:
@@ -327,7 +327,7 @@ def hidden_search_set(
         charges: Number of charges, at least 1.
         realisations: Number of realisations of fan and air for each charge, at least 1.
         seed: Draws the charges and the seeds of the blasts, and seeds the search.
-        risk: Same as for `Case`.
+        risk: Same as for `LoadCaseSet`.
 
     Returns:
         A case in which the charges of vehicles come first, by rank. The most central of the other
@@ -344,7 +344,7 @@ def hidden_search_set(
     drawn = _spread_first(found.sample_charges(rng, charges))
     seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
     threats = [LoadCase(drawn[index % charges], each) for index, each in enumerate(seeds)]
-    return Case(found, tuple(threats), realisations, risk, seed=seed)
+    return LoadCaseSet(found, tuple(threats), realisations, risk, seed=seed)
 
 
 def one_of_each_charge(threats: Iterable[LoadCase]) -> tuple[LoadCase, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, check_distinct
+from blast_env.evaluation.cases import LoadCaseSet, check_distinct
 from blast_env.evaluation.engines.contract import BlastLoads, Engine
 from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
 from blast_env.evaluation.grid_error import GridError, grid_error
@@ -68,7 +68,7 @@ class Assessment:
     level: LevelOfProtection | None = None
 
     @classmethod
-    def of(cls, case: Case, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
+    def of(cls, case: LoadCaseSet, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
         """Return the assessment of a layout from its loads, one per threat of the case."""
         combined, counts = case.combined, case.scenario.objective
         sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
@@ -116,7 +116,7 @@ class Evaluation:
         BlastEnvError: If no load reaches the protected structures of a case without a barrier.
     """
 
-    cases: tuple[Case, ...]
+    cases: tuple[LoadCaseSet, ...]
     layouts: tuple[Layout, ...]
     loads: FloatArray
     unprotected: FloatArray
@@ -236,7 +236,7 @@ class Evaluation:
 
 def compare(
     evaluators: Evaluators,
-    cases: Sequence[Case],
+    cases: Sequence[LoadCaseSet],
     layouts: Sequence[Sequence[Element]],
     processes: int = 1,
     *,
@@ -289,7 +289,7 @@ def compare(
     )
 
 
-def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> None:
+def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
     """Refuse a case in which there is nothing to reduce.
 
     Args:
@@ -309,7 +309,7 @@ def check_something_arrives(cases: Sequence[Case], unprotected: FloatArray) -> N
 
 def loads_of_both(
     evaluator_of: Callable[[Scenario], BlastEvaluator],
-    cases: Sequence[Case],
+    cases: Sequence[LoadCaseSet],
     layouts: Sequence[Layout],
     processes: int = 1,
     progress: Callable[[float], None] | None = None,
@@ -341,7 +341,7 @@ def loads_of_both(
         done += len(together)
 
 
-def _counted(cases: Sequence[Case], loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:
+def _counted(cases: Sequence[LoadCaseSet], loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:
     return np.array(
         [
             [each.load(case.scenario.objective) for each in of_case]

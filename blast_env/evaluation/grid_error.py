@@ -20,7 +20,7 @@ from math import isnan, nan
 from typing import Final, TypeAlias
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, LoadCase
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.contract import BlastLoads, Engine, find_engine
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Layout
@@ -141,7 +141,7 @@ class GridError(CellErrors):
         coarser: The engine with the coarse cells.
     """
 
-    case: Case
+    case: LoadCaseSet
     layout: Layout
     threat: LoadCase
     coarser: Engine
@@ -170,7 +170,7 @@ class GridError(CellErrors):
 
 def grid_error(
     coarser: BlastEvaluator | None,
-    case: Case,
+    case: LoadCaseSet,
     layout: Layout,
     threat: LoadCase,
     fine: tuple[BlastLoads, BlastLoads],

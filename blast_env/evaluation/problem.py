@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import Case, LoadCase, check_distinct
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct
 from blast_env.evaluation.comparison import Assessment, check_something_arrives
 from blast_env.evaluation.engines import BlastLoads
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError
@@ -37,7 +37,7 @@ class DesignProblem:
     """
 
     evaluator: BlastEvaluator
-    case: Case
+    case: LoadCaseSet
     processes: int = 1
     budget: int | None = None
     _asked: set[tuple[Layout, LoadCase]] = field(default_factory=set, init=False, repr=False)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.evaluation.cases import Case, LoadCase, draw_threats, in_turn
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, draw_threats, in_turn
 from blast_env.evaluation.comparison import (
     CHARGE_COLUMNS,
     Evaluation,
@@ -282,7 +282,7 @@ class LayoutEvaluation(Evaluation):
     engine: Engine
 
     @property
-    def case(self) -> Case:
+    def case(self) -> LoadCaseSet:
         """The scenario and the threats."""
         return self.cases[0]
 
@@ -559,7 +559,7 @@ def evaluate_against(
     check_cvar_level(cvar_level)
     scenario = evaluator.scenario
     cells = tuple(sorted(check_layout(scenario, layout)))
-    case = Case(scenario, tuple(threats))
+    case = LoadCaseSet(scenario, tuple(threats))
     ((loads, unprotected),) = loads_of_both(
         lambda _: evaluator, [case], [cells], processes, progress
     )

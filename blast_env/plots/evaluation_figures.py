@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.evaluation.cases import Case
+from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.grid_error import points
 from blast_env.evaluation.report import LayoutEvaluation
@@ -344,7 +344,7 @@ class _Panel:
         in_range: Whether all threats are within the checked range.
     """
 
-    case: Case
+    case: LoadCaseSet
     layout: Layout
     reduction: float
     in_range: bool

@@ -38,7 +38,7 @@ from blast_agents.training.self_labelling import (
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, Evaluators
+from blast_env.evaluation import BlastEvaluator, Evaluators, LoadCaseSet
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
@@ -98,12 +98,12 @@ def agent_for(scenario: Scenario, observation: str = "grid") -> TrainedAgent:
     return TrainedAgent(policy_for(configuration, scenario), scenario, observation)
 
 
-def first_cases(scenario: Scenario, count: int, **changes: Any) -> tuple[Case, ...]:
+def first_cases(scenario: Scenario, count: int, **changes: Any) -> tuple[LoadCaseSet, ...]:
     chosen = run_settings(Path("anywhere"), **changes)
     return training_cases(chosen, SingleScenario(scenario), count)
 
 
-def by_rule(case: Case, name: str = "wall near the charge") -> Layout:
+def by_rule(case: LoadCaseSet, name: str = "wall near the charge") -> Layout:
     return layouts_by_rule(case.scenario, case.charge)[name]
 
 
@@ -137,7 +137,7 @@ def test_the_loss_counts_wanted_actions_alike_and_illegal_ones_not_at_all() -> N
     assert imitation_loss(surer, legal, wanted).item() == pytest.approx(np.log(2.0), abs=1e-3)
 
 
-def charge_y_m(case: Case) -> float:
+def charge_y_m(case: LoadCaseSet) -> float:
     assert isinstance(case.charge, Charge)
     return case.charge.position_m[1]
 

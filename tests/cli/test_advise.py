@@ -20,7 +20,7 @@ from blast_env.design.search.advice import (
     only,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.probability import LevelProbability
 from blast_env.geometry import Layout, Measure, standing
@@ -61,7 +61,7 @@ def test_each_kind_has_nothing_but_its_own_in_stock() -> None:
 
 def test_hardening_takes_the_best_choice_of_measures_with_one_blast() -> None:
     scenario = glazed_yard(target="medium")
-    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
     found = advise(problem, MeasureKind.HARDEN, 5)
     assert found.blasts == 1
     assert standing(found.layout) == ()
@@ -117,7 +117,7 @@ def test_rings_are_the_points_of_their_layouts_where_both_have_the_same_cells(
 def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
     """As many as barriers times choices of measures; what passes is not worse than the target."""
     scenario = glazed_yard(target="medium")
-    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
     found = advise(problem, MeasureKind.HARDEN, 5)
     assert [each.cost for each in found.tried] == [0.0, 5.0, 4.0, 9.0]
     front = cheapest([PricedDamage(each.cost, each.damage) for each in found.tried])
@@ -129,7 +129,7 @@ def test_all_that_was_looked_at_has_a_cost_and_a_damage() -> None:
 def test_what_a_judge_fails_is_searched_for_again_with_a_margin() -> None:
     """The judge is stricter than the search: it wants more glass, or a wall, than would do."""
     scenario = glazed_yard(target="medium")
-    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
     once = advise(problem, MeasureKind.TOGETHER, 12)
 
     def judge(layout: Layout) -> Verdict:

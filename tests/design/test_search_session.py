@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.evaluation import BlastEvaluator, Case, DesignProblem, LoadCase
+from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import hidden_search_set, known_search_set
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
@@ -194,14 +194,16 @@ def test_threats_that_are_no_use_are_refused(threats: tuple[LoadCase, ...], word
     with pytest.raises(BlastEnvError, match=words):
         DesignProblem(
             BlastEvaluator(small_scenario(), "event"),
-            Case(small_scenario(), threats, realisations=len(threats)),
+            LoadCaseSet(small_scenario(), threats, realisations=len(threats)),
         )
 
 
 def test_a_site_without_a_build_zone_is_refused() -> None:
     scenario = small_scenario().model_copy(update={"build_zone": None})
     with pytest.raises(BlastEnvError, match="no build zone"):
-        DesignProblem(BlastEvaluator(scenario, "event"), Case(scenario, (LoadCase(WEST, 1),)))
+        DesignProblem(
+            BlastEvaluator(scenario, "event"), LoadCaseSet(scenario, (LoadCase(WEST, 1),))
+        )
 
 
 def test_a_layout_that_does_not_fit_is_refused(problem: DesignProblem) -> None:

@@ -58,7 +58,7 @@ from blast_env.design.surrogate.walls import (
 from blast_env.design.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, LoadCase, draw_threats
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import LayoutState
@@ -546,8 +546,8 @@ def test_layouts_of_the_table_are_read_back() -> None:
     assert elements('[[1, 2, "t_wall", true]]') == (Piece(1, 2, "t_wall", True),)
 
 
-def case(charges: int = 1) -> Case:
-    return Case(YARD, draw_threats(YARD, range(charges)))
+def case(charges: int = 1) -> LoadCaseSet:
+    return LoadCaseSet(YARD, draw_threats(YARD, range(charges)))
 
 
 def test_a_search_by_guesses_is_never_worse_than_what_it_begins_with() -> None:
@@ -590,7 +590,7 @@ def test_of_what_an_agent_draws_it_proposes_what_the_surrogate_likes_best(
     surrogate, drawing = by_hand(), Drawing()
     proposed = LearntSearch(surrogate, drawing, ranked=3).at_once(YARD, charge)
     drawn = [tuple(sorted(each)) for each in drawing.sample(YARD, charge, 3)]
-    met = case() if charge is None else Case(YARD, (LoadCase(charge, 0),))
+    met = case() if charge is None else LoadCaseSet(YARD, (LoadCase(charge, 0),))
     likes = Guesses.of(surrogate, met).loads([(), *drawn])
     if charge is not None:
         assert proposed == [(), *drawn][int(likes.argmin())]
@@ -632,7 +632,7 @@ class WrongBy(DesignProblem):
 
     def true_load(self, layout: Layout, threats: tuple[LoadCase, ...]) -> float:
         factor = 0.7 + 0.6 * random.Random(repr(layout)).random()
-        return factor * Guesses.of(by_hand(), Case(YARD, threats)).loads([layout]).item()
+        return factor * Guesses.of(by_hand(), LoadCaseSet(YARD, threats)).loads([layout]).item()
 
 
 def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, LoadCase, SeedRange, draw_threats
+from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import are_all, fixed_charges, hidden_search_set, in_turn
 from blast_env.site import PointSource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk
@@ -91,7 +91,7 @@ def test_a_search_meets_none_of_the_threats_that_judge() -> None:
     search_set = hidden_search_set(scenario, 3, 2, seed=1)
     assert all(threat.seed in SeedRange.SEARCH.value for threat in search_set.threats)
     with pytest.raises(BlastEnvError, match="a search may not use"):
-        Case(scenario, search_set.threats[:1], search_set=search_set)
+        LoadCaseSet(scenario, search_set.threats[:1], search_set=search_set)
 
 
 def test_realisations_are_averaged_before_the_risk() -> None:
@@ -101,16 +101,16 @@ def test_realisations_are_averaged_before_the_risk() -> None:
     threats = tuple(LoadCase(charges[k % 3], k) for k in range(6))
     worst = ConditionalValueAtRisk(0.9)
     impulses = [1.0, 2.0, 6.0, 3.0, 4.0, 2.0]
-    assert Case(scenario, threats, 2).combined(impulses) == pytest.approx(3.0)
-    assert Case(scenario, threats, 2, worst).combined(impulses) == pytest.approx(4.0)
-    assert Case(scenario, threats, 2, worst).combined(impulses[:2]) == pytest.approx(2.0)
+    assert LoadCaseSet(scenario, threats, 2).combined(impulses) == pytest.approx(3.0)
+    assert LoadCaseSet(scenario, threats, 2, worst).combined(impulses) == pytest.approx(4.0)
+    assert LoadCaseSet(scenario, threats, 2, worst).combined(impulses[:2]) == pytest.approx(2.0)
 
 
 def test_a_charge_that_is_drawn_twice_counts_twice() -> None:
     """A risk over draws, not over places: a likely place weighs more."""
     scenario = load_scenario("courtyard")
     same, other = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)
-    case = Case(scenario, (LoadCase(same, 1), LoadCase(same, 2), LoadCase(other, 3)))
+    case = LoadCaseSet(scenario, (LoadCase(same, 1), LoadCase(same, 2), LoadCase(other, 3)))
     assert case.combined([1.0, 2.0, 6.0]) == pytest.approx(3.0)
 
 
@@ -119,9 +119,9 @@ def test_threats_out_of_order_are_refused() -> None:
     first, second = Charge((5.0, 10.0), 100.0), Charge((5.0, 20.0), 100.0)
     threats = (LoadCase(first, 1), LoadCase(first, 2), LoadCase(second, 3), LoadCase(second, 4))
     with pytest.raises(BlastEnvError, match=r"threats\[2\] .* in the order of the charges"):
-        Case(scenario, threats, realisations=2)
+        LoadCaseSet(scenario, threats, realisations=2)
     with pytest.raises(BlastEnvError, match="2 realisations of each charge"):
-        Case(scenario, threats[:3], realisations=2)
+        LoadCaseSet(scenario, threats[:3], realisations=2)
 
 
 # --- Fixed charges.

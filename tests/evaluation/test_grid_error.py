@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, compare, evaluate_layout
-from blast_env.evaluation.cases import Case, draw_threats
+from blast_env.evaluation.cases import LoadCaseSet, draw_threats
 from blast_env.evaluation.engines import find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.evaluation.grid_error import (
@@ -130,7 +130,7 @@ def test_several_cases_have_that_of_the_worst_charge() -> None:
     evaluators = Evaluators(GasEngine(cell_m=0.25, border_m=0.0))
     coarser = evaluators.coarser()
     assert coarser is not None
-    cases = [Case(each, draw_threats(each, [0])) for each in (light, hut())]
+    cases = [LoadCaseSet(each, draw_threats(each, [0])) for each in (light, hut())]
     found = compare(evaluators, cases, [WALL, WALL], coarser=coarser)
     assert found.grid_error is not None
     assert found.grid_error.case is cases[1]

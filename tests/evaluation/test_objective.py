@@ -9,7 +9,13 @@ from blast_env.cli.evaluation_report import print_means
 from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, LoadCase, draw_threats, evaluate_against
+from blast_env.evaluation import (
+    BlastEvaluator,
+    LoadCase,
+    LoadCaseSet,
+    draw_threats,
+    evaluate_against,
+)
 from blast_env.site import ObjectiveSection, Scenario, ScenarioError
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, WorstRisk
@@ -85,10 +91,10 @@ def test_both_add_shares_of_their_references_by_the_weights_of_a_structure(
 def test_several_charges_become_one_as_the_objective_says(
     charges: dict[str, Any], risk: MeanRisk | WorstRisk | ConditionalValueAtRisk
 ) -> None:
-    case = Case(site(**charges), (NEAR, FAR))
+    case = LoadCaseSet(site(**charges), (NEAR, FAR))
     loads = np.array([3.0, 7.0])
     assert case.combined(loads) == risk(loads)
-    assert Case(site(**charges), (NEAR, FAR), risk=MeanRisk()).combined(loads) == 5.0
+    assert LoadCaseSet(site(**charges), (NEAR, FAR), risk=MeanRisk()).combined(loads) == 5.0
 
 
 def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
@@ -99,7 +105,7 @@ def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
     assert evaluation.load == max(loads)
     assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(unprotected))
     assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met
-    problem = DesignProblem(evaluator, Case(evaluator.scenario, (NEAR, FAR)))
+    problem = DesignProblem(evaluator, LoadCaseSet(evaluator.scenario, (NEAR, FAR)))
     assert problem.load(WALL) == max(loads)
 
 
@@ -174,5 +180,5 @@ def test_an_objective_of_ones_own_is_one_class_and_then_counts_everywhere(
     _, _, _, _, info = env.step(env.placement.catalogue.finish)
     counted = info["impulse_pa_s"] - 100.0
     assert info["reward_terms"]["impulse"] == pytest.approx(-counted / PA_PER_PSI)
-    problem = DesignProblem(BlastEvaluator(own, "gas"), Case(own, (NEAR,)))
+    problem = DesignProblem(BlastEvaluator(own, "gas"), LoadCaseSet(own, (NEAR,)))
     assert problem.load(WALL) == pytest.approx(protected)

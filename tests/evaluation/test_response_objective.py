@@ -11,7 +11,7 @@ from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, Case, LoadCase, evaluate_against
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_against
 from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Measure
 from blast_env.layout import LayoutState
@@ -89,7 +89,7 @@ def test_with_a_target_the_cheapest_layout_that_reaches_it_is_worth_most() -> No
 
 def test_case_counts_the_cost_of_a_layout_that_passes() -> None:
     scenario = glazed_yard(target="medium")
-    case = Case(scenario, (THREAT,))
+    case = LoadCaseSet(scenario, (THREAT,))
     assert case.objective_value([0.0], (TAKEN,)) == pytest.approx(5.0 / 20.0)
     assert case.objective_value([0.3], (TAKEN,)) == pytest.approx(1.3)
     assert case.combined([0.3]) == pytest.approx(0.3)
@@ -115,7 +115,7 @@ def test_rewards_are_what_counts_and_info_says_the_level(tmp_path: Path) -> None
 def test_searches_harden_without_spending_blasts_on_it(method: str) -> None:
     pytest.importorskip("pymoo")
     scenario = glazed_yard(charges="mean")
-    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), Case(scenario, (THREAT,)))
+    problem = DesignProblem(BlastEvaluator(scenario, "surrogate"), LoadCaseSet(scenario, (THREAT,)))
     metered = replace(problem, budget=30)
     assert metered.unprotected[0] > 0.0
     result = find_proposer(method).propose(metered, 30, 1)

@@ -6,10 +6,10 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
-    Case,
     Evaluators,
     LayoutEvaluation,
     LoadCase,
+    LoadCaseSet,
     compare,
     draw_threats,
     evaluate_layout,
@@ -55,7 +55,7 @@ def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
 def test_the_mechanism_is_the_same_for_all_that_judge_layouts(
     evaluation: LayoutEvaluation,
 ) -> None:
-    case = Case(SITE, evaluation.threats)
+    case = LoadCaseSet(SITE, evaluation.threats)
     together = compare(Evaluators(GAS), [case, case], [POSTS, ()])
     assert together.case_reductions.tolist() == [evaluation.mean_reduction, 0.0]
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import Case, Evaluation, LoadCase
+from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet
 from blast_env.plots.evaluation_figures import MOST_SHOWN, comparison_figure
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import Kinds
@@ -30,7 +30,7 @@ def comparison(
     cases = []
     for number in range(len(reductions)):
         threat = LoadCase(Charge((5.0, 8.0 + number), 100.0), number)
-        cases.append(Case(scenarios[number % len(scenarios)], (threat,)))
+        cases.append(LoadCaseSet(scenarios[number % len(scenarios)], (threat,)))
     return Evaluation(
         cases=tuple(cases),
         layouts=tuple(tuple((row, 0) for row in range(index + 1)) for index in range(len(cases))),

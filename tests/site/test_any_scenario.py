@@ -13,7 +13,7 @@ import pytest
 import blast_env
 from blast_env.design.rules import random_layout, wall_near_charge
 from blast_env.design.search import layouts_by_rule
-from blast_env.evaluation import BlastEvaluator, Case, Evaluators, LoadCase, draw_threats
+from blast_env.evaluation import BlastEvaluator, Evaluators, LoadCase, LoadCaseSet, draw_threats
 from blast_env.io.export import LayoutPlan
 from blast_env.layout import LayoutFile, LayoutState, check_layout, usable_cells
 from blast_env.site.scene import Charge
@@ -99,7 +99,7 @@ def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> No
         lambda it: draw_threats(it, range(3)),
         lambda it: BlastEvaluator(it).scenario,
         lambda it: Evaluators("event").of(it).scenario,
-        lambda it: Case(it, (THREAT,)).scenario,
+        lambda it: LoadCaseSet(it, (THREAT,)).scenario,
         lambda it: LayoutPlan(it, ((1, 1),)).scenario,
         lambda it: blast_env.Blast(it, seed=3).scenario,
         lambda it: wall_near_charge(it, CHARGE),

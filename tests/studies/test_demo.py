@@ -9,7 +9,7 @@ import pytest
 
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.design.surrogate import site_of
-from blast_env.evaluation import Case, Evaluation, LoadCase, SeedRange
+from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet, SeedRange
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, save_scenario
@@ -87,7 +87,7 @@ def comparison_of(
     other: list[float] | None = None,
 ) -> AgentComparison:
     """Loads by hand, a threat each; without a barrier it is 10 Pa s everywhere."""
-    cases = tuple(Case(SITE, (LoadCase(CHARGE, seed),)) for seed in range(len(agent)))
+    cases = tuple(LoadCaseSet(SITE, (LoadCase(CHARGE, seed),)) for seed in range(len(agent)))
     unprotected = np.full((len(agent), 1), 10.0)
 
     def of(loads: list[float]) -> Evaluation:

@@ -9,7 +9,7 @@ from blast_agents.training.run_folder import TrainingSettings
 from blast_env.design.search import LayoutAgent
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, Evaluators, LoadCase, SeedRange, compare, draw_threats
+from blast_env.evaluation import Evaluators, LoadCase, LoadCaseSet, SeedRange, compare, draw_threats
 from blast_env.evaluation.cases import in_turn
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
@@ -27,7 +27,7 @@ class Selection:
         processes: Worker processes for the blasts.
     """
 
-    cases: tuple[Case, ...]
+    cases: tuple[LoadCaseSet, ...]
     evaluators: Evaluators
     processes: int = 1
 
@@ -72,7 +72,7 @@ class Selection:
 
 def training_cases(
     settings: TrainingSettings, source: ScenarioSource, count: int
-) -> tuple[Case, ...]:
+) -> tuple[LoadCaseSet, ...]:
     """Return distinct training cases, which depend only on the settings.
 
     Args:
@@ -93,9 +93,9 @@ def training_cases(
     if known_site and not hidden:
         shown = in_turn(drawn[0][0], [first for _, (first,) in drawn])
         drawn = [(drawn[0][0], (each,)) for each in shown]
-    cases: dict[object, Case] = {}
+    cases: dict[object, LoadCaseSet] = {}
     for index, (scenario, of_case) in enumerate(drawn):
-        case = Case(
+        case = LoadCaseSet(
             scenario,
             of_case,
             charge=None if hidden else of_case[0].charge,
@@ -108,7 +108,7 @@ def training_cases(
 
 def unseen_cases(
     settings: TrainingSettings, source: ScenarioSource, seeds: Sequence[int]
-) -> tuple[Case, ...]:
+) -> tuple[LoadCaseSet, ...]:
     """Return one case per seed: threats of the run's scenario, or each of a held-out site.
 
     Fixed charges of a scenario come in turn, each once before any repeats.
@@ -140,7 +140,7 @@ def _ranges_of(source: ScenarioSource) -> AnyRanges:
 
 def _cases(
     settings: TrainingSettings, scenarios: Sequence[Scenario], seeds: Sequence[int]
-) -> tuple[Case, ...]:
+) -> tuple[LoadCaseSet, ...]:
     """Return one case with one threat per scenario and seed."""
     if len(set(seeds)) < len(seeds):
         raise BlastEnvError("seeds: one appears twice, must be unique")
@@ -152,6 +152,6 @@ def _cases(
     for number, (scenario, threat) in enumerate(zip(scenarios, threats, strict=True), start=1):
         known_charge = threat.charge if settings.threat == "visible" else None
         cases.append(
-            Case(scenario, (threat,), charge=known_charge, name=f"{scenario.name} {number}")
+            LoadCaseSet(scenario, (threat,), charge=known_charge, name=f"{scenario.name} {number}")
         )
     return tuple(cases)

@@ -36,7 +36,7 @@ from blast_env.design.search import layouts_by_rule
 from blast_env.design.search.moves import Moves, legal_part
 from blast_env.envs.observations import OBSERVATIONS, EpisodeObservation, Observable
 from blast_env.envs.strategies import ScenarioSource
-from blast_env.evaluation import Case, Evaluators
+from blast_env.evaluation import Evaluators, LoadCaseSet
 from blast_env.evaluation.evaluator import run_together
 from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
@@ -80,7 +80,7 @@ class Demonstration:
             observation has the planes for them.
     """
 
-    case: Case
+    case: LoadCaseSet
     layout: Layout
     reduction: float
     observation: str = "grid"
@@ -212,7 +212,7 @@ class Judge:
     asked: int = 0
 
     def loads(
-        self, asked: Sequence[tuple[Case, Layout]], threats: slice
+        self, asked: Sequence[tuple[LoadCaseSet, Layout]], threats: slice
     ) -> list[tuple[float, ...]]:
         """Return the loads of each pair, one per threat, in the unit of the objective.
 
@@ -240,7 +240,9 @@ Loads = Mapping[Layout, tuple[float, ...]]
 """Layouts and their loads, one per threat simulated so far, in the objective's unit."""
 
 
-def race(judge: Judge, cases: Sequence[Case], layouts: Sequence[Sequence[Layout]]) -> list[Loads]:
+def race(
+    judge: Judge, cases: Sequence[LoadCaseSet], layouts: Sequence[Sequence[Layout]]
+) -> list[Loads]:
     """Compare the layouts of each case on its threats, by successive halving.
 
     All are simulated under the first threat, the better half under the second, the better quarter
@@ -280,7 +282,7 @@ class Lessons:
         labels: One label per case; none before the first round.
     """
 
-    cases: tuple[Case, ...]
+    cases: tuple[LoadCaseSet, ...]
     labels: list[CaseLabel] = field(default_factory=list)
 
     def reduction(self, index: int) -> float:
@@ -540,7 +542,7 @@ def _sorted(layout: Layout) -> Layout:
 
 
 def _reduction(
-    case: Case, layout: Layout, load: tuple[float, ...], unprotected: tuple[float, ...]
+    case: LoadCaseSet, layout: Layout, load: tuple[float, ...], unprotected: tuple[float, ...]
 ) -> float:
     """Return a relative reduction; 0 if nothing arrives without a barrier."""
     share = reductions(case.objective_value(load, layout), case.objective_value(unprotected))

@@ -22,7 +22,7 @@ from blast_env.design.surrogate.correction import Correction
 from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Case, DesignProblem, LoadCase
+from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
@@ -56,12 +56,12 @@ class Guesses:
     """
 
     surrogate: Surrogate
-    case: Case
+    case: LoadCaseSet
     site: SurrogateSite
     _known: dict[Layout, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, surrogate: Surrogate, case: Case) -> "Guesses":
+    def of(cls, surrogate: Surrogate, case: LoadCaseSet) -> "Guesses":
         """Return an empty cache.
 
         Raises:
@@ -312,7 +312,7 @@ def _given(agent: SamplingAgent | None) -> SamplingAgent:
     return agent
 
 
-def case_for(scenario: Scenario, charge: AnyCharge | None) -> Case:
+def case_for(scenario: Scenario, charge: AnyCharge | None) -> LoadCaseSet:
     """Return the case of a proposal without blasts: the charge, or some of the possible ones."""
     if charge is not None:
         return known_search_set(scenario, charge, 1, 0)
@@ -362,7 +362,7 @@ class _Estimates:
         problem = session.problem
 
         def under(threats: Sequence[LoadCase]) -> Guesses:
-            case = Case(problem.scenario, tuple(threats), risk=problem.case.risk)
+            case = LoadCaseSet(problem.scenario, tuple(threats), risk=problem.case.risk)
             return Guesses.of(surrogate, case)
 
         first = problem.threats[: session.plan.threats]

@@ -9,7 +9,7 @@ import pytest
 import blast_env
 from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.evaluation import BlastEvaluator, Case, draw_threats, evaluate_layout
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet, draw_threats, evaluate_layout
 from blast_env.evaluation.engines import contract, find_engine
 from blast_env.site import load_scenario
 from blast_env.units import PA_PER_PSI
@@ -68,7 +68,7 @@ def test_layouts_are_evaluated_and_reported_with_it() -> None:
 
 def test_a_search_uses_up_the_stock_with_it() -> None:
     evaluator = BlastEvaluator(COURTYARD, "shade")
-    problem = DesignProblem(evaluator, Case(COURTYARD, draw_threats(COURTYARD, range(1))))
+    problem = DesignProblem(evaluator, LoadCaseSet(COURTYARD, draw_threats(COURTYARD, range(1))))
     found = find_proposer("random").propose(problem, 8, seed=0)
     best = max(found.history, key=lambda each: len(each.layout))
     assert found.load == pytest.approx(problem.load(()) * 0.9 ** len(best.layout))
