@@ -254,6 +254,7 @@ NOT_RUN: Final[dict[str, str]] = {
     "blast-env judge --method my_module:climb --secret 'a text that the judge keeps' --sites 8"
     " --out entry": "my_module is a placeholder; tests/benchmark runs such a method",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
+    "python ppo.py --env-id blast_env:BlastBarrier-v0 --total-timesteps 4096": "needs CleanRL",
 }
 """Commands that are parsed only, and why."""
 
@@ -276,5 +277,7 @@ CODE_NOT_RUN: Final = {
     ("docs/researchers/libraries.md", 5): (
         "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
     ),
+    ("docs/researchers/libraries.md", 6): "needs SBX, and so JAX",
+    ("docs/researchers/libraries.md", 7): "needs PufferLib, which pip cannot build everywhere",
 }
 """Blocks of Python, by their number on the page, that are compiled only, and why."""
