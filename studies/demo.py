@@ -20,7 +20,6 @@ from sb3_contrib import MaskablePPO
 
 from blast_env.cli.evaluation_report import interval
 from blast_env.cli.output import (
-    percent,
     print_line,
     print_table,
     progress_bar,
@@ -43,6 +42,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
+from blast_env.evaluation.grid_error import percent
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_layouts

@@ -30,6 +30,7 @@ from blast_env.app.records import (
     read_record,
     write_kept,
 )
+from blast_env.app.work import ANSWER
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder, write_atomically
@@ -150,6 +151,10 @@ class DesignFolder:
     def coarse_there(self) -> frozenset[str]:
         """Return the keys of the blasts with loads on coarser cells."""
         return frozenset(path.parent.name for path in self.blasts.glob(f"*/{COARSE}"))
+
+    def answers_there(self) -> list[Path]:
+        """Return the files of answers, the latest first."""
+        return sorted(self.jobs.glob(f"*/{ANSWER}"), reverse=True)
 
     def _content(self) -> Any:
         path = self.path / _DESIGN

@@ -6,6 +6,7 @@ independent of each other.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from blast_env.app.records import (
     VerdictRow,
     blast_key,
     comparison,
+    read_kept,
 )
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import (
@@ -35,22 +37,33 @@ from blast_env.app.verdicts import (
     verdicts_of,
 )
 from blast_env.app.work import (
+    Answer,
+    AnswerTask,
     BlastTask,
     FilmTask,
     ProposalTask,
+    Question,
     ReportChoice,
     ReportTask,
     SearchTask,
     Status,
     Task,
 )
+from blast_env.design.search.advice import kinds_for
+from blast_env.design.search.advised import ROUNDS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.capacity import MOST_BLASTS
 from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation.probability import Uncertainty
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
 from blast_env.layout.build_scene import charge_against
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
+
+NO_FACADE = "Give structures windows or wall panels first (on the left)."
+"""Message where no structure has a facade, so that there is no level of protection."""
 
 BARE = "no barrier"
 """Name of the blast without a layout."""
@@ -295,6 +308,89 @@ class Session:
             pdf=None if pdf is None else str(pdf),
         )
         return self._begin(task, f"report {page.name if pdf is None else pdf.name}")
+
+    def ask(
+        self, question: Question, target: LevelOfProtection, mass_error: float, budget: int
+    ) -> Path:
+        """Ask a question on the active layout under the chosen threats, by gas dynamics.
+
+        Args:
+            question: The question.
+            target: Required level of protection.
+            mass_error: Uncertainty of the masses; see `Uncertainty`.
+            budget: Most blasts of a search of advice.
+
+        Raises:
+            BlastEnvError: If it cannot be answered: without gas dynamics or a facade, or, with
+                advice, without a budget of the build zone.
+        """
+        task = self._question(question, target, mass_error, budget)
+        return self._begin(task, f"{question} {task.name}, {self.engine.label}")
+
+    def cost_of_question(
+        self, question: Question, target: LevelOfProtection, mass_error: float, budget: int
+    ) -> tuple[CostGuess, ...]:
+        """Return the largest costs of the blasts of a question; see `ask`."""
+        task = self._question(question, target, mass_error, budget)
+        layouts = 2 if task.layout else 1
+        fine = tuple(self._cost(each.charge) for each in task.threats)
+        coarse = tuple(
+            task.search_engine.gas.cost(self.scenario, each.charge) for each in task.threats
+        )
+        if question is Question.CAPACITY:
+            return fine * (layouts * MOST_BLASTS)
+        if question is Question.ASSESS:
+            return (fine + coarse[: task.engine.coarser is not None]) * layouts
+        searches = len(kinds_for(self.scenario)) * ROUNDS
+        searched = tuple(coarse[k % len(coarse)] for k in range(budget * searches))
+        return searched + fine * searches
+
+    def _question(
+        self, question: Question, target: LevelOfProtection, mass_error: float, budget: int
+    ) -> AnswerTask:
+        Uncertainty(mass=mass_error)  # refuses one that is out of bounds
+        if self.engine.is_first_look:
+            raise BlastEnvError("particles give no level of protection: choose gas as the engine")
+        if not self.scenario.bays:
+            raise BlastEnvError(NO_FACADE)
+        if question is Question.ADVISE:
+            if self.scenario.zone.budget is None:
+                raise BlastEnvError("the build zone has no budget: advice is for one")
+            if budget < len(self.chosen_threats()):
+                raise BlastEnvError(
+                    f"budget is {budget} blasts, must be at least {len(self.chosen_threats())}: "
+                    "one per threat"
+                )
+        is_advice = question is Question.ADVISE
+        return AnswerTask(
+            **self._on_site(None if is_advice else self.scenario.without_budget),
+            subject=self.subject,
+            layout=placing.plain(self.design.layout),
+            question=question,
+            name=SLOTS[self.design.active],
+            engine=self.engine,
+            target=target,
+            mass_error=mass_error,
+            budget=budget,
+        )
+
+    def answers(self) -> list[tuple[Answer, bool]]:
+        """Return an answer to each question asked, and whether it is on the present design.
+
+        One on the present design comes before others; of several, the latest counts.
+        """
+        subject, found = self.subject, dict[Question, Answer]()
+        read = [read_kept(Answer, path) for path in self.folder.answers_there()]
+        every = [each for each in read if each is not None]
+        for answer in sorted(every, key=lambda each: each.subject != subject):
+            found.setdefault(answer.question, answer)
+        return [(found[each], found[each].subject == subject) for each in Question if each in found]
+
+    @property
+    def subject(self) -> str:
+        """The digest of the site, the active layout and the chosen threats."""
+        on = self.scenario.model_dump_json(), self.design.layout, self.chosen_threats()
+        return sha256(repr(on).encode()).hexdigest()
 
     def take(self, status: Status, slot: int) -> None:
         """Put the layout of a proposal or a search into a slot of the design.

@@ -1,4 +1,4 @@
-"""The tasks of a worker: proposals, searches, films and reports; blasts are in `blasts`.
+"""The tasks of a worker: proposals, searches, answers, films, reports; blasts are in `blasts`.
 
 Long work reports its progress through a `Teller`, and may be interrupted anywhere by
 `KeyboardInterrupt`.
@@ -13,10 +13,15 @@ from blast_env.app import placing
 from blast_env.app.blasts import run_blasts, warm_engines
 from blast_env.app.cost import ReportCost
 from blast_env.app.offers import PACKAGED, proposed, title_of
+from blast_env.app.records import write_kept
 from blast_env.app.work import (
+    ANSWER,
+    Answer,
+    AnswerTask,
     BlastTask,
     FilmTask,
     ProposalTask,
+    Question,
     ReportTask,
     SearchTask,
     Status,
@@ -94,6 +99,8 @@ def run_task(folder: Path) -> None:
         _film(task, teller)
     elif isinstance(task, ReportTask):
         _report(task, teller)
+    elif isinstance(task, AnswerTask):
+        _answer(task, teller)
     else:
         _propose(task, teller)
 
@@ -169,6 +176,41 @@ def search_case(scenario: Scenario, task: SearchTask) -> LoadCaseSet:
     first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
     threats = [LoadCase(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
     return LoadCaseSet(scenario, tuple(threats), realisations)
+
+
+def _answer(task: AnswerTask, teller: Teller) -> None:
+    # Here, because they take long to import, and a blast needs none of them.
+    from blast_env.design.search.advised import AdviceJudge, advised, asked_site
+    from blast_env.evaluation.assessment import assess
+    from blast_env.evaluation.capacity import capacity
+
+    scenario, engine = task.site, task.engine.gas
+    charges = [each.charge for each in task.threats]
+    layouts: dict[str, Layout] = {"no barrier": ()}
+    if task.layout:
+        layouts[f"layout {task.name}"] = placing.layout_from(scenario, task.layout)
+    changes: dict[str, object] = {}
+    if task.question is Question.ASSESS:
+        found = assess(scenario, layouts, charges, engine, teller.share, cache=Path(task.cache))
+        parts = found.answer(task.level, task.mass_error)
+    elif task.question is Question.CAPACITY:
+        evaluator = BlastEvaluator(scenario, engine, cache=task.cache)
+        parts = capacity(evaluator, layouts, charges, teller.share).answer()
+    else:
+        site = asked_site(scenario, task.level)
+        coarse = BlastEvaluator(site, task.search_engine.gas, cache=task.cache)
+        judge = AdviceJudge(
+            DesignProblem(coarse, LoadCaseSet(site, task.threats)),
+            BlastEvaluator(site, engine, cache=task.cache),
+            task.mass_error,
+        )
+        advice = advised(judge, task.budget, progress=teller.share)
+        parts = advice.answer()
+        changes["layout"] = placing.plain(advice.best.layout) or None
+    answer = Answer(question=task.question, subject=task.subject, parts=tuple(parts))
+    write_kept(answer, teller.folder / ANSWER)
+    first = next(each for each in answer.parts if isinstance(each, str))
+    teller.tell(state="done", share=1.0, text=first, **changes)
 
 
 def _film(task: FilmTask, teller: Teller) -> None:

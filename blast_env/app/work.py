@@ -1,6 +1,7 @@
 """Work requested on the page, as files: the task, its progress and its result."""
 
 from collections.abc import Iterable
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -10,6 +11,7 @@ from blast_env.app.records import MOST_BYTES, EngineRecord, Kept, write_kept
 from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.answers import AnswerTable
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
 
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
 
 TASK: Final = "task.json"
 STATUS: Final = "status.json"
+ANSWER: Final = "answer.json"
+"""Name of the file of an answer in the folder of its work."""
+
 _LEAST_SHARE: Final = 0.05  # below it the time left cannot be estimated
 State = Literal["waiting", "running", "done", "failed", "stopped"]
 
@@ -111,6 +116,67 @@ class FilmTask(LayoutTask):
     path: str
 
 
+class Question(StrEnum):
+    """Questions on the level of protection of buildings, each as a command answers it.
+
+    Attributes:
+        ASSESS: Does the layout comply, and with which probability? As `assess`.
+        CAPACITY: Up to which charge, and from which stand-off? As `assess --capacity`.
+        ADVISE: Which measures comply at the least cost? As `advise`.
+    """
+
+    ASSESS = "assess"
+    CAPACITY = "largest charge"
+    ADVISE = "advise"
+
+
+class AnswerTask(LayoutTask):
+    """A question on a layout, by gas dynamics.
+
+    Attributes:
+        question: The question.
+        name: Name of the layout.
+        engine: The engine; a search of advice has its coarser cells.
+        target: Required level of protection.
+        mass_error: Uncertainty of the masses; see `Uncertainty`.
+        budget: Most blasts of a search of advice.
+        subject: Digest of the site, the layout and the threats.
+    """
+
+    kind: Literal["answer"] = "answer"
+    question: Question
+    subject: str
+    name: str
+    engine: EngineRecord
+    target: int
+    mass_error: float
+    budget: int
+
+    @property
+    def level(self) -> LevelOfProtection:
+        """The required level of protection."""
+        return LevelOfProtection(self.target)
+
+    @property
+    def search_engine(self) -> EngineRecord:
+        """The engine of a search of advice."""
+        return self.engine.coarser or self.engine
+
+
+class Answer(Kept):
+    """The answer to a question.
+
+    Attributes:
+        question: The question.
+        subject: As in `AnswerTask`.
+        parts: Its lines and tables.
+    """
+
+    question: Question
+    subject: str
+    parts: tuple[str | AnswerTable, ...]
+
+
 class ReportChoice(Kept):
     """The contents of a report; see `StudyOptions`."""
 
@@ -151,7 +217,8 @@ class ReportTask(LayoutTask):
 
 
 Task = Annotated[
-    BlastTask | SearchTask | ProposalTask | FilmTask | ReportTask, Field(discriminator="kind")
+    BlastTask | SearchTask | ProposalTask | FilmTask | ReportTask | AnswerTask,
+    Field(discriminator="kind"),
 ]
 
 _TASK: Final[TypeAdapter[Task]] = TypeAdapter(Task)

@@ -26,7 +26,6 @@ from blast_env.cli.evaluation_report import (
     threats_text,
 )
 from blast_env.cli.output import (
-    percent,
     print_cost,
     print_line,
     print_table,
@@ -44,6 +43,7 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.grid_error import percent
 from blast_env.files import write_atomically
 from blast_env.io.export import LayoutPlan, export_layouts
 from blast_env.layout.build_scene import charge_against

@@ -5,7 +5,7 @@ from typing import Final
 
 import typer
 
-from blast_env.cli.assessment import print_assessment
+from blast_env.cli.assessment import draw, print_assessment, write_table
 from blast_env.cli.capacity import print_capacity
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
@@ -46,8 +46,8 @@ _MASS_HELP: Final = (
     f"NAME=KG[,EXPLOSIVE] with {', '.join(TNT_EQUIVALENTS)}; else the site's own. May be repeated."
 )
 _OF_SCREENING: Final = ("mass", "gas")
-_OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg")
-_OF_ASSESSMENT: Final = ("without_fallen", "view", "diagram", "table", "cache")
+_OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg", "cache")
+_OF_ASSESSMENT: Final = ("without_fallen", "view", "diagram", "table")
 
 
 def assess(
@@ -138,7 +138,9 @@ def assess(
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
         refuse_given(context, (*_OF_ASSESSMENT, "require"), "does not apply to --capacity")
-        print_capacity(site, layouts, drawn, engine, level, Uncertainty(mass=mass_error), picture)
+        uncertainty = Uncertainty(mass=mass_error)
+        with resumable(resume_words(cache)):
+            print_capacity(site, layouts, drawn, engine, level, uncertainty, picture, cache)
         return
     with resumable(resume_words(cache)):
         assessed = print_assessment(
@@ -153,5 +155,5 @@ def assess(
             cache=cache,
         )
     if table is not None:
-        assessed.write_table(table, engine)
-    assessed.draw(picture, view, diagram)
+        write_table(assessed, table, engine)
+    draw(assessed, picture, view, diagram)

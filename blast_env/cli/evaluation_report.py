@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from blast_env.cli.options import GivenCharge
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
-    building_words,
     layout_picture,
-    percent,
     print_cost,
     print_json,
     print_line,
@@ -30,16 +28,16 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_against,
 )
+from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.engines.contract import BlastLoads
-from blast_env.evaluation.grid_error import GridError, final_engine, points, with_errors, worse
+from blast_env.evaluation.grid_error import final_engine, percent, points, with_errors, worse
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.io.export import LayoutPlan, check_target, export_layouts
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
-from blast_env.statistics import Estimate, reductions
+from blast_env.statistics import Estimate
 from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
 
@@ -304,30 +302,6 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
     print_if_all_charges(evaluation.scenario, [each.charge for each in evaluation.threats])
     for note in evaluation.notes:
         print_line(f"note: {note}")
-
-
-def impulse_text(error: GridError) -> str:
-    """Return the impulse on the protected structures under one charge, with errors of the cells."""
-
-    def impulse_of(loads: BlastLoads) -> float:
-        return loads.protected_impulse_pa_s
-
-    def text(number: int, share: float) -> str:
-        pa_s = impulse_of(error.fine[number])
-        return with_errors(f"{pa_s:,.0f} Pa s", "" if isnan(share) else f"{share * pa_s:,.0f}")
-
-    protected, unprotected = (
-        text(0, error.of_load(impulse_of)),
-        text(1, error.of_unprotected(impulse_of)),
-    )
-    words = "impulse on the protected structures under the worst charge"
-    if not error.layout:
-        return f"{words}: {protected}"
-    gone = reductions(*map(impulse_of, error.fine)).item()
-    share = with_errors(percent(gone), points(error.of_reduction(impulse_of)))
-    return (
-        f"{words}: {unprotected} without barrier, {protected} with, reduction {share}{worse(gone)}"
-    )
 
 
 def _number(load: float, error: float) -> str:

@@ -16,9 +16,9 @@ from blast_env.cli.output import (
     print_table,
     print_written,
     save_pictures,
-    titled,
 )
 from blast_env.cli.targets import PICTURES
+from blast_env.evaluation.answers import titled
 from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions
 from blast_env.site import save_scenario
 

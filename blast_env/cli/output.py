@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import isnan
 from pathlib import Path
 from signal import SIG_DFL, SIGINT, SIGTERM, getsignal, signal
 from threading import current_thread, main_thread
@@ -22,15 +21,12 @@ from rich.table import Table
 from rich.text import Text
 
 from blast_env.errors import BlastEnvError, MissingExtraError
-from blast_env.evaluation.engines.pieces import outcome_words
+from blast_env.evaluation.answers import AnswerPart, AnswerTable
 from blast_env.geometry import Element
-from blast_env.io.importing.options import plain
 from blast_env.site import AnyCharge, Scenario
-from blast_env.units import MS_PER_S, PA_PER_KPA
 from blast_env.values import printable, printable_line
 
 if TYPE_CHECKING:  # a third of a second to import
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from blast_env.evaluation.engines import Engine
@@ -58,16 +54,6 @@ def result_console() -> Console:
     known = sys.stdout.isatty() or "COLUMNS" in os.environ
     width = None if known else _PIPE_COLUMNS
     return _plain(width=width)
-
-
-def building_words(scenario: Scenario, name: str) -> str:
-    """Return the name of a building, with its title if that says more."""
-    return titled(name, scenario.title_of(name))
-
-
-def titled(name: str, title: str) -> str:
-    """Return a name, with its title if that says more."""
-    return name if plain(title) in ("", name) else f"{name}: {title}"
 
 
 def print_line(text: str, style: str | None = None) -> None:
@@ -337,41 +323,10 @@ def print_written(paths: Iterable[Path]) -> None:
         print_line(f"wrote {path}")
 
 
-def percent(share: float) -> str:
-    """Return a share in per cent; a dash for NaN."""
-    return "-" if isnan(share) else f"{100.0 * share:.1f} %"
-
-
-_PIECE_HEADERS: Final = (
-    *("piece", "response", "mass (kg)", "net peak (kPa)", "net impulse (Pa s)"),
-    *("sliding (m)", "tilt (1: overturned)", "overturned at (ms)"),
-)
-_MOST_PIECES: Final = 12
-
-
-def print_pieces(pieces: "pd.DataFrame", title: str) -> None:
-    """Print the outcome for each of a barrier's pieces, the largest movement first, if any.
-
-    Args:
-        pieces: As `GasResult.pieces`.
-        title: Title of the table, before the counts of the outcomes.
-    """
-    if not len(pieces):
-        return
-    ordered = pieces.sort_values(["tilt", "slide_m"], ascending=False, kind="stable")
-    rows = [
-        (
-            row["piece"],
-            row["outcome"],
-            f"{row['mass_kg']:,.0f}",
-            f"{row['peak_pa'] / PA_PER_KPA:,.1f}",
-            f"{row['impulse_pa_s']:,.0f}",
-            f"{row['slide_m']:.2f}",
-            f"{row['tilt']:.2f}",
-            "-" if isnan(row["overturn_s"]) else f"{MS_PER_S * row['overturn_s']:,.0f}",
-        )
-        for row in ordered.head(_MOST_PIECES).to_dict("records")
-    ]
-    print_table(f"{title}: {outcome_words(pieces)}", _PIECE_HEADERS, rows, text_columns=2)
-    if len(ordered) > _MOST_PIECES:
-        print_line(f"and {len(ordered) - _MOST_PIECES} more pieces with smaller movements")
+def print_answer(parts: Iterable[AnswerPart]) -> None:
+    """Print the lines and tables of an answer, each as soon as it is known."""
+    for part in parts:
+        if isinstance(part, AnswerTable):
+            print_table(part.title, part.headers, part.rows, part.text_columns)
+        else:
+            print_line(part)

@@ -33,7 +33,6 @@ from blast_env.cli.output import (
     LAYOUT_PICTURE,
     InterruptedCommandError,
     layout_picture,
-    percent,
     print_cost,
     print_line,
     print_table,
@@ -65,6 +64,7 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, find_engine
+from blast_env.evaluation.grid_error import percent
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
 from blast_env.layout import load_layout, write_layout

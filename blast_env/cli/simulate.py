@@ -25,17 +25,18 @@ from blast_env.cli.options import (
     refuse_given,
 )
 from blast_env.cli.output import (
-    building_words,
+    print_answer,
     print_json,
     print_line,
-    print_pieces,
     print_table,
     print_written,
     progress_bar,
 )
 from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.engines import BlastResult, Engine, default_engine, find_engine
+from blast_env.evaluation.engines.pieces import pieces_answer
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.layout.build_scene import draw_threat
@@ -279,7 +280,7 @@ def _print_gas(result: "GasResult") -> None:
     ]
     if gauges:
         print_table("gauges", _GAUGES, gauges)
-    print_pieces(result.pieces, "stability of the barrier")
+    print_answer(pieces_answer(result.pieces, "stability of the barrier"))
     notes = dict.fromkeys(note for each in scaled.values() for note in each.get("notes", ()))
     texts = [f"outside the validated range (marked ~): {note}" for note in notes]
     texts += (*result.stepped_notes, *result.moved_gauges)

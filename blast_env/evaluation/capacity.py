@@ -6,19 +6,23 @@ nearer to the building is as severe as a larger one of the same scaled distance.
 all levels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import log
 from typing import Final
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.consequences import Consequences, consequences
-from blast_env.evaluation.engines.contract import Engine
+from blast_env.evaluation.answers import AnswerPart, AnswerTable
+from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.probability import Uncertainty, level_probability
 from blast_env.evaluation.scaling import MASS_RANGE, scaled_to
-from blast_env.geometry import Element
+from blast_env.evaluation.shared import shared_consequences
+from blast_env.geometry import Layout
+from blast_env.layout.build_scene import charge_against
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.site import Scenario
+from blast_env.runner import Tell
+from blast_env.site import AnyCharge, Scenario
 from blast_env.site.scene import Charge
 from blast_env.site.worst_places import nearest_point_m, stand_off_m
 
@@ -28,6 +32,10 @@ RUNGS: Final = 5
 CURVE_DRAWS: Final = 200
 """Default number of draws of the uncertain quantities for a point of a curve."""
 
+MOST_BLASTS: Final = 4 * RUNGS + 1
+"""Most blasts of a ladder for masses and stand-offs."""
+
+_LEVELS: Final = tuple(LevelOfProtection)[1:]
 _STEP: Final = MASS_RANGE**2
 _BISECTIONS: Final = 6
 _SHARES: Final = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of a step, on both sides of a rung
@@ -92,17 +100,20 @@ class Ladder:
     """Charges of rising severity behind a layout: of more mass, or nearer to the building.
 
     Attributes:
-        scenario: The scenario.
+        evaluator: Its scenario, its engine, and its store of blasts.
         layout: The layout.
         charge: The charge of the scenario at its place.
-        engine: The engine of the blasts.
     """
 
-    scenario: Scenario
-    layout: Sequence[Element]
+    evaluator: BlastEvaluator
+    layout: Layout
     charge: Charge
-    engine: Engine
     _blasts: dict[tuple[bool, int], Consequences | None] = field(default_factory=dict, init=False)
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.evaluator.scenario
 
     @property
     def blasts(self) -> int:
@@ -188,7 +199,7 @@ class Ladder:
 
     def _blast(self, charge: Charge, number: int) -> Consequences | None:
         try:
-            return consequences(self.scenario, self.layout, [charge], self.engine)
+            return shared_consequences(self.evaluator, self.layout, [charge])
         except BlastEnvError:
             if number == 0:
                 raise
@@ -204,3 +215,107 @@ class Ladder:
         }
         nearest = known[min(known, key=lambda number: abs(number - at))]
         return scaled_to(nearest, self.charge_at(severity, nearer))
+
+    @property
+    def place(self) -> str:
+        """The place of the charge in words."""
+        x_m, y_m = self.charge.position_m
+        return f"{x_m:.1f}, {y_m:.1f}"
+
+
+@dataclass(frozen=True, eq=False)
+class Capacity:
+    """The largest masses and the least stand-offs, for each layout and place of a charge.
+
+    Attributes:
+        ladders: The ladders by the name of the layout, one per place.
+        masses: The edge of the masses for each level, by the name of the layout and the place.
+        stand_offs: The same of the stand-offs.
+    """
+
+    ladders: Mapping[str, Sequence[Ladder]]
+    masses: Mapping[str, Sequence[Sequence[Edge]]]
+    stand_offs: Mapping[str, Sequence[Sequence[Edge]]]
+
+    def answer(self) -> Iterator[AnswerPart]:
+        """Yield both tables, one row per layout and place."""
+        every = [(name, each) for name, own in self.ladders.items() for each in own]
+        blasts = sum(each.blasts for _, each in every)
+        yield f"{blasts} blasts; between them, histories are scaled by at most 1.3 in mass"
+        levels = tuple(each.label for each in _LEVELS)
+        site = every[0][1].scenario.name
+        rows = [
+            (
+                *(name, each.place, f"{edges[0].stand_off_m:.1f} m"),
+                *(edge.mass_text for edge in edges),
+            )
+            for name, own in self.ladders.items()
+            for each, edges in zip(own, self.masses[name], strict=True)
+        ]
+        title = f"{site}: largest charge (kg TNT) that keeps each level of protection"
+        yield AnswerTable.of(title, ("layout", "place (m)", "stand-off", *levels), rows, 2)
+        rows = [
+            (
+                *(name, each.place, f"{each.charge.tnt_kg:g} kg"),
+                *(edge.stand_off_text for edge in edges),
+            )
+            for name, own in self.ladders.items()
+            for each, edges in zip(own, self.stand_offs[name], strict=True)
+        ]
+        title = f"{site}: least stand-off (m) that keeps each level of protection"
+        yield AnswerTable.of(title, ("layout", "place (m)", "charge", *levels), rows, 2)
+
+    def curves(
+        self, target: LevelOfProtection, uncertainty: Uncertainty
+    ) -> tuple[Ladder, dict[str, list[tuple[float, float]]]]:
+        """Return the ladder of the place that bears least, and each layout's curve there.
+
+        Args:
+            target: The level of protection, of the last layout.
+            uncertainty: The uncertain quantities.
+        """
+        name, edges = list(self.masses.items())[-1]
+        number = _LEVELS.index(target)
+        of_target = [own[number].charge.tnt_kg for own in edges]
+        place = of_target.index(min(of_target))
+        curves = {
+            layout: own[place].curve(target, uncertainty) for layout, own in self.ladders.items()
+        }
+        return self.ladders[name][place], curves
+
+
+def capacity(
+    evaluator: BlastEvaluator,
+    layouts: Mapping[str, Layout],
+    charges: Sequence[AnyCharge],
+    progress: Tell | None = None,
+) -> Capacity:
+    """Return the largest masses and the least stand-offs that keep each level of protection.
+
+    A few blasts run at each place. The stand-off changes along the line from the nearest protected
+    wall to the charge.
+
+    Args:
+        evaluator: Its scenario, its engine, and its store of blasts.
+        layouts: The layouts by name.
+        charges: The charges; their places count.
+        progress: Called with the finished share of the places.
+    """
+    ladders = {
+        name: [
+            Ladder(evaluator, layout, charge_against(evaluator.scenario, layout, each))
+            for each in charges
+        ]
+        for name, layout in layouts.items()
+    }
+    masses: dict[str, list[list[Edge]]] = {name: [] for name in layouts}
+    stand_offs: dict[str, list[list[Edge]]] = {name: [] for name in layouts}
+    done, whole = 0, len(layouts) * len(charges)
+    for name, own in ladders.items():
+        for ladder in own:
+            masses[name].append([ladder.edge(level) for level in _LEVELS])
+            stand_offs[name].append([ladder.edge(level, nearer=True) for level in _LEVELS])
+            done += 1
+            if progress is not None:
+                progress(done / whole)
+    return Capacity(ladders, masses, stand_offs)

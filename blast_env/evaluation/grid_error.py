@@ -167,6 +167,28 @@ class GridError(CellErrors):
             f" (factor {FACTOR:g}, order {ORDER:g})"
         )
 
+    @property
+    def impulse_words(self) -> str:
+        """The impulse on the protected structures, its reduction, and the errors of both."""
+
+        def impulse_of(loads: BlastLoads) -> float:
+            return loads.protected_impulse_pa_s
+
+        def text(number: int, share: float) -> str:
+            pa_s = impulse_of(self.fine[number])
+            return with_errors(f"{pa_s:,.0f} Pa s", "" if isnan(share) else f"{share * pa_s:,.0f}")
+
+        protected = text(0, self.of_load(impulse_of))
+        words = "impulse on the protected structures under the worst charge"
+        if not self.layout:
+            return f"{words}: {protected}"
+        gone = reductions(*map(impulse_of, self.fine)).item()
+        share = with_errors(percent(gone), points(self.of_reduction(impulse_of)))
+        return (
+            f"{words}: {text(1, self.of_unprotected(impulse_of))} without barrier, "
+            f"{protected} with, reduction {share}{worse(gone)}"
+        )
+
 
 def grid_error(
     coarser: BlastEvaluator | None,
@@ -210,6 +232,11 @@ def with_errors(value: str, cells: str = "", sampled: str = "") -> str:
     errors = [f"+- {cells} (cells)"] if cells else []
     errors += [f"+- {sampled}"] if sampled else []
     return " ".join([value, ", ".join(errors)]) if errors else value
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent; a dash for NaN."""
+    return "-" if isnan(share) else f"{100.0 * share:.1f} %"
 
 
 def points(error: float) -> str:

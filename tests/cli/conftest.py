@@ -5,7 +5,8 @@ from functools import partial
 
 import pytest
 
-from blast_env.cli import advise, assessment
+from blast_env.design.search import advised
+from blast_env.evaluation import assessment
 from blast_env.evaluation.probability import level_probability
 from tests.figures import undrawn_figures
 
@@ -21,6 +22,6 @@ def _undrawn() -> Iterator[None]:
 def _probabilities_of_few_draws() -> Iterator[None]:
     """Draw a tenth of what commands draw."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (advise, assessment):
+        for module in (advised, assessment):
             patch.setattr(module, "level_probability", partial(level_probability, draws=100))
         yield

@@ -162,7 +162,7 @@ def test_a_layout_passes_with_the_probability_that_is_wanted(
 ) -> None:
     """Every layout has the level with 0.9, by draws of no blast."""
     likely = LevelProbability(np.repeat([2, 0], [90, 10]), np.full((100, 5), 0.5))
-    monkeypatch.setattr("blast_env.cli.advise.level_probability", lambda *_: likely)
+    monkeypatch.setattr("blast_env.design.search.advised.level_probability", lambda *_: likely)
     site = tmp_path / "yard.toml"
     blast_env.save_scenario(glazed_yard(charges="mean"), site)
     options = ("--tnt-kg", "0.02", "--budget", "1", "--rounds", "1", "--judge-cell", "0.5")

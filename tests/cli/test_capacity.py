@@ -7,9 +7,12 @@ from typer.testing import CliRunner
 
 import blast_env
 from blast_env.cli import app
-from blast_env.evaluation import capacity
+from blast_env.evaluation import BlastEvaluator, capacity
 from blast_env.evaluation.consequences import Consequences, consequences
 from blast_env.evaluation.scaling import scaled_to
+from blast_env.geometry import Layout
+from blast_env.site import AnyCharge
+from blast_env.site.scene import Charge
 from tests.gas_sites import WALL, glazed_hut
 
 
@@ -20,11 +23,15 @@ def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.Mon
     layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
     first: list[Consequences] = []
 
-    def scaled(scenario, layout, charges, engine):  # type: ignore[no-untyped-def]
-        first[1:] = first[:1] or [consequences(scenario, layout, charges, engine)]
-        return scaled_to(first[-1], charges[0])
+    def scaled(evaluator: BlastEvaluator, layout: Layout, charges: list[AnyCharge]) -> Consequences:
+        (charge,) = charges
+        assert isinstance(charge, Charge)
+        first[1:] = first[:1] or [
+            consequences(evaluator.scenario, layout, charges, evaluator.engine)
+        ]
+        return scaled_to(first[-1], charge)
 
-    monkeypatch.setattr(capacity, "consequences", scaled)
+    monkeypatch.setattr(capacity, "shared_consequences", scaled)
     options = ("--tnt-kg", "0.1", "--cell", "0.5", "--layout", layout)
     done = CliRunner().invoke(app, ["assess", "--capacity", *map(str, (site, *options))])
     assert done.exit_code == 0, done.output

@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import pytest
 
-from blast_env.evaluation import capacity
+from blast_env.evaluation import BlastEvaluator, capacity
 from blast_env.evaluation.capacity import Edge, Ladder
 from blast_env.evaluation.consequences import Consequences, consequences
 from blast_env.evaluation.engines.gas import GasEngine
@@ -26,12 +25,12 @@ def blast() -> Consequences:
 
 @pytest.fixture
 def ladder(blast: Consequences, monkeypatch: pytest.MonkeyPatch) -> Ladder:
-    def scaled(scenario: Any, _layout: object, charges: list[Charge], _: object) -> Consequences:
-        scenario.with_charge(charges[0])
+    def scaled(evaluator: BlastEvaluator, _layout: object, charges: list[Charge]) -> Consequences:
+        evaluator.scenario.with_charge(charges[0])
         return scaled_to(blast, charges[0])
 
-    monkeypatch.setattr(capacity, "consequences", scaled)
-    return Ladder(glazed_hut(), (), CHARGE, GasEngine())
+    monkeypatch.setattr(capacity, "shared_consequences", scaled)
+    return Ladder(BlastEvaluator(glazed_hut(), GasEngine()), (), CHARGE)
 
 
 @pytest.mark.parametrize(

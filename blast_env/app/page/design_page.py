@@ -11,6 +11,7 @@ from blast_env.app.page.plan_view import PlanPanel, SolidView
 from blast_env.app.page.results_view import ResultsView
 from blast_env.app.page.screening_view import ScreeningView
 from blast_env.app.page.site_panel import SitePanel
+from blast_env.app.page.verdict_view import VerdictView
 from blast_env.app.page.work_panel import WorkPanel
 from blast_env.app.session import Session
 
@@ -37,6 +38,7 @@ class DesignPage:
                     ui.tab("Plan", icon="map")
                     ui.tab("3-D", icon="view_in_ar")
                     ui.tab(_SCREENING, icon="radar")
+                    ui.tab("Verdict", icon="gavel")
                     ui.tab("Results", icon="leaderboard")
                 with ui.tab_panels(self._tabs, value=session.view, animated=False).classes(
                     "w-full grow"
@@ -48,6 +50,8 @@ class DesignPage:
                         self._solid = SolidView(self.editor)
                     with ui.tab_panel(_SCREENING).classes("p-0"):
                         self._screening = ScreeningView(session)
+                    with ui.tab_panel("Verdict").classes("p-0"):
+                        self._verdict = VerdictView(session)
                     with ui.tab_panel("Results").classes("p-0"):
                         self._results = ResultsView(session)
             self._tabs.on_value_change(lambda event: self._keep_view(event.value))
@@ -72,6 +76,7 @@ class DesignPage:
         self._solid.refresh()
         self._work.refresh()
         self._results.refresh()
+        self._verdict.refresh()
         self._screening.show(self.session.view == _SCREENING)
         history = self.session.history
         self._undo.set_enabled(bool(history.past))
@@ -97,6 +102,7 @@ class DesignPage:
     def _follow(self) -> None:
         self._work.follow()
         self._results.refresh()
+        self._verdict.refresh()
 
     def _header(self) -> None:
         with ui.header().classes("be-header items-center gap-1 q-py-none q-px-md"):

@@ -2,11 +2,12 @@
 
 from base64 import b64encode
 from io import BytesIO
-from typing import Any, Final
+from typing import Final
 
 from nicegui import background_tasks, run, ui
 
-from blast_env.app.session import Session
+from blast_env.app.page.tables import cells, text_table
+from blast_env.app.session import NO_FACADE, Session
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.screening import (
     LEFT_OUT,
@@ -26,7 +27,6 @@ _REQUIREMENTS: Final = (
     *("gsa 1", "gsa 2", "gsa 3a", "gsa 3b", "iso A", "iso B", "iso D", "iso E"),
 )
 _DPI: Final = 90
-_NO_FACADE: Final = "Give structures windows or wall panels first (on the left)."
 
 
 class ScreeningView:
@@ -52,7 +52,7 @@ class ScreeningView:
                 element.on_value_change(self.refresh)
         with ui.element("div").classes("be-results"):
             self._said = ui.label().classes("be-quiet").props('aria-live="polite"')
-            self._threats = _table(THREAT_HEADERS)
+            self._threats = text_table(THREAT_HEADERS)
             self._picture = ui.element("img").props('alt="stand-offs as rings"').classes("w-full")
             self._stand_offs = ui.column().classes("w-full gap-1")
             ui.label(f"{LEFT_OUT}; presets: {PRESETS_SOURCE}").classes("be-quiet")
@@ -84,7 +84,7 @@ class ScreeningView:
         answer: tuple[Screening, str] | BlastEnvError | None
         try:
             if not session.scenario.bays:
-                raise BlastEnvError(_NO_FACADE)
+                raise BlastEnvError(NO_FACADE)
             answer = await run.io_bound(
                 _answer, session.scenario, session.design.layout, masses, required
             )
@@ -104,13 +104,12 @@ class ScreeningView:
         found, picture = answer
         self._said.text = f"required: {required.words}; worst place of each threat by damage"
         rows = [found.threat_row(each, [required]) for each in found.threats]
-        self._threats.rows = [_cells(row) for row in rows]
+        self._threats.rows = cells(rows)
         self._picture.props(f'src="{picture}"')
         with self._stand_offs:
             for each in found.threats:
                 ui.label(f"stand-off (m) for each level, {each.name} (* on this site)")
-                table = _table(STAND_OFF_HEADERS)
-                table.rows = [_cells(row) for row in found.stand_off_rows(each)]
+                text_table(STAND_OFF_HEADERS).rows = cells(found.stand_off_rows(each))
 
 
 def _answer(
@@ -126,16 +125,3 @@ def _answer(
     image = BytesIO()
     screening_picture(scenario, layout, found).savefig(image, format="png", dpi=_DPI)
     return found, f"data:image/png;base64,{b64encode(image.getvalue()).decode()}"
-
-
-def _table(headers: tuple[str, ...]) -> ui.table:
-    columns = [
-        {"name": str(number), "field": str(number), "label": label, "align": "left"}
-        for number, label in enumerate(headers)
-    ]
-    table = ui.table(columns=columns, rows=[], row_key="0")
-    return table.props("dense flat bordered").classes("be-verdicts w-full mb-2")
-
-
-def _cells(row: tuple[str, ...]) -> dict[str, Any]:
-    return {str(number): cell for number, cell in enumerate(row)}

@@ -22,6 +22,7 @@ from blast_env.geometry import Layout, Measure
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
 from blast_env.response.damage import worst
+from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import generator
 
@@ -248,12 +249,11 @@ def advise_until(
     every: list[Advice] = []
     below = inf
     for _ in range(rounds):
-        found = advise(problem, kind, budget, seed, begin_with, damage_below=below)
+        part = share_of(progress, len(every), rounds)
+        found = advise(problem, kind, budget, seed, begin_with, part, damage_below=below)
         if every and not found.passes:
             break
         every.append(found)
-        if progress is not None:
-            progress(len(every) / rounds)
         if not found.passes or judge(found.layout) is Verdict.PASSES:
             break
         below = found.best.damage - margin
