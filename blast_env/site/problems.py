@@ -1,6 +1,6 @@
 """Problems of a scenario file, with messages that name key, value and bound."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from types import UnionType
@@ -15,7 +15,6 @@ from blast_env.errors import (
     alternatives,
     key_path,
     suggestion,
-    type_word,
     value_text,
 )
 from blast_env.geometry import Rectangle
@@ -110,109 +109,38 @@ def problems_from(
 
 
 def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Problem]:
-    """Yield the problems of one entry of a pydantic error."""
+    """Yield the problems of one entry of a pydantic error, in its words."""
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    if kind in ("union_tag_invalid", "union_tag_not_found"):
-        parts, annotation = _followed(model, detail["loc"])
-        yield from _kind_problems(parts, annotation, value, context["discriminator"].strip("'"))
-        return
     if kind == "extra_forbidden":
         parts, annotation = _followed(model, detail["loc"][:-1])
         yield unknown_key((*parts, detail["loc"][-1]), _options(annotation)[0].model_fields)
         return
     if kind == "invalid_key":
-        yield Problem("", f"has the key {value_text(detail['input'])}, keys must be strings")
+        yield Problem("", f"has the key {value_text(value)}: {detail['msg']}")
         return
     parts, annotation = _followed(model, detail["loc"])
-    if kind == "value_error" and isinstance(cause := context["error"], ScenarioError):
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        key = context["discriminator"].strip("'")
+        tags = [
+            str(get_args(each.model_fields[key].annotation)[0]) for each in _options(annotation)
+        ]
+        words = f"{detail['msg']}{suggestion(value.get(key), tags)}"
+        if key not in value:
+            words = f"missing, must be {alternatives(tags)}"
+            for misspelt in get_close_matches(key, value, n=1):
+                yield unknown_key((*parts, misspelt), [key])
+        yield Problem(key_path((*parts, key)), words)
+    elif kind == "value_error" and isinstance(cause := context["error"], ScenarioError):
         yield from (problem.below(parts) for problem in cause.problems)
+    elif kind == "value_error":
+        yield Problem(key_path(parts), f"is {value_text(value)}, {context['error']}")
+    elif kind == "missing":
+        yield Problem(key_path(parts), "missing")
     # Pydantic counts only the valid items of an array; the others have their own errors.
     elif kind != "too_short" or len(value) < context["min_length"]:
-        yield Problem(key_path(parts), _sentence(detail, annotation))
-
-
-def _sentence(detail: ErrorDetails, annotation: object) -> str:
-    """Return the message for an error about one value."""
-    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    if kind == "missing":
-        return "missing"
-    if kind in _BOUNDS:
-        key, words = _BOUNDS[kind]
-        return f"is {value_text(value)}, must be {words} {context[key]:.10g}"
-    if kind in _LENGTHS:
-        key, what, words = _LENGTHS[kind]
-        return f"has {len(value)} {what}, must have {words} {context[key]}"
-    if kind == "literal_error":
-        known = get_args(_options(annotation)[0])
-        nearest = suggestion(value, known) if isinstance(value, str) else ""
-        return f"is {value_text(value)}, must be {alternatives(known)}{nearest}"
-    if kind == "value_error":
-        return f"is {value_text(value)}, {context['error']}"
-    if kind not in _TYPES:
-        return f"is {value_text(value)}: {detail['msg']}"
-    if kind == "float_type" and isinstance(value, int) and not isinstance(value, bool):
-        return f"is {value_text(value)}, which is too large"
-    if kind == "tuple_type" and isinstance(value, Mapping):
-        return "is a table, must be an array (for a list of tables, write [[...]])"
-    return f"is {type_word(value)}, must be {_TYPES[kind]}"
-
-
-_BOUNDS: Final[Mapping[str, tuple[str, str]]] = {
-    "greater_than_equal": ("ge", "at least"),
-    "greater_than": ("gt", "greater than"),
-    "less_than_equal": ("le", "at most"),
-    "less_than": ("lt", "less than"),
-}
-
-_LENGTHS: Final[Mapping[str, tuple[str, str, str]]] = {
-    "too_short": ("min_length", "values", "at least"),
-    "too_long": ("max_length", "values", "at most"),
-    "string_too_short": ("min_length", "characters", "at least"),
-    "string_too_long": ("max_length", "characters", "at most"),
-}
-
-_TYPES: Final[Mapping[str, str]] = {
-    "bool_type": "true or false",
-    "dict_type": "a table",
-    "finite_number": "a finite number",
-    "float_type": "a number",
-    "int_from_float": "a whole number",
-    "int_type": "a whole number",
-    "model_attributes_type": "a table",
-    "model_type": "a table",
-    "string_type": "a string",
-    "string_unicode": "a string of valid characters",
-    "tuple_type": "an array",
-}
-
-
-def _kind_problems(
-    parts: KeyParts, annotation: object, value: Mapping[str, Any], kind_key: str
-) -> Iterator[Problem]:
-    """Yield the problems of a table whose kind is missing or unknown.
-
-    Pydantic does not examine such a table further; this does if the kind can be guessed.
-    """
-    models = {_tag(option, kind_key): option for option in _options(annotation)}
-    key, misspelt = kind_key, get_close_matches(kind_key, value, n=1)
-    if kind_key in value:
-        given = value[kind_key]
-        nearest = suggestion(given, models) if isinstance(given, str) else ""
-        message = f"is {value_text(given)}, must be {alternatives(models)}{nearest}"
-        yield Problem(key_path((*parts, kind_key)), message)
-    else:
-        yield Problem(key_path((*parts, kind_key)), f"missing, must be {alternatives(models)}")
-        if misspelt:
-            key = misspelt[0]
-            yield unknown_key((*parts, key), [kind_key])
-    given = value.get(key)
-    guess = get_close_matches(given, models, n=1) if isinstance(given, str) else []
-    if guess:
-        rest = {name: item for name, item in value.items() if name != key}
-        try:
-            models[guess[0]].model_validate({**rest, kind_key: guess[0]})
-        except ValidationError as error:
-            yield from problems_from(error, models[guess[0]], parts)
+        known = get_args(_options(annotation)[0]) if kind == "literal_error" else ()
+        text = f"is {value_text(value)}: {detail['msg']}{suggestion(value, known)}"
+        yield Problem(key_path(parts), text)
 
 
 _OF_A_KEY: Final = "[key]"
@@ -250,11 +178,6 @@ def _options(annotation: Any) -> tuple[Any, ...]:
         members = (member for member in get_args(annotation) if member is not type(None))
         return tuple(option for member in members for option in _options(member))
     return (annotation,)
-
-
-def _tag(model: type[BaseModel], kind_key: str) -> str:
-    """Return the value of a model's `kind`."""
-    return str(get_args(model.model_fields[kind_key].annotation)[0])
 
 
 def _has_tag(model: type[BaseModel], tag: str | int) -> bool:

@@ -265,7 +265,7 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
         height.value = "0.1"
         user.find("height (m)").trigger("blur")
         assert session.scenario.structures[0].height_m == 3.5
-        await user.should_see("must be at least 0.5")
+        await user.should_see("greater than or equal to 0.5")
         windows = next(
             each for each in user.find(kind=ui.select).elements if each.props["label"] == "windows"
         )

@@ -179,7 +179,7 @@ def test_a_layout_passes_with_the_probability_that_is_wanted(
     ("options", "message"),
     [
         (("--target", "good"), "no level of protection 'good'"),
-        (("--budget-cost", "-3"), "build_zone.budget: is -3.0, must be greater than 0"),
+        (("--budget-cost", "-3"), "build_zone.budget: is -3.0: Input should be greater than 0"),
         (("--budget", "0"), "greater than or equal to 1"),
     ],
 )

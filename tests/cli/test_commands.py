@@ -150,7 +150,7 @@ def test_draw_reports_all_problems_of_all_files(tmp_path: Path) -> None:
     assert "courtyard: good for simulate" in result.stdout
     output = result.stdout.replace("\n", " ")
     assert "site.widht_m: unknown key, did you mean 'width_m'?" in output
-    assert "build_zone.stock: is -1, must be at least 1" in output
+    assert "build_zone.stock: is -1: Input should be greater than or equal to 1" in output
     assert "wrote" not in output
     assert run("draw", "--check-only", "courtyard").exit_code == 0
     result = run("draw", "courtyard", bad, "--out", tmp_path / "site.png")

@@ -183,7 +183,7 @@ def test_facades_count_for_the_hash_where_their_response_does() -> None:
             "hardening[0].wall: is 'window_film_6', there is no such component",
         ),
         ({"glazing": "window_laminated_7"}, "did you mean 'window_laminated_6'"),
-        ({"glazing": "window_film_6", "cost": -1.0}, "hardening[0].cost: is -1.0, must be"),
+        ({"glazing": "window_film_6", "cost": -1.0}, "hardening[0].cost: is -1.0: Input should be"),
         ({}, "hardening[0].glazing: missing: glazing, wall or both must be given"),
         ({"glazing": "window_film_6", "storeys": [7]}, "'better' covers no bay with windows"),
         ({"glazing": "window_film_6", "structures": ["hat"]}, "hardening[0].structures[0]: "),
@@ -216,7 +216,7 @@ def test_measures_need_items() -> None:
             {"target_probability": 0.95},
             "objective.target_probability: must be left out: there is no target",
         ),
-        ({"target": "good"}, "objective.target: is 'good', must be"),
+        ({"target": "good"}, "objective.target: is 'good': Input should be"),
     ],
 )
 def test_unsound_objectives_get_the_errors_of_the_file(

@@ -141,8 +141,8 @@ def test_same_stand_off_is_the_same_scenario() -> None:
     ("distance_m", "words"),
     [
         (0.25, "must keep clear of it by 0.5 m"),
-        (1e6, "must be at most 2000"),
-        (math.inf, "must be a finite number"),
+        (1e6, "less than or equal to 2000"),
+        (math.inf, "should be a finite number"),
     ],
 )
 def test_stand_off_out_of_bounds_is_named(distance_m: float, words: str) -> None:

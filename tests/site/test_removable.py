@@ -127,9 +127,9 @@ _ITEM = {"name": "wall", "length_modules": 3, "thickness_modules": 1, "height_m"
         ({"structures": ["fense"]}, ".structures[0]", "did you mean 'fence'"),
         ({"structures": ["hut"]}, ".structures[0]", "is protected: it cannot be removed"),
         ({"structures": ["fence", "fence"]}, ".structures[1]", "removes already"),
-        ({"structures": []}, ".structures", "must have at least 1"),
+        ({"structures": []}, ".structures", "should have at least 1"),
         ({"name": "wall"}, ".name", "already the name of build_zone.items[0]"),
-        ({"cost": 0.0}, ".cost", "must be at least 1e-06"),
+        ({"cost": 0.0}, ".cost", "greater than or equal to 0.000001"),
     ],
 )
 def test_what_cannot_be_taken_away_is_refused(
