@@ -546,7 +546,7 @@ def advance_planes(
     code: NDArray[np.int8],
     work: Reals,
     edges: Reals,
-    box: NDArray[np.int64],
+    extent: NDArray[np.int64],
     z_from: int,
     z_to: int,
     ratio: Any,
@@ -564,7 +564,8 @@ def advance_planes(
         code: Codes of the cells (z, y, x).
         work: A workspace (WORK_SIZE,).
         edges: A workspace (y, 2 * 6).
-        box: First and last + 1 cells along z, y and x of the box outside which air is still (6,).
+        extent: First and last + 1 cells along y and x of each plane, outside which air is still
+            (z, 4).
         z_from: First plane.
         z_to: Last plane + 1.
         ratio: Ratio of time step to cell side.
@@ -575,13 +576,13 @@ def advance_planes(
         first: First entry of each row in `walls`, for faces normal to x, then to y and z.
         notes: Fastest signal and number of cells raised to the floor; updated in place.
     """
-    y0, y1, x0, x1 = box[2], box[3], box[4], box[5]
-    tiles = (x1 - x0 + TILE - 1) // TILE
     count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
     floored_cells = 0
     for z in range(z_from, z_to):
+        y0, y1, x0, x1 = extent[z, 0], extent[z, 1], extent[z, 2], extent[z, 3]
+        tiles = (x1 - x0 + TILE - 1) // TILE
         for tile in range(tiles):
             xa = x0 + (x1 - x0) * tile // tiles
             xb = x0 + (x1 - x0) * (tile + 1) // tiles
@@ -701,12 +702,24 @@ def _update_column_row(
             put(state, row + i, select(get(work, _CODE_LOW + i) == zero, new, old))
 
 
+@njit(error_model="numpy", fastmath=FUSED)
+def _slice_at(extent: NDArray[np.int64], y: int) -> tuple[int, int, int, int]:
+    """Return first and last + 1 cells along z and x of an extent at a y; zeros if it has none."""
+    z0, z1, x0, x1 = 0, 0, 0, 0
+    for z in range(len(extent)):
+        if extent[z, 0] <= y < extent[z, 1]:
+            if z1 == 0:
+                z0, x0, x1 = z, extent[z, 2], extent[z, 3]
+            z1, x0, x1 = z + 1, min(x0, extent[z, 2]), max(x1, extent[z, 3])
+    return z0, z1, x0, x1
+
+
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
 def advance_columns(
     state: Reals,
     code: NDArray[np.int8],
     work: Reals,
-    box: NDArray[np.int64],
+    extent: NDArray[np.int64],
     y_from: int,
     y_to: int,
     ratio: Any,
@@ -720,13 +733,13 @@ def advance_columns(
 
     `upright` is the ratio of cell side to the height of each cell along z (nz + 8,).
     """
-    z0, z1, x0, x1 = box[0], box[1], box[4], box[5]
-    tiles = (x1 - x0 + TILE - 1) // TILE
     count = len(state)
     rows = code.shape[1]
     lines = code.shape[0] * rows
     floored_cells = 0
     for y in range(y_from, y_to):
+        z0, z1, x0, x1 = _slice_at(extent, y)
+        tiles = (x1 - x0 + TILE - 1) // TILE
         for tile in range(tiles):
             x = x0 + (x1 - x0) * tile // tiles
             n = x0 + (x1 - x0) * (tile + 1) // tiles - x

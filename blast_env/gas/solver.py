@@ -148,7 +148,8 @@ class GasSolver:
         wall_pressure: Mean pressures on `faces` during the last step, in the solver's units (n,).
             They are the fluxes of momentum, so that their integral is exactly the momentum taken
             up by the wall.
-        box: Cells of `state` outside which the air is still: first and last + 1 along z, y and x.
+        extent: Cells of `state` outside which the air is still: first and last + 1 along y and x in
+            each plane; zeros in a plane of still air (z, 4).
 
     Raises:
         BlastEnvError: If an argument is out of bounds.
@@ -220,10 +221,11 @@ class GasSolver:
         edges = (self._code.shape[1], kernels.EDGE_SIZE)
         self._edges = [np.zeros(edges, dtype=dtype) for _ in range(threads)]
         self._notes = np.zeros((threads, 2))
-        self._whole = np.array(
-            [bound for n in self._code.shape for bound in (MARGIN, n - MARGIN)], dtype=np.int64
-        )
-        self.box = self._empty_box() if skip_still_air else self._whole.copy()
+        self._whole = np.zeros((len(self._code), 4), dtype=np.int64)
+        self._whole[MARGIN:-MARGIN] = [
+            bound for n in self._code.shape[1:] for bound in (MARGIN, n - MARGIN)
+        ]
+        self.extent = np.zeros_like(self._whole) if skip_still_air else self._whole.copy()
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
         self._signal = 0.0
         self._floored_cells = 0
@@ -274,8 +276,8 @@ class GasSolver:
             self._put(state.FUEL, np.asarray(fuel_kg_m3) / self.density_kg_m3, part, solid)
         self._signal = 0.0
         if self._skip:
-            self.box = self._whole.copy()
-            state.tighten(self.state, self._still, self.box, max(self._code.shape))
+            self.extent = self._whole.copy()
+            state.tighten(self.state, self._still, self.extent, max(self._code.shape))
 
     def advance(self, until_s: float, *, land: bool = False) -> None:
         """Continue until the simulated time is at least `until_s`.
@@ -348,8 +350,8 @@ class GasSolver:
         other.cell_updates, other._floored_cells = self.cell_updates, self._floored_cells
         other._signal = self._signal
         if self._skip:
-            other.box = other._whole.copy()
-            state.tighten(other.state, other._still, other.box, max(other._code.shape))
+            other.extent = other._whole.copy()
+            state.tighten(other.state, other._still, other.extent, max(other._code.shape))
         return other
 
     def density(self) -> NDArray[np.float64]:
@@ -401,7 +403,7 @@ class GasSolver:
         )
 
     def _move_planes(self, ratio: Any) -> None:
-        self._widen((2, 3, 4, 5))
+        self._widen_planes()
 
         def move(k: int, first: int, end: int) -> None:
             kernels.advance_planes(
@@ -409,7 +411,7 @@ class GasSolver:
                 self._code,
                 self._work[k],
                 self._edges[k],
-                self.box,
+                self.extent,
                 first,
                 end,
                 ratio,
@@ -421,18 +423,18 @@ class GasSolver:
                 self._notes[k],
             )
 
-        self._share_out(move, int(self.box[0]), int(self.box[1]))
-        self.cell_updates += self._cells_in_box()
+        self._share_out(move, *_ends(np.flatnonzero(self.extent[:, 1])))
+        self.cell_updates += self._moving_cells()
 
     def _move_columns(self, ratio: Any) -> None:
-        self._widen((0, 1))
+        self._widen_upright()
 
         def move(k: int, first: int, end: int) -> None:
             kernels.advance_columns(
                 self.state,
                 self._code,
                 self._work[k],
-                self.box,
+                self.extent,
                 first,
                 end,
                 ratio,
@@ -443,30 +445,30 @@ class GasSolver:
                 self._notes[k],
             )
 
-        self._share_out(move, int(self.box[2]), int(self.box[3]))
+        self._share_out(move, *_ends(self.extent[self.extent[:, 1] > 0, :2] - np.array([0, 1])))
 
     def _burn(self, burning: Burning, step_s: float) -> None:
         real = self.state.dtype.type
         share = real(-expm1(-step_s / burning.time_s))
         heat = real(burning.heat_j_kg / self.velocity_m_s**2)
-        state.burn(self.state, self.box, share, heat)
+        state.burn(self.state, self.extent, share, heat)
 
     def _settle(self, settling: Settling) -> None:
         real = self.state.dtype.type
         if self._burning is not None:
             heat = real(self._burning.heat_j_kg / self.velocity_m_s**2)
-            state.burn(self.state, self.box, real(1.0), heat)
+            state.burn(self.state, self.extent, real(1.0), heat)
             self._burning = None
             # Without a scalar the state is smaller by a sixth.
             self.state, self._still = self.state[: state.FUEL], self._still[: state.FUEL]
         if self.steps % _COOL_EVERY == 0:
-            state.cool(self.state, self.box, real(settling.hottest))
+            state.cool(self.state, self.extent, real(settling.hottest))
 
     def _share_out(self, move: Callable[[int, int, int], None], first: int, end: int) -> None:
-        """Split layers from first to end among the threads, then remove still air from the box."""
+        """Split layers from first to end among the threads, then skip what is still air again."""
         count, broken_off = self._threads, Event()
         bounds = [first + (end - first) * k // count for k in range(count + 1)]
-        layers = max(_CELLS_PER_CALL * max(end - first, 1) // max(self._cells_in_box(), 1), 1)
+        layers = max(_CELLS_PER_CALL * max(end - first, 1) // max(self._moving_cells(), 1), 1)
 
         def in_parts(k: int) -> None:
             for part in range(bounds[k], bounds[k + 1], layers):
@@ -482,25 +484,31 @@ class GasSolver:
         finally:  # also after Ctrl-C: stop the other threads
             broken_off.set()
         if self._skip:
-            state.tighten(self.state, self._still, self.box, 2)
+            state.tighten(self.state, self._still, self.extent, 2)
 
-    def _cells_in_box(self) -> int:
-        z0, z1, y0, y1, x0, x1 = self.box.tolist()
-        return int((z1 - z0) * (y1 - y0) * (x1 - x0))
+    def _moving_cells(self) -> int:
+        sides = self.extent[:, 1::2] - self.extent[:, ::2]
+        return int((sides[:, 0] * sides[:, 1]).sum())
 
-    def _widen(self, sides: tuple[int, ...]) -> None:
-        """Extend sides of the box by the range of a pass, 2 cells."""
-        if self._skip and self.box[1] > self.box[0]:
-            for side in sides:
-                low = side % 2 == 0
-                moved = self.box[side] + (-2 if low else 2)
-                whole = self._whole[side]
-                self.box[side] = max(moved, whole) if low else min(moved, whole)
+    def _widen_planes(self) -> None:
+        """Extend each plane by the range of a pass, 2 cells."""
+        if self._skip:
+            filled = self.extent[:, 1] > 0
+            wider = self.extent + np.array([-2, 2, -2, 2])
+            wider[:, ::2] = np.maximum(wider[:, ::2], self._whole[:, ::2])
+            wider[:, 1::2] = np.minimum(wider[:, 1::2], self._whole[:, 1::2])
+            self.extent[filled] = wider[filled]
 
-    def _empty_box(self) -> NDArray[np.int64]:
-        box = self._whole.copy()
-        box[1::2] = box[::2]
-        return box
+    def _widen_upright(self) -> None:
+        """Extend each plane to the cells of those up to 2 above and below, the range of a pass."""
+        if self._skip:
+            low, high = self.extent[:, ::2], self.extent[:, 1::2]
+            low = np.where(high > 0, low, max(self._code.shape))
+            near = [slice(k, k + len(low) - 2 * MARGIN) for k in range(2 * MARGIN + 1)]
+            inner = self.extent[MARGIN:-MARGIN]
+            inner[:, 1::2] = np.maximum.reduce([high[each] for each in near])
+            inner[:, ::2] = np.minimum.reduce([low[each] for each in near])
+            inner[inner[:, 1] == 0] = 0
 
     def _excess(self, values: Reals) -> NDArray[np.float64]:
         """Return the overpressure in units of still air's pressure, exactly 0 in still air."""
@@ -523,3 +531,8 @@ class GasSolver:
     def _get(self, component: int) -> NDArray[np.float64]:
         inner = self.state[(component, *self.grid.inner)]
         return inner.T.astype(np.float64)
+
+
+def _ends(layers: NDArray[np.int64]) -> tuple[int, int]:
+    """Return the first of some layers, and the last + 1; zeros without any."""
+    return (int(layers.min()), int(layers.max()) + 1) if layers.size else (0, 0)

@@ -29,27 +29,29 @@ FUSED: Final = {"contract"}
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
-def burn(state: Reals, box: NDArray[np.int64], share: Any, heat: Any) -> None:
-    """Convert a share of the fuel in every cell of a box to energy, `heat` per mass."""
-    for z in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            for x in range(box[4], box[5]):
+def burn(state: Reals, extent: NDArray[np.int64], share: Any, heat: Any) -> None:
+    """Convert a share of the fuel in the cells of an extent to energy, `heat` per mass."""
+    for z in range(len(extent)):
+        y0, y1, x0, x1 = extent[z]
+        for y in range(y0, y1):
+            for x in range(x0, x1):
                 burnt = share * state[FUEL, z, y, x]
                 state[FUEL, z, y, x] -= burnt
                 state[ENERGY, z, y, x] += heat * burnt
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
-def cool(state: Reals, box: NDArray[np.int64], hottest: Any) -> None:
+def cool(state: Reals, extent: NDArray[np.int64], hottest: Any) -> None:
     """Add mass to gas hotter than `hottest` times still air, down to that temperature.
 
     Energy and momentum are unchanged.
     """
     real = state.dtype.type
     half, one, zero, gamma_1 = real(0.5), real(1.0), real(0.0), real(GAMMA - 1.0)
-    for z in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            for x in range(box[4], box[5]):
+    for z in range(len(extent)):
+        y0, y1, x0, x1 = extent[z]
+        for y in range(y0, y1):
+            for x in range(x0, x1):
                 density = state[DENSITY, z, y, x]
                 if density >= one:
                     continue
@@ -81,34 +83,41 @@ def fastest_signal(state: Reals) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=FUSED)
-def tighten(state: Reals, still: Reals, box: NDArray[np.int64], most: int) -> None:
-    """Remove layers of still air from the six sides of a box, at most `most` from each."""
-    for side in range(6):
-        for _ in range(most):
-            axis = side // 2
-            if box[2 * axis] >= box[2 * axis + 1]:
-                break
-            layer = box[side] if side % 2 == 0 else box[side] - 1
-            if not _is_still(state, still, box, axis, layer):
-                break
-            box[side] += 1 if side % 2 == 0 else -1
+def tighten(state: Reals, still: Reals, extent: NDArray[np.int64], most: int) -> None:
+    """Remove rows of still air from the four sides of each plane, at most `most` from each.
+
+    Args:
+        state: The state (5 or 6, z, y, x).
+        still: Its values in still air (5 or 6,).
+        extent: First and last + 1 cells along y and x of each plane; updated in place (z, 4).
+        most: Largest number of rows.
+    """
+    for z in range(len(extent)):
+        for side in range(4):
+            for _ in range(most):
+                if extent[z, 0] >= extent[z, 1] or extent[z, 2] >= extent[z, 3]:
+                    extent[z] = 0
+                    break
+                row = extent[z, side] if side % 2 == 0 else extent[z, side] - 1
+                if not _is_still(state, still, z, extent[z], side // 2, row):
+                    break
+                extent[z, side] += 1 if side % 2 == 0 else -1
 
 
 @njit(error_model="numpy", fastmath=FUSED)
-def _is_still(state: Reals, still: Reals, box: NDArray[np.int64], axis: int, layer: int) -> bool:
-    z0, z1, y0, y1, x0, x1 = box
+def _is_still(
+    state: Reals, still: Reals, z: int, bounds: NDArray[np.int64], axis: int, row: int
+) -> bool:
+    y0, y1, x0, x1 = bounds
     if axis == 0:
-        z0, z1 = layer, layer + 1
-    elif axis == 1:
-        y0, y1 = layer, layer + 1
+        y0, y1 = row, row + 1
     else:
-        x0, x1 = layer, layer + 1
+        x0, x1 = row, row + 1
     for k in range(len(still)):
-        for z in range(z0, z1):
-            for y in range(y0, y1):
-                for x in range(x0, x1):
-                    if state[k, z, y, x] != still[k]:
-                        return False
+        for y in range(y0, y1):
+            for x in range(x0, x1):
+                if state[k, z, y, x] != still[k]:
+                    return False
     return True
 
 
