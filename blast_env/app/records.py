@@ -24,6 +24,7 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.grid_error import CellErrors, points
+from blast_env.evaluation.standing import worst_standing
 from blast_env.files import write_atomically
 from blast_env.gas.settings import UNIFORM
 from blast_env.geometry import Layout
@@ -316,6 +317,7 @@ class Row(Kept):
         cost: Cost of the layout.
         reduction: Reduction of the load that counts, against no barrier under the same threat.
         engine: The engine in words.
+        standing: Standing of the load, with its reason.
     """
 
     layout: str
@@ -327,6 +329,7 @@ class Row(Kept):
     cost: str
     reduction: str
     engine: str
+    standing: str
 
 
 class VerdictRow(Kept):
@@ -402,6 +405,7 @@ def comparison(
                     cost=f"{cost:g}",
                     reduction=_percent(share, off),
                     engine=record.engine.label,
+                    standing=_standing(loads, names),
                 )
             )
     return rows + list(_all_threats(records, objective, errors))
@@ -417,6 +421,10 @@ def _impulse(names: tuple[str, ...], loads: BlastLoads) -> float:
     if not names:
         return found.protected_impulse_pa_s
     return on_buildings(found.structures)[0].impulse_pa_s
+
+
+def _standing(loads: BlastLoads, names: tuple[str, ...]) -> str:
+    return worst_standing(each.stood for each in only(loads, names).protected).words
 
 
 def load_text(objective: ObjectiveSection, load: float) -> str:
@@ -509,6 +517,9 @@ def _all_threats(
             cost=f"{cost:g}",
             reduction=_percent(share, off),
             engine=last.engine.label,
+            standing=worst_standing(
+                load.stood for _, each in own for load in only(blast_loads(each), ()).protected
+            ).words,
         )
 
 

@@ -42,6 +42,7 @@ from blast_env.tables import write_csv
 from blast_env.units import PA_PER_PSI
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -208,6 +209,7 @@ _HEADERS: Final = (
     "reduction",
     "95 % interval",
     "threats in range",
+    "standing",
 )
 
 
@@ -293,15 +295,30 @@ def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
                 percent(reduction.value) + _of_cells(points(row["reduction_error"])),
                 interval(reduction),
                 f"{row['threats_in_range']} of {count}",
+                row["standing"],
             )
         )
     barriers = layout_counts(evaluation.layout, "barrier")
     title = f"{evaluation.scenario.name}: {barriers} against none, {threats_text(count, seeds)}"
     print_table(title, _HEADERS, rows, text_columns=2)
+    print_standings(evaluation.scenario, evaluation.building_table, "structure")
     _print_totals(evaluation)
     print_if_all_charges(evaluation.scenario, [each.charge for each in evaluation.threats])
     for note in evaluation.notes:
         print_line(f"note: {note}")
+
+
+def print_standings(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> None:
+    """Print the standing of the load on each building, with its reason.
+
+    Args:
+        scenario: It has the titles of the buildings.
+        buildings: A table with `STANDING_COLUMNS`.
+        column: The column with the name of the building.
+    """
+    for each in buildings.to_dict("records"):
+        name = building_words(scenario, str(each[column]))
+        print_line(f"standing of the load, {name}: {each['standing']} ({each['reason']})")
 
 
 def _number(load: float, error: float) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from blast_env.cli.command import writes
+from blast_env.cli.evaluation_report import print_standings
 from blast_env.cli.options import (
     BY_SITE,
     CELL_HELP,
@@ -60,6 +61,7 @@ _PARTICLE_HEADERS: Final = (
 _GAS_HEADERS: Final = (
     *("building", "protected", "impulse (Pa s)", "captured"),
     *("peak (kPa)", "arrival (ms)", "most loaded wall", "roof (Pa s)"),
+    "standing",
 )
 _GAUGES: Final = ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa s)", "captured")
 
@@ -265,10 +267,12 @@ def _print_gas(result: "GasResult") -> None:
             _number(MS_PER_S * each["arrival_s"], ".1f"),
             f"{each['most_loaded_face']} {each['most_loaded_pa_s']:,.0f}",
             _number(each["roof_impulse_pa_s"], ",.0f"),
+            each["standing"],
         )
         for each in result.buildings.to_dict("records")
     ]
     _print_loads(result, charge, f"{charge.height_m:g} m high", _GAS_HEADERS, rows)
+    print_standings(scenario, result.buildings, "building")
     gauges = [
         (
             *(each["name"], f"{each['x_m']:.2f}", f"{each['y_m']:.2f}", f"{each['z_m']:.2f}"),

@@ -29,6 +29,7 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.grid_error import GridError, LoadOf, final_engine, grid_error
+from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
 from blast_env.evaluation.store import BlastStore
 from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
@@ -76,6 +77,7 @@ STRUCTURE_COLUMNS: Final = (
     ),
     Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
     Column("threats_in_range", "", "threats that the calibration was made for"),
+    *STANDING_COLUMNS,
 )
 
 _OF_PARTICLES: Final = (*SIM_NAMES, *(f"unprotected_{name}" for name in SIM_NAMES))
@@ -122,6 +124,7 @@ def _structure_row(
     first = loads[0]
     pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, without))
     reduction = reduction_estimate(pa_s, bare_pa_s)
+    stood = worst_standing(load.stood for load in loads)
     row: dict[str, object] = {
         "structure": first.name,
         "protected": first.protected,
@@ -130,6 +133,8 @@ def _structure_row(
         "reduction_low": reduction.low,
         "reduction_high": reduction.high,
         "threats_in_range": sum(load.in_range for load in loads),
+        "standing": stood.standing.label,
+        "reason": stood.reason,
     }
     sums = SIM_NAMES if isinstance(first, ParticleLoad) else ()
     for name in ("impulse_pa_s", *sums):

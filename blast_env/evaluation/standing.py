@@ -8,7 +8,7 @@
 | outside | a scaled distance without comparison, or an impulse not captured |
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from math import cbrt
 from typing import Final, NamedTuple
@@ -59,14 +59,23 @@ class Stood(NamedTuple):
         return f"{self.standing.label} ({self.reason})"
 
 
+UNSTATED: Final = Stood(LoadStanding.OUTSIDE, "the engine states no checks")
+"""The standing of loads by engines that state none."""
+
+
+def worst_standing(stood: Iterable[Stood]) -> Stood:
+    """Return the worst of some standings, the first of equal ones; `UNSTATED` of none."""
+    return max(stood, key=lambda each: each.standing, default=UNSTATED)
+
+
 def standing_of(
-    scaled_m: float, is_seen: bool, cells: float, is_known: bool, is_stepped: bool
+    scaled_m: float, shaded: float, cells: float, is_known: bool, is_stepped: bool
 ) -> Stood:
     """Return the standing of a load.
 
     Args:
         scaled_m: Scaled distance from the charge, m/kg^(1/3).
-        is_seen: Whether the place is in sight of the charge.
+        shaded: Share of the place that is out of sight of the charge.
         cells: Cells per m/kg^(1/3) of the charge.
         is_known: Whether the impulse was captured.
         is_stepped: Whether the wall is oblique, modelled as a staircase.
@@ -82,10 +91,10 @@ def standing_of(
         return Stood(LoadStanding.APPROXIMATE, words)
     if is_stepped:
         return Stood(LoadStanding.APPROXIMATE, "an oblique wall, modelled in steps")
-    if not is_seen:
-        return Stood(
-            LoadStanding.VERIFIED, "in the shade: compared with experiments and other codes"
-        )
+    if shaded > 0.0:
+        part = "" if shaded == 1.0 else f"{shaded:.0%} of it "
+        words = f"{part}in the shade: compared with experiments and other codes"
+        return Stood(LoadStanding.VERIFIED, words)
     return Stood(LoadStanding.MEASURED, "in sight: within 6 % of Kingery and Bulmash's impulse")
 
 
@@ -104,7 +113,7 @@ def bay_standings(
     return tuple(
         standing_of(
             float(distance_m) / scale,
-            bool(seen),
+            1.0 - float(seen),
             cells,
             known.get(each.name, True),
             each.line is not None and min(map(abs, each.line.normal)) > _OBLIQUE,

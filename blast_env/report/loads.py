@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
+from blast_env.evaluation.standing import Stood
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder
@@ -201,6 +202,7 @@ class TargetLoad:
             wave arrives or the run ends before.
         known: Whether these impulses were known when the run ended.
         flagged: Whether there is a note on them.
+        stood: Standing of the mean impulse.
     """
 
     target: str
@@ -213,6 +215,7 @@ class TargetLoad:
     duration_s: float
     known: bool
     flagged: bool
+    stood: Stood
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,6 +284,7 @@ class MeasuredBlast:
             duration_s=self._duration_s(target.name, wall),
             known=known,
             flagged=not (known and in_range),
+            stood=self.result.standing(target.names),
         )
 
     def _is_known(self, target: ReportedBuilding, wall: WallName) -> bool:

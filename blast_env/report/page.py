@@ -189,6 +189,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "verdict": verdict,
         "sources": _sources(study, verdict, summary),
         "standing": _standing(verdict),
+        "standings": {each.name: _standings(study, each.name) for each in study.threats},
         "checks": checks_of(study),
         "details": options.details,
         "sure": _sureness(study),
@@ -265,6 +266,13 @@ def _summary(study: Study) -> list[SummaryLine]:
 
 def _standing(verdict: ReportVerdict) -> str:
     return "" if verdict.barrier is None else outcome_words(verdict.barrier.pieces)
+
+
+def _standings(study: Study, threat: str) -> list[str]:
+    """Return the standings of the impulses on protected buildings under a threat, each once."""
+    pairs = [each for each in study.pairs if each.threat.name == threat and each.target.protected]
+    loads = [load for each in pairs for load in (each.unprotected, each.protected)]
+    return list(dict.fromkeys(load.stood.words for load in loads))
 
 
 @dataclass(frozen=True)

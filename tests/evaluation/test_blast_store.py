@@ -21,6 +21,7 @@ from blast_env.evaluation import (
     evaluate_layout,
 )
 from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.standing import LoadStanding, Stood
 from blast_env.store import Store
 from tests.attack.disks import file_size_limit
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
@@ -37,8 +38,12 @@ def key(seed: int) -> BlastKey:
 def loads(seed: int) -> BlastLoads:
     """Loads with numbers that need every bit."""
     notes = ("far", "b\n")
-    sums = {"impulse_sim": 0.1 + 0.2, "transferred_impulse_sim": 1.0 / 3.0}
-    house = ParticleLoad("haus ß", True, 2.0, 1e-300, 0.7, 2.0, False, notes, "b", **sums)
+    house = ParticleLoad(
+        *("haus ß", True, 2.0, 1e-300, 0.7, 2.0, False, notes, "b"),
+        stood=Stood(LoadStanding.OUTSIDE, "far"),
+        impulse_sim=0.1 + 0.2,
+        transferred_impulse_sim=1.0 / 3.0,
+    )
     structures = (house, replace(house, name="b", notes=()))
     return BlastLoads(structures, np.array([0.0, float(seed), np.pi, 1e300]))
 

@@ -50,8 +50,9 @@ def test_notes_say_what_the_calibration_was_not_made_for(evaluator: BlastEvaluat
 
 
 def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> None:
-    sums = {"impulse_sim": 10.0, "transferred_impulse_sim": 5.0}
-    load = ParticleLoad("a", True, 2.0, 0.1, None, 2.0, True, (), "a", **sums)
+    load = ParticleLoad(
+        "a", True, 2.0, 0.1, None, 2.0, True, (), "a", impulse_sim=10.0, transferred_impulse_sim=5.0
+    )
     other = replace(load, name="b", weight=3.0, impulse_sim=1.0, impulse_pa_s=0.01)
     bystander = replace(load, name="c", protected=False, in_range=False)
     loads = BlastLoads((load, bystander, other), np.zeros(3))

@@ -2,27 +2,30 @@
 
 import pytest
 
+from blast_env.evaluation import LoadCase, evaluate_layout
 from blast_env.evaluation.consequences import bay_table, consequences
-from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.standing import standing_of
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.standing import LoadStanding, standing_of
+from blast_env.geometry import Layout
 from blast_env.site.scene import Charge
-from tests.gas_sites import WALL, glazed_hut
+from tests.gas_sites import WALL, glazed_hut, hut, site_document
 
 
 @pytest.mark.parametrize(
     ("place", "standing", "reason"),
     [
-        ((3.0, True, 12.0, True, False), "measured", "in sight"),
-        ((3.0, False, 12.0, True, False), "verified", "in the shade"),
-        ((3.0, True, 12.0, True, True), "approximate", "oblique"),
-        ((3.0, True, 5.0, True, False), "approximate", "5 cells per m/kg^(1/3), checked from 9.2"),
-        ((1.2, True, 12.0, True, False), "outside", "scaled distance 1.2 m/kg^(1/3)"),
-        ((9.0, False, 5.0, True, True), "outside", "checked from 1.7 to 8.6"),
-        ((3.0, True, 12.0, False, False), "outside", "not yet captured"),
+        ((3.0, 0.0, 12.0, True, False), "measured", "in sight"),
+        ((3.0, 1.0, 12.0, True, False), "verified", "in the shade"),
+        ((3.0, 0.25, 12.0, True, False), "verified", "25% of it in the shade"),
+        ((3.0, 0.0, 12.0, True, True), "approximate", "oblique"),
+        ((3.0, 0.0, 5.0, True, False), "approximate", "5 cells per m/kg^(1/3), checked from 9.2"),
+        ((1.2, 0.0, 12.0, True, False), "outside", "scaled distance 1.2 m/kg^(1/3)"),
+        ((9.0, 1.0, 5.0, True, True), "outside", "checked from 1.7 to 8.6"),
+        ((3.0, 0.0, 12.0, False, False), "outside", "not yet captured"),
     ],
 )
 def test_the_worst_reason_decides(
-    place: tuple[float, bool, float, bool, bool], standing: str, reason: str
+    place: tuple[float, float, float, bool, bool], standing: str, reason: str
 ) -> None:
     stood = standing_of(*place)
     assert stood.standing.label == standing
@@ -42,3 +45,40 @@ def test_bays_have_their_standing_in_tables_and_the_deciding_one_in_the_verdict(
     own = [*facade.glazing.hazard[facade.glazed == response.deciding_bay]]
     own += [*facade.walls.damage[facade.walled == response.deciding_bay]]
     assert max(own) == worst
+
+
+@pytest.fixture(scope="module")
+def fine_blasts() -> dict[str, GasResult]:
+    """Blasts of 13 kg at 4.5 m on cells of 0.25 m, 9.4 per m/kg^(1/3); the west wall counts."""
+    scenario = hut(structures=[{**site_document()["structures"][0], "faces": ["west"]}])
+    engine, charge = GasEngine(cell_m=0.25), Charge((1.5, 4.0), 13.0)
+    layouts: dict[str, Layout] = {"bare": (), "wall": WALL[:3]}
+    return {
+        name: GasBlast(scenario, each, engine=engine, charge=charge).run()
+        for name, each in layouts.items()
+    }
+
+
+def test_the_load_on_a_structure_stands_by_the_walls_that_count(
+    fine_blasts: dict[str, GasResult],
+) -> None:
+    stood = {name: each.standing(["hut"]) for name, each in fine_blasts.items()}
+    assert stood["bare"].standing is LoadStanding.MEASURED
+    assert stood["wall"].standing is LoadStanding.VERIFIED
+    assert "of it in the shade" in stood["wall"].reason  # the wall is half as wide
+    for name, each in fine_blasts.items():
+        (load,), (row,) = each.structure_loads, each.structures.to_dict("records")
+        assert load.stood == stood[name]
+        assert (row["standing"], row["reason"]) == (stood[name].standing.label, stood[name].reason)
+        assert each.buildings["standing"].tolist() == [row["standing"]]
+
+
+def test_an_evaluation_has_the_worst_standing_of_its_threats() -> None:
+    """With 5 kg on cells of 0.5 m approximate, with 400 kg outside."""
+    threats = [LoadCase(Charge((2.0, 4.0), kg)) for kg in (5.0, 400.0)]
+    found = evaluate_layout(hut(), WALL, threats=threats, cell_m=0.5)
+    assert found.table["standing"].tolist() == ["outside"]
+    assert found.table["reason"].str.startswith("scaled distance 0.54 m/kg^(1/3)").all()
+    assert found.to_dict()["structures"][0]["standing"] == "outside"
+    by_particles = evaluate_layout("courtyard", (), range(1), engine="event")
+    assert set(by_particles.table["standing"]) <= {"approximate", "outside"}

@@ -11,6 +11,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.evaluation.governing import Severity
+from blast_env.evaluation.standing import UNSTATED
 from blast_env.geometry import Piece
 from blast_env.report import UNITS, Limit, StudyOptions, UnitSystem
 from blast_env.report.loads import TargetLoad, first_phase_s, targets_of
@@ -150,7 +151,7 @@ def test_structures_of_a_building_are_one_target() -> None:
 def load(impulse_pa_s: float, peak_pa: float) -> TargetLoad:
     counted = CountedPeak(peak_pa, PeakSource.CURVE)
     return TargetLoad(
-        "hut", 1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True, False
+        "hut", 1.0, 0.5 * peak_pa, counted, 0.1, "west", impulse_pa_s, 0.1, True, False, UNSTATED
     )
 
 

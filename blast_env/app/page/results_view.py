@@ -32,6 +32,7 @@ _COLUMNS: Final = (
     ("reduction", "reduction", "right"),
     ("cost", "cost", "right"),
     ("engine", "engine", "left"),
+    ("standing", "standing of the load", "left"),
 )
 _VERDICT_COLUMNS: Final = (
     ("layout", "layout", "left"),

@@ -12,6 +12,7 @@ from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate,
 from blast_env.design.surrogate.walls import Memory, SurrogateSite, site_of
 from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
 from blast_env.evaluation.engines.contract import EngineBlast
+from blast_env.evaluation.standing import LoadStanding, Stood
 from blast_env.geometry import Element
 from blast_env.layout.build_scene import charge_against
 from blast_env.site import AnyCharge, Scenario
@@ -19,6 +20,7 @@ from blast_env.site import AnyCharge, Scenario
 SURROGATE: Final = "surrogate"
 """Name of the surrogate as an engine."""
 
+_GUESSED: Final = Stood(LoadStanding.APPROXIMATE, "a guess of gas dynamics")
 _KEPT_SITES: Final = 64
 """Number of cached sites, of some megabytes each."""
 
@@ -129,7 +131,9 @@ def _loads(site: SurrogateSite, guess: Guess, index: int) -> BlastLoads:
         peak_pa.update(zip(names, guess.peak_pa[index].tolist(), strict=True))
     notes = ("a prediction of the surrogate, not a blast",)
     loads = tuple(
-        StructureLoad.on(each, impulse_pa_s[each.name], peak_pa[each.name], notes=notes)
+        StructureLoad.on(
+            each, impulse_pa_s[each.name], peak_pa[each.name], notes=notes, stood=_GUESSED
+        )
         for each in structures
     )
     on_modules = np.repeat([*impulse_pa_s.values()], [each.modules for each in structures])

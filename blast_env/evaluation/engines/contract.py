@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra, value_text
+from blast_env.evaluation.standing import UNSTATED, Stood, worst_standing
 from blast_env.geometry import Element
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.buildings import LevelOfProtection
@@ -57,6 +58,7 @@ class StructureLoad:
         area_m2: Area of the counted walls; `None` where the engine has no areas.
         response: Response of its bays in the objective; `None` unless the objective is a response.
         worst_damage: The largest damage of its bays, for the same objective.
+        stood: Standing of the load, with its reason.
     """
 
     name: str
@@ -71,6 +73,7 @@ class StructureLoad:
     area_m2: float | None = None
     response: float | None = None
     worst_damage: float | None = None
+    stood: Stood = UNSTATED
 
     @classmethod
     def on(
@@ -81,6 +84,7 @@ class StructureLoad:
         in_range: bool = False,
         notes: tuple[str, ...] = (),
         area_m2: float | None = None,
+        stood: Stood = UNSTATED,
     ) -> Self:
         """Return the load on a structure of a scenario by an engine without particles.
 
@@ -91,6 +95,7 @@ class StructureLoad:
             in_range: Whether the engine was checked for this distance and charge.
             notes: Reasons if it was not, one sentence each.
             area_m2: Area of the counted walls.
+            stood: Standing of the load.
         """
         return cls(
             name=structure.name,
@@ -103,6 +108,7 @@ class StructureLoad:
             notes=notes,
             building=structure.building_name,
             area_m2=area_m2,
+            stood=stood,
         )
 
 
@@ -156,6 +162,7 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
         peak_pa=max(peaks_pa, default=None),
         in_range=all(each.in_range for each in counted),
         area_m2=sum(areas_m2) if is_known else None,
+        stood=worst_standing(each.stood for each in counted),
     )
 
 

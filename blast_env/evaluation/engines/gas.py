@@ -4,7 +4,7 @@ Impulses are peak specific impulses (`blast_env.gas.probes`). The engine is dete
 for a given charge and layout; a seed only draws the charge.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
@@ -30,6 +30,13 @@ from blast_env.evaluation.engines.contract import (
     StructureLoad,
 )
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
+from blast_env.evaluation.standing import (
+    STANDING_COLUMNS,
+    LoadStanding,
+    Stood,
+    standing_of,
+    worst_standing,
+)
 from blast_env.gas.cost import CostGuess, cost_of_run
 from blast_env.gas.oblique_walls import STEPPED, ObliqueLoads, stepped_buildings
 from blast_env.gas.settings import (
@@ -57,7 +64,7 @@ from blast_env.particles.calibration.model import ScaledImpulse
 from blast_env.particles.run import EndReason
 from blast_env.provenance import versions
 from blast_env.response.damage import BayDamage
-from blast_env.response.facade import peak_factor, slowest_period_s
+from blast_env.response.facade import cells_of, peak_factor, slowest_period_s
 from blast_env.site import (
     AnyCharge,
     AnyScenario,
@@ -67,9 +74,10 @@ from blast_env.site import (
     find_scenario,
 )
 from blast_env.site.scene import WALLS, BlastSite, Charge
+from blast_env.site.sight import in_sight
 from blast_env.site.zone import source_bounds_m
-from blast_env.statistics import mean_over_area
-from blast_env.tables import table_of
+from blast_env.statistics import counted_parts, mean_over_area
+from blast_env.tables import table_of, texts
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # pandas and Numba take a third of a second each to import
@@ -83,6 +91,9 @@ NOT_KNOWN: Final = "impulse not yet captured: it was near its largest value when
 
 _AT_SURFACE_M: Final = 1e-6  # a gauge on a wall records the air before it
 _PROGRESS_CALLS: Final = 100
+
+_FLOORED: Final = "{} cells were raised to the floor of pressure"
+_SEEN_FACES: Final = 200  # of a structure, most for the share in sight
 
 _FINAL_CELL_M: Final = 0.25
 _WIDEST_UNIFORM_M: Final = 40.0
@@ -311,15 +322,24 @@ class GasResult:
 
     @cached_property
     def structures(self) -> "pd.DataFrame":
-        """One row per structure; see `STRUCTURE_COLUMNS`."""
-        return structure_table(self.run, self.on_walls)
+        """One row per structure; see `STRUCTURE_COLUMNS`, and `STANDING_COLUMNS` of its load."""
+        return self._with_standing(structure_table(self.run, self.on_walls), "structure")
 
     @cached_property
     def buildings(self) -> "pd.DataFrame":
-        """One row per building, with its parts combined; see `BUILDING_COLUMNS`."""
+        """One row per building, its parts combined; see `BUILDING_COLUMNS`, `STANDING_COLUMNS`."""
         names = self.blast.scenario.building_names
         stepped = stepped_buildings(self.blast.scenario.structures)
-        return structure_table(self.run, self.on_walls, names, stepped)
+        table = structure_table(self.run, self.on_walls, names, stepped)
+        return self._with_standing(table, "parts")
+
+    def _with_standing(self, table: "pd.DataFrame", column: str) -> "pd.DataFrame":
+        """Return a table with the standing of the load on the structures that a column names."""
+        stood = [self.standing(str(names).split()) for names in table[column]]
+        return table.assign(
+            standing=texts([each.standing.label for each in stood]),
+            reason=texts([each.reason for each in stood]),
+        )
 
     @property
     def stepped_notes(self) -> tuple[str, ...]:
@@ -444,10 +464,45 @@ class GasResult:
                 scaled.in_range,
                 scaled.notes,
                 self._area_m2(index),
+                self._stood[outline.name],
             )
             for index, outline in enumerate(self.run.site.structures)
             if not outline.is_barrier
             for scaled in [self._scaled(index)]
+        )
+
+    def standing(self, names: Collection[str]) -> Stood:
+        """Return the standing of the load on a structure, or on several that form a building.
+
+        Args:
+            names: Names of the structures whose loads count.
+        """
+        counted = counted_parts([each for each in self.run.site.structures if each.name in names])
+        return worst_standing(self._stood[each.name] for each in counted)
+
+    @cached_property
+    def _stood(self) -> dict[str, Stood]:
+        """The standing of the load on the counted walls of each structure, by name."""
+        structures = enumerate(self.run.site.structures)
+        return {each.name: self._standing_of(k) for k, each in structures if not each.is_barrier}
+
+    def _standing_of(self, index: int) -> Stood:
+        run, scenario = self.run, self.blast.scenario
+        outline = run.site.structures[index]
+        own = self._walls(index)
+        own = own[np.linspace(0, len(own) - 1, min(len(own), _SEEN_FACES)).astype(int)]
+        outward = np.pad(run.table.outward[own], ((0, 0), (0, 1)))  # walls are upright
+        seen = in_sight(run.site, run.table.centre_m[own] + MODULE_SIDE_M * outward, outward)
+        if run.solver.floored_cells:
+            return Stood(LoadStanding.APPROXIMATE, _FLOORED.format(run.solver.floored_cells))
+        from blast_env.gas.engine import scaled_distance  # the run has imported it
+
+        return standing_of(
+            scaled_distance(run.site, outline),
+            1.0 - float(seen.mean()) if len(own) else 0.0,
+            cells_of(peak_factor(run.grid.cell_m, run.site.charge.tnt_kg)),
+            run.is_known(index),
+            scenario.building_names[outline.name] in stepped_buildings(scenario.structures),
         )
 
     def loads(self) -> BlastLoads:
@@ -559,13 +614,15 @@ class GasResult:
         from blast_env.particles.workbook import SheetTable, write_tables
 
         tables = [
-            SheetTable("Structures", self.structures, STRUCTURE_COLUMNS),
+            SheetTable("Structures", self.structures, (*STRUCTURE_COLUMNS, *STANDING_COLUMNS)),
             SheetTable("Walls", self.walls, WALL_COLUMNS),
             SheetTable("Modules", self.modules, MODULE_COLUMNS),
             SheetTable("Gauges", self.gauges, GAUGE_COLUMNS),
         ]
         if len(self.buildings) < len(self.structures):
-            tables.insert(0, SheetTable("Buildings", self.buildings, BUILDING_COLUMNS))
+            tables.insert(
+                0, SheetTable("Buildings", self.buildings, (*BUILDING_COLUMNS, *STANDING_COLUMNS))
+            )
         if len(self.bays):
             tables.append(SheetTable("Bays", self.bays, LOADED_BAY_COLUMNS))
         if len(self.pieces):
@@ -601,7 +658,5 @@ class GasResult:
             why = str(self.end_reason) if waited else "take until='walls' to wait for it"
             notes.append(f"{NOT_KNOWN}: {why}")
         if self.run.solver.floored_cells:
-            notes.append(
-                f"{self.run.solver.floored_cells} cells were raised to the floor of pressure"
-            )
+            notes.append(_FLOORED.format(self.run.solver.floored_cells))
         return tuple(notes)

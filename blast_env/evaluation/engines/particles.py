@@ -15,6 +15,7 @@ import numpy as np
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.evaluation.engines.contract import BlastLoads, Engine, ParticleLoad, find_engine
+from blast_env.evaluation.standing import LoadStanding, Stood
 from blast_env.geometry import Element, layout_text
 from blast_env.layout.build_scene import build_scene
 from blast_env.particles.calibration.model import (
@@ -40,6 +41,7 @@ if TYPE_CHECKING:  # pandas takes a third of a second to import
     from blast_env.particles.tables import RunRecord
 
 _PROGRESS_CALLS: Final = 200
+_CALIBRATED: Final = Stood(LoadStanding.APPROXIMATE, "calibrated particles, which overrate walls")
 
 PARTICLES_OVERRATE: Final = (
     "The particle model overrates barriers: on 'courtyard' it predicted 4.0 times the reduction of"
@@ -358,6 +360,9 @@ class BlastResult:
                     in_range=scaled.in_range,
                     notes=scaled.notes,
                     building=self.blast.scenario.building_names[each.name],
+                    stood=_CALIBRATED
+                    if scaled.in_range
+                    else Stood(LoadStanding.OUTSIDE, "; ".join(scaled.notes)),
                 )
                 for each in structures
                 for scaled in [self.impulse(each.name, law)]
