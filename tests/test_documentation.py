@@ -156,22 +156,6 @@ def test_code_says_its_language_so_that_it_is_not_overlooked() -> None:
             compile(dedent(block), page, "exec")
 
 
-PAGE = """
-    python -m json.tool {file} copy.json   # a remark
-
-```python
-copy = "copy.json"
-```
-
-Then `python -m json.tool copy.json`:
-
-```python
-from pathlib import Path
-assert Path(copy).exists()
-```
-"""
-
-
 def test_the_documentation_names_every_command_of_the_studies() -> None:
     named = {each.words[2:4] for each in COMMANDS if each.words[0] == "python"}
     for script in ("gas",):

@@ -102,11 +102,6 @@ def test_a_run_is_a_function_of_its_arguments(unprotected: GasResult) -> None:
     assert finer.impulse("hut").pa_s == pytest.approx(coarse.impulse("hut").pa_s, rel=0.1)
 
 
-def test_threads_change_no_bit(unprotected: GasResult) -> None:
-    two = GasBlast(HUT, engine=GasEngine(threads=2)).run()
-    assert two.digest == unprotected.digest
-
-
 def test_a_run_ends_when_its_loads_are_known(unprotected: GasResult) -> None:
     """Four times as long they are the same."""
     assert unprotected.end_reason is EndReason.LOADS_KNOWN

@@ -11,12 +11,11 @@ from blast_env.design.surrogate import packaged_surrogate, site_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
-from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutState
 from blast_env.plots.oblique import ObliqueView, boxes_of, painted_order
 from blast_env.plots.plan import structure_features
-from blast_env.site import Scenario, load_scenario, save_scenario
+from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
 from tests.gas_sites import site_document
@@ -101,14 +100,6 @@ def test_a_base_of_0_changes_nothing() -> None:
     scenarios = [Scenario.from_document(each, "hut") for each in (plain, said)]
     assert scenarios[0].content_hash == scenarios[1].content_hash
     assert hut_with(CANOPY).content_hash != hut_with({**CANOPY, "base_m": 2.0}).content_hash
-
-
-def test_it_survives_saving(tmp_path: Path) -> None:
-    scenario = hut_with(CANOPY)
-    path = tmp_path / "canopy.toml"
-    save_scenario(scenario, path)
-    assert "base_m = 2.5" in path.read_text()
-    assert load_scenario(path) == scenario
 
 
 @pytest.mark.parametrize(
@@ -197,16 +188,6 @@ def test_pictures_draw_it_above_the_ground() -> None:
     solid = next(each for each in boxes(scenario, ()) if each.name == "canopy")
     assert solid.centre_m[2] == pytest.approx(2.75)
     assert solid.size_m[2] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("name", ["plan.dxf", "plan.geojson"])
-def test_what_is_exported_keeps_it(name: str, tmp_path: Path) -> None:
-    scenario = hut_with(raised(2.5, 3.0, (1.0, 6.0), columns=4))
-    path = tmp_path / name
-    export_layout(LayoutPlan(scenario, ()), path)
-    again = import_site(path, ImportOptions(protect=("hut",), stock=6)).scenario
-    found = {(each.base_m, each.height_m) for each in again.structures}
-    assert found == {(0.0, 2.0), (2.5, 3.0)}
 
 
 @pytest.mark.parametrize("tags", [{"min_height": 3.2}, {"building:min_level": "1"}])

@@ -357,11 +357,6 @@ def test_what_carries_nothing_has_the_hash_of_before() -> None:
             {"charge": [{"kind": "point", "position_m": [7.0, 6.0], "tnt_kg": 5.0}]},
             r"'podium' .* must keep clear of it by 0.5 m, .* or be higher than its 1 m",
         ),
-        (
-            [TERRACE | {"carries": "yes"}],
-            {},
-            r"\[1\].carries: is 'yes' .*, must be true or false",
-        ),
     ],
 )
 def test_what_cannot_be_is_refused(
@@ -463,17 +458,6 @@ def test_a_drawing_has_the_zone_on_the_terrace_that_it_lies_wholly_on(tmp_path: 
         scenario = Scenario.from_document(document, "terraced")
         (zone,) = drawing(LayoutPlan(scenario, ())).query('LWPOLYLINE[layer=="BUILD_ZONE"]')
         assert zone.dxf.elevation == elevation_m
-
-
-def test_the_window_of_a_gas_environment_shows_it() -> None:
-    env = gym.make(
-        "BlastBarrierGas-v0", scenario=terraced(), render_mode="rgb_array", observation="grid"
-    )
-    env.reset(seed=0)
-    frame = env.render()
-    assert isinstance(frame, np.ndarray)
-    assert frame.std() > 1.0
-    env.close()
 
 
 def test_text_shows_the_cells_on_it() -> None:

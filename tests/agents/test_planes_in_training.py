@@ -18,8 +18,7 @@ from blast_agents.training.run_folder import RunConfiguration
 from gymnasium import spaces
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from blast_env import bundled_scenarios, load_scenario
-from blast_env.bundled import REAL_SIZE
+from blast_env import load_scenario
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import OBSERVATIONS, GridObservation
 from blast_env.errors import BlastEnvError
@@ -27,8 +26,6 @@ from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, generate_site
 from tests.catalogue_sites import yard_document
-
-BUNDLED = tuple(sorted({*bundled_scenarios()} - {"free_field"} - REAL_SIZE))
 
 
 def shaped_yard(width_m: float, height_m: float) -> Scenario:
@@ -83,11 +80,6 @@ def check(scenario: Scenario, observation: str = "grid", policy: str | None = No
         assert in_training.shape[1:] == GridObservation().space(scenario).shape
         assert np.array_equal(in_training, planes)
     assert torch.equal(found, expected)
-
-
-@pytest.mark.parametrize("name", BUNDLED)
-def test_every_bundled_site(name: str) -> None:
-    check(load_scenario(name))
 
 
 @pytest.mark.parametrize("name", ["courtyard", "visitor_entrance", "guard_post"])

@@ -258,11 +258,8 @@ def test_its_agent_is_one_like_any_other(finished: Path) -> None:
     assert LayoutState.of(small_scenario(), layout)
 
 
-@pytest.mark.parametrize("rounds", [1, 2])
-def test_an_interrupted_run_ends_as_if_it_had_not_been(
-    finished: Path, tmp_path: Path, rounds: int
-) -> None:
-    calls = []
+def test_an_interrupted_run_ends_as_if_it_had_not_been(finished: Path, tmp_path: Path) -> None:
+    calls, rounds = [], 2
 
     def progress(share: float) -> None:
         calls.append(share)
@@ -277,11 +274,10 @@ def test_an_interrupted_run_ends_as_if_it_had_not_been(
     assert outcome(run) == outcome(finished)
 
 
-@pytest.mark.parametrize("rounds", [0, 1])
 def test_blasts_of_an_interrupted_round_are_not_repeated_but_counted(
-    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rounds: int
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = tmp_path / "run"
+    run, rounds = tmp_path / "run", 1
     imitate = SelfLabelling._imitate
 
     def interrupt(training: SelfLabelling, updates: int, rng: np.random.Generator) -> float:

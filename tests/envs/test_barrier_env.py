@@ -246,11 +246,6 @@ def test_an_observation_of_ones_own_is_seen() -> None:
     assert [float(step[0][0]) for step in play(env, seed=1)] == [0.0, 1.0, 2.0, 3.0]
 
 
-def test_an_observation_without_an_episode_is_refused() -> None:
-    with pytest.raises(BlastEnvError, match="or have the method episode"):
-        make(observation=object())
-
-
 def test_a_reward_must_not_name_the_term_of_the_environment() -> None:
     env = make(reward=lambda _: {"invalid_actions": 1.0})
     env.reset(seed=1)

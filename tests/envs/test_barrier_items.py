@@ -11,7 +11,6 @@ from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import FeaturesObservation, GridObservation, Observable
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from tests.catalogue_sites import ITEMS, WALL, item, yard
 
@@ -37,45 +36,6 @@ def test_actions_place_pieces_and_the_charge_goes_off() -> None:
     assert 0.1 < info["reduction"] < 1.0
 
 
-def test_masks_follow_stock_budget_and_ground() -> None:
-    env = yard_env()
-    env.reset(seed=0)
-    rng = np.random.default_rng(2)
-    catalogue, legal = yard().zone.catalogue, 0
-    while not (ended := env.placement.is_full):
-        mask = env.action_masks()
-        assert mask.shape == (catalogue.finish + 1,)
-        assert mask[-1]
-        for action in rng.integers(catalogue.finish, size=25).tolist():
-            assert mask[action] == (env.explain(catalogue.element(action)) is None)
-        actions = np.flatnonzero(mask[:-1])
-        legal += 1
-        _, _, ended, _, _ = env.step(int(rng.choice(actions)))
-    assert ended
-    assert legal >= 3
-    assert env.placement.cost <= 20.0
-
-
-def test_an_illegal_piece_changes_nothing() -> None:
-    env = yard_env(invalid_action="penalty")
-    env.reset(seed=0)
-    before, *_ = env.step(yard().zone.catalogue.action(WALL[0]))
-    after, reward, ended, _, info = env.step(yard().zone.catalogue.action(Piece(7, 1, "post")))
-    assert np.array_equal(before, after)
-    assert (reward, ended, info["invalid_actions"]) == (-0.001, False, 1)
-
-
-def test_incremental_rewards_add_up_over_pieces() -> None:
-    catalogue = yard().zone.catalogue
-    totals = []
-    for reward in ("terminal", "incremental"):
-        env = yard_env(reward=reward)
-        env.reset(seed=0)
-        actions = [*(catalogue.action(piece) for piece in WALL[:2]), catalogue.finish]
-        totals.append(sum(env.step(action)[1] for action in actions))
-    assert totals[0] == pytest.approx(totals[1], rel=1e-12)
-
-
 def test_an_episode_can_begin_with_pieces() -> None:
     env = yard_env(render_mode="ansi")
     env.reset(seed=0, options={"layout": WALL})
@@ -86,14 +46,6 @@ def test_an_episode_can_begin_with_pieces() -> None:
     assert text.count("M") >= 7
     env.reset(seed=0)
     assert pickle.loads(pickle.dumps(env)).placement.layout == ()
-
-
-def test_frames_show_pieces() -> None:
-    env = yard_env(render_mode="rgb_array")
-    env.reset(seed=0)
-    empty = env.render()
-    env.step(yard().zone.catalogue.action(WALL[0]))
-    assert (env.render() != empty).any()
 
 
 # --- Observations.

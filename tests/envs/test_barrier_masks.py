@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env.errors import LayoutError
-from blast_env.layout import LayoutState, check_layout
+from blast_env.layout import check_layout
 from blast_env.site import BuildZone, Scenario, bundled_scenarios, load_scenario
 from tests.envs.small import make, restricted_scenario, small_scenario
 
@@ -103,10 +103,3 @@ def test_the_mask_of_the_information_is_what_a_space_samples_with() -> None:
     _, _, _, _, info = env.step(min(sampled))
     assert info["action_mask"].dtype == np.int8
     assert env.action_space.sample(mask=info["action_mask"]) != min(sampled)
-
-
-def test_an_empty_zone_offers_what_the_placement_offers() -> None:
-    scenario = restricted_scenario()
-    env = make(scenario)
-    _, info = env.reset(seed=0)
-    assert (info["action_mask"][:-1] == LayoutState.empty(scenario).free.ravel()).all()

@@ -7,7 +7,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.vector import AutoresetMode
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.site import Scenario, save_scenario
@@ -111,33 +110,6 @@ def test_vectors_of_every_id_in_every_mode(name: str, mode: str | None) -> None:
     vector.action_space.seed(0)
     observation, *_ = vector.step(vector.action_space.sample())
     assert observation in vector.observation_space
-    vector.close()
-
-
-@pytest.mark.parametrize("how", [*AutoresetMode, "SameStep"])
-def test_every_autoreset_mode(how: AutoresetMode | str) -> None:
-    """Three steps, of which the second ends both episodes."""
-    vector = gym.make_vec(
-        "BlastBarrier-v0",
-        num_envs=2,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": how},
-        scenario=small_scenario(),
-        engine=ThinEngine(),
-        realisations=1,
-    )
-    assert vector.metadata["autoreset_mode"] == AutoresetMode(how)
-    first, _ = vector.reset(seed=5)
-    vector.step(np.array([0, 1]))
-    last, _, ended, _, infos = vector.step(np.array([FINISH, FINISH]))
-    assert ended.all()
-    if vector.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP:
-        assert [len(each) for each in infos["final_info"]["layout"]] == [1, 1]
-        assert not same(last, np.stack(infos["final_obs"]))
-    if vector.metadata["autoreset_mode"] == AutoresetMode.DISABLED:
-        vector.reset(options={"reset_mask": np.array([True, True])})
-    vector.step(np.array([0, 1]))
-    assert same(vector.reset(seed=5)[0], first)
     vector.close()
 
 

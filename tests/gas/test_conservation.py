@@ -5,17 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.gas.faces import Faces, exposed_faces, ground_faces
+from blast_env.gas.faces import ground_faces
 from blast_env.gas.grid import FaceKind, GasGrid
 from blast_env.gas.probes import FaceLoads
 from blast_env.gas.solver import Burning, Settling
-from tests.gas.flows import CLOSED, blast, check_nothing_is_lost, street
-
-
-def test_mass_and_energy_in_a_closed_box() -> None:
-    """With walls inside, and for hundreds of steps."""
-    solver = blast(street(), (6, 9, 0), faces=CLOSED, precision="double")
-    check_nothing_is_lost(solver)
+from tests.gas.flows import CLOSED, blast, street
 
 
 def test_mass_and_energy_in_a_closed_box_in_single_precision() -> None:
@@ -42,32 +36,6 @@ def test_a_box_of_walls_lets_nothing_out(skip: bool) -> None:
     after = solver.state[:, 2:-2, 2:-2, 2:-2]
     assert (after != before).any()
     assert (after[:, outside.T] == before[:, outside.T]).all()
-
-
-def test_walls_take_up_the_momentum_of_the_gas() -> None:
-    """In a closed box, the impulses of its walls are the change of momentum, by axis."""
-    solid = np.ones((20, 18, 12), dtype=bool)
-    solid[1:-1, 1:-1, 1:-1] = False
-    solid[8:10, 5:9, 1:6] = True
-    loads: list[FaceLoads] = []
-    all_faces: list[Faces] = []
-
-    def setup(grid: GasGrid) -> dict[str, Any]:
-        faces = exposed_faces(grid, grid.solid)
-        loads.append(FaceLoads(len(faces)))
-        all_faces.append(faces)
-        return {"faces": faces, "recorders": loads}
-
-    solver = blast(solid, (5, 7, 4), setup=setup, precision="double")
-    solver.advance(0.02)
-    (load,), (faces,) = loads, all_faces
-    impulse = load.net_impulse_pa_s
-    area = solver.grid.cell_m**2
-    pushed = [-area * float((impulse * faces.side)[faces.axis == axis].sum()) for axis in range(3)]
-    momentum = [-part for part in solver.totals().momentum_kg_m_s]
-    scale = area * float(load.impulse_pa_s.sum())
-    assert np.array(pushed) / scale == pytest.approx(np.array(momentum) / scale, abs=1e-12)
-    assert max(abs(np.array(momentum))) > 1e-3 * scale
 
 
 def test_the_ground_takes_up_momentum_too() -> None:

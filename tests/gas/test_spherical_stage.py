@@ -36,13 +36,6 @@ def test_the_opening_continues_on_the_grid() -> None:
     assert opening.at(0.0, 3.0) == 0.0
 
 
-def test_mass_scales_the_opening() -> None:
-    small = spherical_stage(GasCharge(1.0, (1.0, 2.0, 0.0)), 6.0)
-    large_one = spherical_stage(GasCharge(8.0, (2.0, 4.0, 0.0)), 12.0)
-    assert large_one.end_s == pytest.approx(2.0 * small.end_s)
-    assert large_one.peak_pa(4.0) == pytest.approx(small.peak_pa(2.0), rel=1e-3)
-
-
 def test_gauges_nearer_than_the_first_obstacle_miss_nothing() -> None:
     """They had missed the front: it is laid onto the grid when it has already passed them."""
     site = BlastSite(

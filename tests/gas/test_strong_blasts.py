@@ -7,8 +7,7 @@ from blast_env.gas.state import ENERGY
 from tests.gas.flows import CLOSED, blast
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-@pytest.mark.parametrize("pressure_pa", [5e8, 2e10])
+@pytest.mark.parametrize(("precision", "pressure_pa"), [("single", 2e10), ("double", 5e8)])
 def test_beside_walls_in_corners_and_gaps(precision: str, pressure_pa: float) -> None:
     """A ball of 1,600 kg/m^3 that touches a wall, with gaps of one cell, a corner and a notch."""
     solid = np.zeros((28, 24, 12), dtype=bool)

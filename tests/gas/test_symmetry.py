@@ -1,6 +1,7 @@
 """Mirrors and quarter turns of a scene turn its result, and what must not matter does not."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,11 @@ Turn = Callable[[NDArray[Any]], NDArray[Any]]
 TIME_S = 0.02
 
 
+def as_it_is(values: NDArray[Any]) -> NDArray[Any]:
+    return values
+
+
+@cache
 def turned(turn: Turn, precision: str) -> NDArray[np.float64]:
     """Return the pressure of the blast in a turned street."""
     plain = blast(street(), (6, 9, 0))
@@ -29,20 +35,10 @@ def turned(turn: Turn, precision: str) -> NDArray[np.float64]:
     return solver.pressure()
 
 
-@pytest.mark.parametrize(
-    "turn",
-    [
-        lambda values: values[::-1],
-        lambda values: values[:, ::-1],
-        lambda values: np.rot90(values),
-        lambda values: np.rot90(values, 2),
-        lambda values: values.transpose(1, 0, 2),
-    ],
-    ids=["mirror x", "mirror y", "quarter turn", "half turn", "diagonal"],
-)
+@pytest.mark.parametrize("turn", [np.flipud, np.rot90], ids=["mirror", "quarter turn"])
 @pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("single", 1e-4)])
 def test_a_turned_scene_turns_the_result(turn: Turn, precision: str, tolerance: float) -> None:
-    plain = turned(lambda values: values, precision)
+    plain = turned(as_it_is, precision)
     other = turned(turn, precision)
     # Relative to the largest overpressure.
     scale = plain.max() - 101_325.0
@@ -50,8 +46,7 @@ def test_a_turned_scene_turns_the_result(turn: Turn, precision: str, tolerance: 
     assert np.abs(other - turn(plain)).max() < tolerance * scale
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-@pytest.mark.parametrize("time_s", [0.002, 0.02])
+@pytest.mark.parametrize(("precision", "time_s"), [("double", 0.002), ("single", 0.02)])
 def test_leaving_out_still_air_changes_no_bit(precision: str, time_s: float) -> None:
     """While most of the air is still, and when hardly any is."""
     left_out = blast(street(), (6, 9, 0), precision=precision)
@@ -74,15 +69,14 @@ def test_nothing_happens_in_still_air() -> None:
     assert (everywhere.state == before).all()
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_threads_and_calls_change_no_bit(precision: str) -> None:
+def test_threads_and_calls_change_no_bit() -> None:
     """One thread or three, in one go or in many."""
     states = []
     for threads in (1, 3, 1):
-        solver = blast(street(), (6, 9, 0), precision=precision, threads=threads)
+        solver = blast(street(), (6, 9, 0), threads=threads)
         solver.advance(TIME_S)
         states.append(solver.state)
-    stopped = blast(street(), (6, 9, 0), precision=precision)
+    stopped = blast(street(), (6, 9, 0))
     for time_s in np.linspace(0.0, TIME_S, 30):
         stopped.advance(float(time_s))
     for state in (*states[1:], stopped.state):

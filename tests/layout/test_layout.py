@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 
 from blast_env.errors import LayoutError
@@ -23,24 +22,17 @@ def scenario() -> Scenario:
     ("layout", "words"),
     [
         ([(3, 1), (20, 0)], r"cell \(20, 0\) is outside the build zone"),
-        ([(3, 1), (-1, 0)], r"cell \(-1, 0\) is outside the build zone"),
         ([(10**5000, 0)], "cell .an integer of about 5000 digits, 0. is outside"),
         ([(6, 6)], r"cell \(6, 6\) overlaps the structure 'house'"),
         ([(0, 0)], r"cell \(0, 0\) must stay empty: path"),
         ([(3, 1), (4, 1), (3, 1)], r"cell \(3, 1\) is repeated"),
         ([(2 + i // 5, i % 5) for i in range(13)], "13 modules, must have at most 12"),
         ([(3.0, 1.0)], r"layout\[0\]: is \(3.0, 1.0\), must be a pair of integers"),
-        (np.array([[3.0, 1.0]]), r"layout\[0\]: is \(3.0, 1.0\), must be a pair"),
         ([(3, 1), (True, 1)], r"layout\[1\]: is \(true \(a truth value\), 1\), must be a pair"),
-        (np.array([[True, True]]), r"layout\[0\]: is \(true"),
         ([(3, 1, 2)], r"layout\[0\]: has 3 values, must be a pair"),
-        ([()], r"layout\[0\]: has 0 values, must be a pair"),
         (["31"], r"layout\[0\]: is '31' \(a string\), must be a pair"),
         ([3, 1], r"layout\[0\]: is 3, must be a pair"),
-        (np.array([3, 1]), r"layout\[0\]: is 3, must be a pair"),
-        ([{3, 1}], r"layout\[0\]: is a set, must be a pair"),
         ([None], r"layout\[0\]: is nothing, must be a pair"),
-        ([((1, 2), (3, 4))], r"layout\[0\]: is \(an array, an array\), must be a pair"),
         (None, "layout is nothing, must be a list"),
         ("abc", "layout is 'abc'"),
         ({(3, 1): 1}, "layout is a table, must be a list"),

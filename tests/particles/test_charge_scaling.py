@@ -69,14 +69,6 @@ def test_another_charge_is_the_reference_blast_enlarged_with_balls_as_small_as_b
     assert numbers(for_charge(DENSE, tnt_kg)) == pytest.approx(numbers(expected))
 
 
-@given(tnt_kg=masses)
-def test_the_energy_of_the_charge_grows_with_the_area_of_similar_blasts(tnt_kg: float) -> None:
-    """And so, the density of air being what it is, distances with the cube root of the mass."""
-    large = for_charge(DENSE, tnt_kg).explosive
-    ratio = large.mass * large.ball_count / (DENSE.explosive.mass * DENSE.explosive.ball_count)
-    assert ratio == pytest.approx((tnt_kg / 100.0) ** (2.0 / 3.0))
-
-
 @given(tnt_kg=st.floats(0.01, 50_000.0))
 def test_scaling_by_mass_changes_the_mass_of_the_balls_and_nothing_else(tnt_kg: float) -> None:
     sparse = preset("ballistic")

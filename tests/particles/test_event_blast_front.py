@@ -6,7 +6,6 @@ import pytest
 from blast_env.evaluation.engines.particles import EventEngine
 from tests.particles.blast_front import (
     FrontCase,
-    density_peak,
     elastic_front,
     inelastic_front,
     radial_momentum,
@@ -48,20 +47,3 @@ def test_an_inelastic_blast_loses_energy_but_hardly_radial_momentum() -> None:
         energies.append(0.5 * float((balls.mass * balls.speed**2).sum()))
     assert energies[1] < 0.4 * energies[0] < 0.1 * case.energy
     assert momenta[1] == pytest.approx(momenta[0], rel=0.1)
-
-
-def test_the_densest_place_is_found() -> None:
-    """Balls on a ring, and fewer around it."""
-    case = FrontCase(restitution=1.0, side_spacings=120)
-    run = EventEngine().start(case.scene(0))
-    balls = run.balls()
-    is_air = balls.kind == balls.kind[0]
-    from_centre = balls.position - run.scene.charge_centre
-    distance = np.hypot(*from_centre.T)
-    ring = is_air & (distance > 300.0) & (distance < 420.0)
-    balls.position[ring] = (
-        run.scene.charge_centre + from_centre[ring] * (400.0 / distance[ring])[:, None]
-    )
-    radius, compression = density_peak(balls, run.scene)
-    assert radius == pytest.approx(40.0, rel=0.01)
-    assert compression > 3.0

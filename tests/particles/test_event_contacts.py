@@ -10,8 +10,6 @@ import pytest
 
 from blast_env import load_scenario, simulate
 from blast_env.particles.event import engine as event_engine
-from blast_env.particles.event.contacts import _PRESSED, collide_balls
-from blast_env.particles.event.state import BALL, RULES
 from blast_env.particles.run import EndReason
 from blast_env.site.balls import Balls
 from blast_env.site.parameters import SimulationParameters
@@ -217,22 +215,3 @@ def test_gaps_of_one_module_in_a_barrier_do_not_stop_a_blast() -> None:
         )
         assert result.end_reason is not EndReason.EVENT_LIMIT
         assert result.steps < 10_000
-
-
-@pytest.mark.parametrize(("presses", "together"), [(_PRESSED, True), (_PRESSED - 1, False)])
-def test_balls_that_are_pressed_too_often_go_on_together(presses: int, together: bool) -> None:
-    """With the velocity of their centre of mass: no momentum is lost."""
-    pair = np.zeros(2, dtype=BALL)
-    pair["x"], pair["radius"], pair["mass"] = [10.0, 12.0], 1.0, [1.0, 3.0]
-    pair["vx"], pair["vy"] = [8.0, -4.0], [2.0, 6.0]
-    pair["collisions"], pair["presses"] = 1, presses
-    rules_of = np.zeros(1, dtype=RULES)[0]
-    rules_of["contact_time_s"], rules_of["restitution"] = 1.0, 0.5
-    collide_balls(pair[0], pair[1], 0.0, rules_of)
-    assert np.dot(pair["mass"], pair["vx"]) == pytest.approx(8.0 - 12.0)
-    assert np.dot(pair["mass"], pair["vy"]) == pytest.approx(2.0 + 18.0)
-    if together:
-        assert pair["vx"].tolist() == pytest.approx([-1.0, -1.0])
-        assert pair["vy"].tolist() == pytest.approx([5.0, 5.0])
-    else:
-        assert pair["vx"][0] < pair["vx"][1]  # they part

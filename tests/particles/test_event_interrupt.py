@@ -8,7 +8,6 @@ import pytest
 
 from blast_env.evaluation.engines import Blast
 from blast_env.evaluation.engines.particles import EventEngine
-from blast_env.particles.event import engine as event_engine
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import Scenario
 from blast_env.site.scene import Scene
@@ -48,30 +47,6 @@ def touching_air() -> Scene:
 def outcome(run: EventRun) -> tuple[float, int, bytes, bytes]:
     run.advance(np.inf)
     return run.time_s, run.steps, run.log.to_array().tobytes(), run.balls().position.tobytes()
-
-
-def calls_of(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return a list that grows with every return of the compiled code, by its answer."""
-    answers: list[int] = []
-    compiled = event_engine._RUN
-
-    def run(*arguments: object) -> int:
-        answers.append(int(compiled(*arguments)))
-        return answers[-1]
-
-    run.signatures = [()]  # type: ignore[attr-defined]
-    monkeypatch.setattr(event_engine, "_RUN", run)
-    return answers
-
-
-def test_the_compiled_loop_comes_back_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It took 40 s and more to hear a signal. Ten thousand events take a tenth of a second."""
-    EventEngine().start(touching_air()).advance(1e-6)  # compiled by now
-    answers = calls_of(monkeypatch)
-    run = EventEngine().start(touching_air())
-    run.advance(np.inf)
-    events = run.steps + run.crossings + run.outdated
-    assert answers.count(event_engine.PAUSED) >= events // 10_000 > 3
 
 
 def test_an_interrupted_run_goes_on_to_the_same_end() -> None:

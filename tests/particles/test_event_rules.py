@@ -37,19 +37,6 @@ def through_air(count: int, settings: SimulationParameters) -> Scene:
     return scene(row, [FAR_WALL], settings)
 
 
-@pytest.mark.parametrize("count", [1, 3, 5])
-def test_an_explosive_ball_shrinks_by_a_tenth_at_each_air_ball(count: int) -> None:
-    """The air keeps its size."""
-    run = EVENT.start(through_air(count, parameters()))
-    run.advance(0.16)
-    after = run.balls()
-    assert run.steps == count
-    assert after.radius[0] == pytest.approx(0.9**count, rel=1e-12)
-    assert after.mass[0] == pytest.approx(0.9**count, rel=1e-12)
-    assert (after.radius[1:] == 1.0).all()
-    assert (after.mass[1:] == 1e-6).all()
-
-
 def test_explosive_balls_do_not_shrink_at_each_other() -> None:
     settings = parameters(explosive={"collide_within_charge": True})
     pair = balls([EXPLOSIVE] * 2, [(50.0, 50.0), (60.0, 50.0)], [(300.0, 0.0), (0.0, 0.0)])
@@ -117,15 +104,6 @@ def test_a_ball_is_removed_at_the_collision_that_takes_it_below_r_min() -> None:
     assert run.steps == 4
     assert run.balls().velocity[3, 0] > 100.0
     assert run.balls().velocity[4].tolist() == [0.0, 0.0]
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
-def test_c_e_is_the_restitution_at_modules_whatever_the_elasticities(restitution: float) -> None:
-    settings = parameters(air={"elasticity": 0.2}, contact={"module_restitution": restitution})
-    after = states_at(
-        scene(balls([AIR], [(90.0, 99.0)], [(400.0, 30.0)]), [FACADE], settings), 0.03
-    )
-    assert after.velocity[0] == pytest.approx([-restitution * 400.0, 30.0], abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -139,11 +139,6 @@ def test_a_module_passes_its_capacity_and_is_removed(engine: ParticleEngine) -> 
     assert back.hits >= 1
 
 
-def test_without_a_capacity_nothing_is_destroyed(engine: ParticleEngine) -> None:
-    of_scene = scene(balls([AIR], [(80.0, 99.0)], [(4000.0, 0.0)]), [FACADE], parameters())
-    assert not any(part.destroyed for part in finished(of_scene, engine).obstacles[0].parts)
-
-
 def test_hits_are_summed_per_module(engine: ParticleEngine) -> None:
     of_scene = scene(
         balls([AIR] * 3, [(80.0, 91.0), (70.0, 91.0), (80.0, 95.0)], [(400.0, 0.0)] * 3),

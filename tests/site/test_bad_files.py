@@ -1,6 +1,5 @@
 """Damaged scenario files, hundreds: each a clear error, none a traceback."""
 
-from copy import deepcopy
 from difflib import get_close_matches
 from typing import Any
 
@@ -9,7 +8,7 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.site import Scenario, ScenarioError, load_scenario, parse_scenario
+from blast_env.site import Scenario, ScenarioError, parse_scenario
 from tests.site.documents import (
     Document,
     KeyPath,
@@ -47,7 +46,6 @@ NUMBERS = [
     for case in LEAVES
     if isinstance(value_at(*case), int | float) and not isinstance(value_at(*case), bool)
 ]
-TEXTS = [tomli_w.dumps(document) for document in all_documents()]
 LETTERS = "abcdefghijklmnopqrstuvwxyz_"
 
 
@@ -161,69 +159,6 @@ def test_number_out_of_bounds_is_named(case: tuple[Document, KeyPath], wrong: fl
     line = next(line for line in message.split("\n") if f": {written(path)}: " in line)
     assert "must be" in line or "Input should be" in line
     assert len(line) < 300
-
-
-@given(st.data())
-@settings(max_examples=25, deadline=None, derandomize=True)
-def test_overlapping_structures_are_both_named(data: st.DataObject) -> None:
-    document = deepcopy(data.draw(st.sampled_from(all_documents())))
-    index = data.draw(st.integers(0, len(document["structures"]) - 1))
-    section = document["structures"][index]
-    rectangle = Scenario.from_document(document, SOURCE).structures[index].rectangle_m
-    left = data.draw(st.floats(max(0.0, rectangle.left - 1.0), rectangle.right - 0.01))
-    bottom = data.draw(st.floats(max(0.0, rectangle.bottom - 1.0), rectangle.top - 0.01))
-    other = {"kind": "ConcreteSquare", "name": "other", "side_modules": 3}
-    document["structures"].append({**other, "corner_m": [left, bottom]})
-    message = error_of_document(document)
-    assert "'other' (x " in message
-    assert f" overlaps structures[{index}], '{section['name']}' (x " in message
-
-
-@given(st.data())
-@settings(max_examples=20, deadline=None, derandomize=True)
-def test_structure_outside_the_site_is_named(data: st.DataObject) -> None:
-    document = deepcopy(data.draw(st.sampled_from(all_documents())))
-    index = data.draw(st.integers(0, len(document["structures"]) - 1))
-    axis, side = data.draw(st.sampled_from([(0, "width_m"), (1, "height_m")]))
-    section = document["structures"][index]
-    # Every structure is at least one module, 0.5 m, long.
-    section["corner_m"][axis] = data.draw(st.floats(document["site"][side] - 0.49, 2000.0))
-    message = error_of_document(document)
-    assert f"structures[{index}]: '{section['name']}' (x " in message
-    assert "must lie inside the site" in message
-
-
-@given(st.sampled_from(TEXTS), st.floats(0.0, 1.0))
-@settings(max_examples=25, deadline=None, derandomize=True)
-def test_truncated_file_is_an_error(text: str, share: float) -> None:
-    # Without any structure, whatever else is there is no scenario.
-    end = text.index("[[structures]]") if "[[structures]]" in text else text.index("structures = ")
-    error_of(text[: int(share * end)])
-
-
-@given(st.sampled_from(TEXTS), st.integers(0, 10**6), st.text(min_size=1, max_size=10))
-@settings(max_examples=50, deadline=None, derandomize=True)
-def test_edited_file_is_a_scenario_or_an_error(text: str, place: int, inserted: str) -> None:
-    place %= len(text)
-    edited = text[:place] + inserted + text[place + len(inserted) :]
-    try:
-        scenario = parse_scenario(edited, SOURCE)
-    except ScenarioError:
-        error_of(edited)
-    else:
-        assert scenario.structures
-
-
-@given(st.binary(max_size=200))
-@settings(max_examples=25, deadline=None, derandomize=True)
-def test_random_bytes_are_an_error(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes
-) -> None:
-    path = tmp_path_factory.getbasetemp() / "random_bytes.toml"
-    path.write_bytes(content)
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(path)
-    assert all(line.startswith(f"{path}: ") for line in str(caught.value).split("\n"))
 
 
 TOML_VALUES = st.recursive(

@@ -10,7 +10,7 @@ from blast_env.geometry import Cell
 from blast_env.layout import LayoutState, usable_cells
 from blast_env.site import Scenario
 from tests.site.documents import minimal_document
-from tests.site.zones import area, filled, structure, zone_scenario
+from tests.site.zones import area, structure, zone_scenario
 
 
 def test_budget_can_be_spent_to_the_last_of_it() -> None:
@@ -81,14 +81,6 @@ def test_module_moves_the_access_way_to_the_other_side() -> None:
     assert np.flatnonzero(after.free[0]).tolist() == [0, 1, 2, 4, 5, 6, 7]
     assert not after.free[1].any()
     assert np.flatnonzero(after.free[2]).tolist() == [0, 6, 7]
-
-
-def test_vehicle_may_drive_over_keep_outs() -> None:
-    way = {"width_m": 1.0, "between": "bottom_top"}
-    path = area(0.0, 0.0, 1.0, 4.0, reason="path")
-    placement = LayoutState.empty(zone_scenario(access_way=way, keep_outs=[path], stock=48))
-    assert placement.free[:, 2:].all()
-    assert len(filled(placement.scenario, np.random.default_rng(0)).cells) == 48
 
 
 @pytest.mark.parametrize(

@@ -59,16 +59,6 @@ def test_bundled_scenario_lies_on_the_module_grid(name: str) -> None:
     assert all((2.0 * side).is_integer() for rectangle in rectangles for side in rectangle)
 
 
-def test_gap_of_the_gate_stays_open() -> None:
-    scenario = load_scenario("perimeter_gate")
-    south, north = (scenario.structures[i].rectangle_m for i in (0, 1))
-    assert (south.bottom, north.top) == (0.0, scenario.site.height_m)
-    zone = scenario.zone
-    lane = zone.keep_outs[0].rectangle_m
-    assert (lane.bottom, lane.top) == (south.top, north.bottom)
-    assert lane.left <= south.left
-
-
 def texts(least: int, most: int) -> st.SearchStrategy[str]:
     text = st.text(min_size=least, max_size=most)
     return text.filter(lambda each: STEERING.search(each) is None)
@@ -220,12 +210,6 @@ def test_scenario_is_saved_only_where_it_can_be_loaded(tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match="there is no folder"):
         save_scenario(scenario, tmp_path / "missing" / "f.toml")
     assert os.listdir(tmp_path) == []
-
-
-def test_example_of_the_format_description_loads() -> None:
-    scenario = load_scenario(EXAMPLES / "example.toml")
-    assert scenario.build_zone is not None
-    assert scenario.simulation.overrides
 
 
 def test_example_of_heights_fits_into_the_whole_example() -> None:

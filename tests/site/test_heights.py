@@ -155,27 +155,11 @@ AIR = "the height of the air (which site.air_height_m can raise)"
     [
         (
             ("structures", 0, "height_m"),
-            0.4,
-            "structures[0].height_m: is 0.4: Input should be greater than or equal to 0.5",
-        ),
-        (
-            ("structures", 0, "height_m"),
             14.5,
             f"structures[0].height_m: is 14.5, must be at most 14, {AIR}",
         ),
-        (
-            ("build_zone", "height_m"),
-            0.0,
-            "build_zone.height_m: is 0.0: Input should be greater than",
-        ),
         (("build_zone", "height_m"), 20, f"build_zone.height_m: is 20, must be at most 14, {AIR}"),
-        (("site", "air_height_m"), 1.0, "site.air_height_m: is 1.0: Input should be greater than"),
         (("site", "air_height_m"), 5.0, f"structures[0].height_m: is 6, must be at most 5, {AIR}"),
-        (
-            ("charge", 1, "height_m"),
-            -0.1,
-            "charge[1].height_m: is -0.1: Input should be greater than",
-        ),
         (
             ("charge", 1, "height_m"),
             14.1,
@@ -192,19 +176,12 @@ AIR = "the height of the air (which site.air_height_m can raise)"
             ["west", "top"],
             "structures[0].faces[1]: is 'top': Input should be 'west', 'east', 'south' or 'north'",
         ),
-        (("structures", 0, "faces"), [], "structures[0].faces: is an array: Tuple should have at"),
         (
             ("structures", 0, "faces"),
             ["west", "west"],
             "structures[0].faces: is an array, must name each wall at most once, not 'west' twice",
         ),
-        (
-            ("structures", 0, "faces"),
-            "west",
-            "structures[0].faces: is 'west': Input should be a",
-        ),
         (("gauges", 1, "name"), "door", "gauges[1].name: is 'door', already the name of gauges[0]"),
-        (("gauges", 0, "name"), "1st", "gauges[0].name: is '1st', must be 1 to 40 letters"),
         (
             ("gauges", 0, "position_m"),
             [30.5, 10.0, 1.0],
@@ -214,11 +191,6 @@ AIR = "the height of the air (which site.air_height_m can raise)"
             ("gauges", 0, "position_m"),
             [3.0, 10.0, 14.5],
             f"gauges[0].position_m[2]: is 14.5, must be at most 14, {AIR}",
-        ),
-        (
-            ("gauges", 0, "position_m", 2),
-            -1.0,
-            "gauges[0].position_m[2]: is -1.0: Input should be greater than or equal to 0",
         ),
         (
             ("gauges", 0, "position_m"),
@@ -255,22 +227,6 @@ def test_what_cannot_stand_is_named(path: KeyPath, value: object, line: str) -> 
 )
 def test_what_only_just_stands_is_allowed(path: KeyPath, value: object) -> None:
     assert lines_for(changed(tall_document(), path, value)) == []
-
-
-def test_all_problems_with_heights_are_found_at_once() -> None:
-    document = tall_document()
-    document["site"]["air_height_m"] = 4.0
-    document["charge"][0]["height_m"] = 5.0
-    document["charge"][1]["height_m"] = -1.0
-    document["gauges"][0]["name"] = "roof"
-    keys = {line.split(": ")[1] for line in lines_for(document)}
-    assert keys == {
-        "charge[1].height_m",
-        "charge[0].height_m",
-        "structures[0].height_m",
-        "gauges[1].name",
-        "gauges[1].position_m[2]",
-    }
 
 
 def test_unsound_structure_does_not_make_the_air_too_low() -> None:

@@ -92,14 +92,6 @@ def test_errors_name_value_bound_and_place(changes: dict[str, Any], key: str, wo
 def test_overlaps_are_of_modules_not_of_rectangles_around() -> None:
     """A hut in the corner of an L-shaped building stands free."""
     document = with_polygon(outline_m=[(6, 2), (9, 2), (9, 3), (7, 3), (7, 6), (6, 6)])
-    document["structures"][0]["outline_m"] = [
-        (6.0, 2.0),
-        (9.0, 2.0),
-        (9.0, 3.0),
-        (7.0, 3.0),
-        (7.0, 6.0),
-        (6.0, 6.0),
-    ]
     hut = {"kind": "ModularObstacle", "name": "hut", "rows": 2, "columns": 2, "height_m": 2.0}
     document["structures"].append(hut | {"corner_m": [8.0, 4.0]})
     Scenario.from_document(document, "free")

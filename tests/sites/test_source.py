@@ -5,7 +5,6 @@ import pickle
 import numpy as np
 import pytest
 
-from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario
 from blast_env.sites import HELD_OUT_SITES, SiteRanges, SiteSource, generate_site
@@ -42,23 +41,10 @@ def test_few_sites_to_train_on_come_again() -> None:
     assert names == {"site_10000", "site_10001"}
 
 
-def test_a_stream_draws_the_same_sites_again() -> None:
-    drawn = [
-        [SiteSource.training().sample(np.random.default_rng(seed)).name for seed in range(5)]
-        for _ in range(2)
-    ]
-    assert drawn[0] == drawn[1]
-
-
 def test_the_representative_is_always_the_first_site() -> None:
     source = SiteSource.training()
     assert source.representative is source.representative
     assert source.representative == generate_site(HELD_OUT_SITES)
-
-
-def test_an_environment_takes_it_for_a_source() -> None:
-    source = SiteSource.held_out()
-    assert scenario_source(source) is source
 
 
 def test_it_survives_a_pickle() -> None:

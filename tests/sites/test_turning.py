@@ -72,7 +72,7 @@ def test_faces_and_gauges_turn_and_heights_stay() -> None:
     assert turned(once, 3) == scenario.model_copy(update={"georeference": None})
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_layout_turned_with_its_site_cuts_as_many_lines_of_sight(seed: int) -> None:
     site = generate_site(seed)
     rows = site.build_zone.rows if site.build_zone is not None else 0

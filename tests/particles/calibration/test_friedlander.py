@@ -25,15 +25,6 @@ def test_the_waveform_is_equation_1() -> None:
     assert type(wave.pressure(0.034)) is float
 
 
-@given(peaks, durations, decays)
-def test_equation_2_holds_by_quadrature(peak: float, duration_s: float, decay: float) -> None:
-    """Most of a fast wave comes within a few 1 / b, so quadrature is told to look there."""
-    wave = Friedlander(peak, duration_s, decay)
-    knee = duration_s / max(decay, 1.0)
-    parts = [quad(wave.pressure, *ends)[0] for ends in ((0.0, knee), (knee, duration_s))]
-    assert wave.impulse() == pytest.approx(sum(parts), rel=1e-8)
-
-
 @given(peaks, durations, st.floats(1e-6, 0.499))
 def test_peak_duration_and_impulse_come_back(peak: float, duration_s: float, share: float) -> None:
     impulse = share * peak * duration_s
@@ -42,14 +33,6 @@ def test_peak_duration_and_impulse_come_back(peak: float, duration_s: float, sha
     assert wave.impulse() == pytest.approx(impulse, rel=1e-12)
     assert wave.decay > 0.0
     assert not wave.is_triangular
-
-
-@given(peaks, durations, st.floats(1e-3, 1e3))
-def test_the_decay_comes_back(peak: float, duration_s: float, decay: float) -> None:
-    """The impulse changes by b / 6 of itself near b = 0, so b is known to 1e-15 at best."""
-    impulse = Friedlander(peak, duration_s, decay).impulse()
-    found = Friedlander.from_impulse(peak, duration_s, impulse)
-    assert found.decay == pytest.approx(decay, rel=1e-9, abs=1e-12)
 
 
 @given(peaks, durations, st.floats(0.5, 100.0))

@@ -90,31 +90,6 @@ def test_hopkinson_cranz_scaling(z: float, charge_kg: float) -> None:
             assert found == pytest.approx(scaled * (size if grows else 1.0), rel=1e-6)
 
 
-def test_reflection_and_the_ground_add_to_the_load() -> None:
-    distance_m = np.geomspace(2.0, 150.0, 200)
-    for kind in ("overpressure", "impulse"):
-        incident: Quantity = (
-            "incident_overpressure" if kind == "overpressure" else "incident_impulse"
-        )
-        reflected: Quantity = (
-            "reflected_overpressure" if kind == "overpressure" else "reflected_impulse"
-        )
-        for burst in BURSTS:
-            direct = kingery_bulmash(incident, distance_m, 100.0, burst)
-            assert (kingery_bulmash(reflected, distance_m, 100.0, burst) > 1.6 * direct).all()
-        ground, air = (kingery_bulmash(reflected, distance_m, 100.0, burst) for burst in BURSTS)
-        assert (ground > air).all()
-
-
-def test_a_shock_is_not_slower_than_sound_and_arrives_at_that_speed() -> None:
-    distance_m = np.linspace(5.0, 100.0, 4000)
-    arrival_s = kingery_bulmash("arrival_time", distance_m, 50.0, "spherical")
-    speed = kingery_bulmash("shock_speed", distance_m, 50.0, "spherical")
-    assert (speed > 340.0).all()
-    slope = np.diff(distance_m) / np.diff(arrival_s)
-    assert slope == pytest.approx((speed[1:] + speed[:-1]) / 2.0, rel=0.03)
-
-
 def test_numbers_stay_numbers_and_arrays_are_broadcast() -> None:
     distance_m, charge_kg = np.array([[5.0], [10.0]]), np.array([50.0, 100.0, 200.0])
     grid = kingery_bulmash("reflected_impulse", distance_m, charge_kg)
@@ -137,15 +112,9 @@ def test_both_ends_of_the_range_belong_to_it_and_beyond_is_refused(
     size = float(np.cbrt(123.0))
     assert (kingery_bulmash(quantity, [least * size, 40.0 * size], 123.0, burst) > 0.0).all()
     for z in (0.999 * least, 40.04):
-        message = f"Z is {z:.6g} m/kg^(1/3), must be {least:g} to 40"
+        message = f"Z at [1] is {z:.6g} m/kg^(1/3), must be {least:g} to 40"
         with pytest.raises(BlastEnvError, match=re.escape(message)):
-            kingery_bulmash(quantity, z, 1.0, burst)
-
-
-def test_the_place_out_of_range_is_named() -> None:
-    message = "scaled distance Z at [1] is 80 m/kg^(1/3), must be 0.0674 to 40"
-    with pytest.raises(BlastEnvError, match=re.escape(message)):
-        kingery_bulmash("incident_impulse", [10.0, 80.0], 1.0)
+            kingery_bulmash(quantity, [10.0, z], 1.0, burst)
 
 
 def test_the_coefficient_in_doubt_is_the_one_without_a_step() -> None:

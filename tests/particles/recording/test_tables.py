@@ -63,14 +63,6 @@ def test_the_impulse_is_the_recorded_one_and_the_speed_is_of_the_velocity() -> N
     assert (row["speed"], row["impulse_sim"]) == (5.0, 2.5)
 
 
-def test_impulse_is_mass_times_speed_before_the_collision(blast: BlastResult) -> None:
-    table = blast.collisions
-    quantum = blast.blast.scene.impulse_quantum
-    np.testing.assert_allclose(
-        table["impulse_sim"], table["mass"] * table["speed"], rtol=0.0, atol=quantum
-    )
-
-
 @pytest.mark.parametrize(
     ("velocity", "normal", "angle_deg"),
     [
