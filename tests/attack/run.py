@@ -31,32 +31,22 @@ from tests.attack.web import ATTACKS, attempts_of, victim
 
 _KB: Final = 1024
 _RESET_PEAK: Final = "5"
-
-
-class Overtime(BaseException):
-    """What no reader can turn into an error of its own."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What one file may cost.
-
-    Attributes:
-        time_s: Processor time.
-        most_bytes: Memory.
-        stop_s: Processor time after which a reader is stopped.
-    """
-
-    time_s: float = 3.0
-    most_bytes: int = 2**28
-    stop_s: float = 30.0
-
-
-_LIMITS: Final = Limits()
+_TIME_S: Final = 3.0  # processor time of one file
+_BYTES: Final = 2**28  # memory of one file
+_STOP_S: Final = 30.0  # processor time after which a reader is stopped
 _MOST_BYTES: Final = 2**32  # of all together
 _MADE_TIME_S: Final = 10.0
 _MADE_BYTES: Final = 500_000_000
 _MADE_STOP_S: Final = 120.0  # on the clock
+
+Row = tuple[Sequence[object], Sequence[str]]
+"""The cells of a row, and what is wrong with what it stands for."""
+
+Only = Annotated[str, typer.Option(help="Those with this in their names.")]
+
+
+class Overtime(BaseException):
+    """What no reader can turn into an error of its own."""
 
 
 @dataclass
@@ -79,32 +69,20 @@ class Outcome:
     failures: dict[str, bytes] = field(default_factory=dict)
     failed: int = 0
 
-    @property
-    def accepted(self) -> int:
-        """How many were read."""
-        return self.files - self.refused - self.failed
 
-
-def attack(form: Format, count: int, seed: int = 0, limits: Limits = _LIMITS) -> Outcome:
-    """Read wrong files.
-
-    Args:
-        form: The format.
-        count: How many files.
-        seed: Decides which.
-        limits: What each of them may cost.
-    """
+def attack(form: Format, count: int, seed: int = 0) -> Outcome:
+    """Read so many wrong files of a format; the seed decides which."""
     sound = [form.read(each) for each in form.samples]
     outcome = Outcome()
     for content in mutants(form.samples, count, seed):
         began_s, before = process_time(), _size_bytes()
-        with _stopped_after(limits.stop_s):
+        with _stopped_after(_STOP_S):
             problem = _problem(form, content, sound, outcome)
         took_s, more = process_time() - began_s, _peak_bytes() - before
-        if problem is None and took_s > limits.time_s:
-            problem = f"took more than {limits.time_s:g} s"
-        if problem is None and more > limits.most_bytes:
-            problem = f"took more than {limits.most_bytes >> 20} MiB"
+        if problem is None and took_s > _TIME_S:
+            problem = f"took more than {_TIME_S:g} s"
+        if problem is None and more > _BYTES:
+            problem = f"took more than {_BYTES >> 20} MiB"
         if problem is not None:
             outcome.failed += 1
             outcome.failures.setdefault(problem, content)
@@ -177,6 +155,23 @@ def memory_limit(more_bytes: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
+def _table(
+    headers: Sequence[str], names: Iterable[str], only: str, row_of: Callable[[str, Path], Row]
+) -> None:
+    """Print a row for each name, made in a folder of its own; exit with 1 if anything is wrong."""
+    print(f"| {' | '.join(headers)} |\n|{'---|' * len(headers)}")
+    wrong = 0
+    for name in names:
+        if only not in name:
+            continue
+        with TemporaryDirectory() as folder:
+            cells, problems = row_of(name, Path(folder))
+        print(f"| {' | '.join(map(str, (name, *cells)))} |", flush=True)
+        print("".join(f"    {each}\n" for each in problems), end="", flush=True)
+        wrong += len(problems)
+    raise typer.Exit(1 if wrong else 0)
+
+
 app = typer.Typer(pretty_exceptions_enable=False)
 
 
@@ -184,131 +179,108 @@ app = typer.Typer(pretty_exceptions_enable=False)
 def files(
     count: Annotated[int, typer.Option(help="Files of each format.")] = 10_000,
     seed: Annotated[int, typer.Option(help="Decides which.")] = 0,
-    only: Annotated[str, typer.Option(help="Formats with this in their names.")] = "",
+    only: Only = "",
     out: Annotated[Path, typer.Option(help="Where files that failed are kept.")] = Path(
         "out/attack"
     ),
 ) -> None:
     """Read thousands of wrong files of each format; print what became of them."""
-    failed = 0
-    print("| format | files | refused | accepted | failures | slowest, ms | most, MiB | time, s |")
-    print("|---|---|---|---|---|---|---|---|")
+
+    def row(name: str, folder: Path) -> Row:
+        began_s = process_time()
+        found = attack(FORMATS[name](folder), count, seed)
+        problems = []
+        for number, (problem, content) in enumerate(found.failures.items()):
+            out.mkdir(parents=True, exist_ok=True)
+            kept = out / f"{name.replace('/', '_')}_{number}"
+            kept.write_bytes(content)
+            problems.append(f"{problem}: {kept}")
+        read = found.files - found.refused - found.failed
+        most = (f"{1000.0 * found.slowest_s:.0f}", f"{found.largest_bytes / 2**20:.0f}")
+        counts = (found.files, found.refused, read, found.failed)
+        return (*counts, *most, f"{process_time() - began_s:.0f}"), problems
+
+    headers = ("format", "files", "refused", "accepted", "failures")
     with memory_limit(_MOST_BYTES):
-        for name, make in FORMATS.items():
-            if only not in name:
-                continue
-            began_s = process_time()
-            with TemporaryDirectory() as folder:
-                outcome = attack(make(Path(folder)), count, seed)
-            cells = (
-                *(name, outcome.files, outcome.refused, outcome.accepted, outcome.failed),
-                *(f"{1000.0 * outcome.slowest_s:.0f}", f"{outcome.largest_bytes / 2**20:.0f}"),
-                f"{process_time() - began_s:.0f}",
-            )
-            print(f"| {' | '.join(map(str, cells))} |", flush=True)
-            for number, (problem, content) in enumerate(outcome.failures.items()):
-                out.mkdir(parents=True, exist_ok=True)
-                kept = out / f"{name.replace('/', '_')}_{number}"
-                kept.write_bytes(content)
-                print(f"    {problem}: {kept}")
-            failed += outcome.failed
-    raise typer.Exit(1 if failed else 0)
+        _table((*headers, "slowest, ms", "most, MiB", "time, s"), FORMATS, only, row)
 
 
 @app.command()
-def made(
-    only: Annotated[str, typer.Option(help="Files with this in their names.")] = "",
-) -> None:
+def made(only: Only = "") -> None:
     """Read files that were made on purpose to take long or much; print what they took."""
-    failed = 0
-    print("| file | size, MB | outcome | processor time, s | memory, MB |")
-    print("|---|---|---|---|---|")
-    for name in FAMILIES:
-        if only not in name:
-            continue
-        with TemporaryDirectory() as folder:
-            found = read_made(name, Path(folder))
-        cells = (name, f"{found.size / 1e6:.1f}", found.outcome)
-        print(f"| {' | '.join(cells)} | {found.time_s:.1f} | {found.peak_bytes / 1e6:.0f} |")
-        failed += not found.is_within
-    raise typer.Exit(1 if failed else 0)
+    headers = ("file", "size, MB", "outcome", "processor time, s", "memory, MB")
+    _table(headers, FAMILIES, only, _made)
 
 
-@app.command()
-def hostile(
-    only: Annotated[str, typer.Option(help="Families with this in their names.")] = "",
-) -> None:
-    """Read files of other kinds, with wrong numbers and texts; print how often it was refused."""
-    failed = 0
-    print("| family | tried | held | processor time, s |")
-    print("|---|---|---|---|")
-    for name, attempts in HOSTILE.items():
-        if only not in name:
-            continue
-        began_s, tried, through = process_time(), 0, list[str]()
-        with TemporaryDirectory() as folder:
-            for what, problem in attempts(Path(folder)):
-                tried += 1
-                through += [f"{what}: {problem}"] if problem else []
-        cells = (name, tried, tried - len(through), f"{process_time() - began_s:.0f}")
-        print(f"| {' | '.join(map(str, cells))} |", flush=True)
-        print("".join(f"    {each}\n" for each in through[:9]), end="", flush=True)
-        failed += len(through)
-    raise typer.Exit(1 if failed else 0)
-
-
-@dataclass(frozen=True)
-class MadeOutcome:
-    """What became of a file that was made on purpose.
-
-    Attributes:
-        size: Of the file, in bytes.
-        outcome: A word.
-        time_s: Processor time of all processes that read it, their start included.
-        peak_bytes: Most memory of one of them.
-    """
-
-    size: int
-    outcome: str
-    time_s: float
-    peak_bytes: int
-
-    @property
-    def is_within(self) -> bool:
-        """Whether it was read or refused, and took no more than it may."""
-        fine = self.outcome in ("read", "refused")
-        return fine and self.time_s <= _MADE_TIME_S and self.peak_bytes <= _MADE_BYTES
-
-
-def read_made(name: str, folder: Path) -> MadeOutcome:
+def _made(name: str, folder: Path) -> Row:
     """Make a file and read it, each in a process of its own."""
     path = folder / f"made{suffix_of(name)}"
     program = [sys.executable, "-m", "tests.attack.made"]
     subprocess.run([*program, "make", name, str(path)], check=True)
     reader = [*program, "read", name, str(path)]
-    size = path.stat().st_size
+    outcome, time_s, peak_bytes = "failed", 0.0, 0
     try:
         done = subprocess.run(reader, capture_output=True, timeout=_MADE_STOP_S, check=False)
+        if done.returncode == 0:
+            outcome, time_s, peak_bytes = json.loads(done.stdout)
     except subprocess.TimeoutExpired:
-        return MadeOutcome(size, "stopped", _MADE_STOP_S, 0)
-    if done.returncode != 0:
-        return MadeOutcome(size, "failed", 0.0, 0)
-    return MadeOutcome(size, *json.loads(done.stdout))
+        outcome, time_s = "stopped", _MADE_STOP_S
+    size_mb, peak_mb = path.stat().st_size / 1e6, peak_bytes / 1e6
+    cells = (f"{size_mb:.1f}", outcome, f"{time_s:.1f}", f"{peak_mb:.0f}")
+    fine = outcome in ("read", "refused")
+    within = fine and time_s <= _MADE_TIME_S and peak_bytes <= _MADE_BYTES
+    return cells, [] if within else ["not as it must be"]
+
+
+@app.command()
+def hostile(only: Only = "") -> None:
+    """Read files of other kinds, with wrong numbers and texts; print how often it was refused."""
+
+    def row(name: str, folder: Path) -> Row:
+        began_s = process_time()
+        tried = [*HOSTILE[name](folder)]
+        through = [f"{tried_as}: {problem}" for tried_as, problem in tried if problem]
+        held = len(tried) - len(through)
+        return (len(tried), held, f"{process_time() - began_s:.0f}"), through
+
+    _table(("family", "tried", "held", "processor time, s"), HOSTILE, only, row)
+
+
+@app.command()
+def web(only: Only = "") -> None:
+    """Attack a server of the page; print how often, and what got through."""
+    with TemporaryDirectory() as work, victim(Path(work, "work")) as server:
+
+        def row(name: str, _: Path) -> Row:
+            began_s = time()
+            tried, through = attempts_of(name, server)
+            return (tried, tried - len(through), f"{time() - began_s:.0f}"), through
+
+        _table(("attack", "tried", "held", "time, s"), ATTACKS, only, row)
 
 
 @app.command()
 def kills(
     most: Annotated[int, typer.Option(help="Most kills of each job, evenly spread.")] = 40,
-    only: Annotated[str, typer.Option(help="Jobs with this in their names.")] = "",
+    only: Only = "",
 ) -> None:
     """Kill each job at one step on the disk after the other; print whether it goes on."""
-    _attack_jobs("steps on the disk | killed at", only, partial(_killed, most))
+
+    def row(name: str, folder: Path) -> Row:
+        steps, whole = steps_and_outcome(name, folder / "whole")
+        places = {
+            f"step {at}": partial(outcome_after_kill, name, folder / f"{at}", at)
+            for at in spread(steps - 1, min(most, steps))
+        }
+        return _attacked(steps, places, whole)
+
+    _table(("job", "steps on the disk", "killed at", *_GOES_ON), JOBS, only, row)
 
 
 @app.command()
 def disks(
     most: Annotated[int, typer.Option(help="Devices for each job, evenly spread.")] = 12,
-    only: Annotated[str, typer.Option(help="Jobs with this in their names.")] = "",
+    only: Only = "",
 ) -> None:
     """Do each job on devices without room for all of it, and again with room.
 
@@ -320,82 +292,22 @@ def disks(
     except PermissionError as error:
         print(f"not tried: {error}")
         return
-    _attack_jobs("KiB on the disk | devices", only, partial(_without_room, most))
+
+    def row(name: str, folder: Path) -> Row:
+        _, whole = steps_and_outcome(name, folder / "whole")
+        size = size_of(folder / "whole")
+        rooms = {
+            f"bytes left {left}": partial(
+                outcome_after_full_device, name, folder / "disk", size, left
+            )
+            for left in spread(size, most)
+        }
+        return _attacked(size // _KB, rooms, whole)
+
+    _table(("job", "KiB on the disk", "devices", *_GOES_ON), JOBS, only, row)
 
 
-@app.command()
-def web(
-    only: Annotated[str, typer.Option(help="Attacks with this in their names.")] = "",
-) -> None:
-    """Attack a server of the page; print how often, and what got through."""
-    failed = 0
-    print("| attack | tried | held | time, s |")
-    print("|---|---|---|---|")
-    with TemporaryDirectory() as folder, victim(Path(folder, "work")) as server:
-        for name in ATTACKS:
-            if only not in name:
-                continue
-            began_s = time()
-            tried, through = attempts_of(name, server)
-            cells = (name, tried, tried - len(through), f"{time() - began_s:.0f}")
-            print(f"| {' | '.join(map(str, cells))} |", flush=True)
-            print("".join(f"    {each}\n" for each in through), end="", flush=True)
-            failed += len(through)
-    raise typer.Exit(1 if failed else 0)
-
-
-@dataclass(frozen=True)
-class JobOutcome:
-    """What became of a job that was attacked.
-
-    Attributes:
-        size: How long or large it is.
-        attacks: How often it was attacked.
-        wrong: What went wrong.
-    """
-
-    size: int
-    attacks: int
-    wrong: list[str]
-
-
-def _attack_jobs(columns: str, only: str, attacked: Callable[[str, Path], JobOutcome]) -> None:
-    failed = 0
-    print(f"| job | {columns} | goes on to the same result | time, s |")
-    print("|---|---|---|---|---|")
-    for name in JOBS:
-        if only not in name:
-            continue
-        began_s = time()
-        with TemporaryDirectory() as folder:
-            found = attacked(name, Path(folder))
-        right = found.attacks - len(found.wrong)
-        cells = (name, found.size, found.attacks, right, f"{time() - began_s:.0f}")
-        print(f"| {' | '.join(map(str, cells))} |", flush=True)
-        print("".join(f"    {each}\n" for each in found.wrong), end="", flush=True)
-        failed += len(found.wrong)
-    raise typer.Exit(1 if failed else 0)
-
-
-def _killed(most: int, name: str, folder: Path) -> JobOutcome:
-    steps, whole = steps_and_outcome(name, folder / "whole")
-    places = spread(steps - 1, min(most, steps))
-    problems = (
-        problem_with(partial(outcome_after_kill, name, folder / f"{at}", at), whole)
-        for at in places
-    )
-    return JobOutcome(steps, len(places), _known("step", places, problems))
-
-
-def _without_room(most: int, name: str, folder: Path) -> JobOutcome:
-    _, whole = steps_and_outcome(name, folder / "whole")
-    size = size_of(folder / "whole")
-    rooms = spread(size, most)
-    problems = (
-        problem_with(partial(outcome_after_full_device, name, folder / "disk", size, left), whole)
-        for left in rooms
-    )
-    return JobOutcome(size // _KB, len(rooms), _known("bytes left", rooms, problems))
+_GOES_ON: Final = ("goes on to the same result", "time, s")
 
 
 def spread(last: int, count: int) -> list[int]:
@@ -403,22 +315,17 @@ def spread(last: int, count: int) -> list[int]:
     return sorted({int(each) for each in np.linspace(0, last, count).round()})
 
 
-def _known(what: str, places: Sequence[int], problems: Iterable[str]) -> list[str]:
-    return [f"{what} {at}: {each}" for at, each in zip(places, problems, strict=True) if each]
-
-
-def problem_with(attacked: Callable[[], Any], whole: Any) -> str:
-    """Return what is wrong with a job that was attacked and begun again; empty if nothing is.
-
-    Args:
-        attacked: Attacks it, begins it again and returns what came of it.
-        whole: What comes of it otherwise.
-    """
-    try:
-        found = attacked()
-    except (RuntimeError, BlastEnvError, OSError, ValueError) as error:
-        return f"{type(error).__name__}: {error}"
-    return "" if found == whole else "another result"
+def _attacked(size: int, attacks: dict[str, Callable[[], Any]], whole: Any) -> Row:
+    """Attack a job in each way; it must go on to what comes of it otherwise."""
+    began_s, wrong = time(), []
+    for words, attacked in attacks.items():
+        try:
+            problem = "" if attacked() == whole else "another result"
+        except (RuntimeError, BlastEnvError, OSError, ValueError) as error:
+            problem = f"{type(error).__name__}: {error}"
+        wrong += [f"{words}: {problem}"] if problem else []
+    cells = (size, len(attacks), len(attacks) - len(wrong), f"{time() - began_s:.0f}")
+    return cells, wrong
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -56,24 +55,19 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         blast(seed=1.5),
         r"^seed is 1.5, must be an integer from 0 to 9223372036854775807",
     ),
-    "seed a": (blast(seed="a"), "^seed is 'a', must be an integer"),
     "seed none": (blast(seed=None), "^seed is nothing"),
     "seed 2**63": (blast(seed=2**63), "^seed is 9223372036854775808, must be an integer from 0"),
     "seed enormous": (blast(seed=ENORMOUS), "^seed is an integer of about 400 digits"),
-    "seed float": (blast(seed=np.float64(3.0)), "^seed is 3.0, must be an integer"),
     "engine 5": (blast(engine=5), "^engine is 5, must be a name or an engine"),
-    "engine list": (blast(engine=["event"]), "^engine is an array"),
     "engine long": (blast(engine=LONG), "^no engine 'xxx"),
     "engine escape": (blast(engine="\x1b[31m"), r"^no engine '\\x1b\[31m'"),
     "layout 5": (blast(layout=5), "^layout is 5, must be a list"),
-    "layout text": (blast(layout="ab"), "layout"),
     "layout floats": (blast(layout=[(1.0, 2)]), "layout"),
     "layout enormous": (blast(layout=[(ENORMOUS, 0)]), "an integer of about 400 digits"),
     "scenario 5": (blast(scenario=5), "^scenario is 5, must be a name"),
     "scenario keys": (blast(scenario={1: 2}), "has the key 1, keys must be strings"),
     "scenario null": (blast(scenario="\0"), r"null characters"),
     "scenario long": (blast(scenario=f"{LONG}.toml"), r"path is .* of 100005 characters"),
-    "cells text": (blast(engine="gas", cell_m="a"), "^cell_m is 'a', must be a number"),
     "cells tiny": (blast(engine="gas", cell_m=1e-9), "^cell_m is 1e-09, .* at least 0.001 m"),
     "settled text": (lambda: GasEngine(settled_s=SOON), "^settled_s is 'soon', must be a number"),
     "settled nan": (lambda: GasEngine(settled_s=float("nan")), "^settled_s is nan, must be a fini"),
@@ -135,15 +129,11 @@ def test_a_path_that_is_none_is_refused_by_every_writer() -> None:
             {"charge_position_m": (ENORMOUS, 1)},
             r"^charge_position_m is \(an integer of about 400 digits, 1\), must be a pair",
         ),
-        ({"charge_position_m": "ab"}, "^charge_position_m is 'ab', must be a pair"),
-        ({"charge_position_m": 5}, "^charge_position_m is 5, must be a pair"),
         ({"tnt_kg": ENORMOUS}, "^tnt_kg is an integer of about 400 digits, must be a finite"),
         ({"tnt_kg": True}, "^tnt_kg is true, must be a number"),
-        ({"tnt_kg": "100"}, "^tnt_kg is '100', must be a number"),
         ({"charge_height_m": [1.0]}, "^charge_height_m is an array, must be a number"),
         ({"layout": 5}, "^layout is 5, must be a list"),
         ({"blast_seed": 2**63}, "^blast_seed is 9223372036854775808, must be an integer"),
-        ({"blast_seed": 1.5}, "^blast_seed is 1.5, must be an integer"),
     ],
 )
 def test_options_of_reset_are_named_with_their_values(options: Any, words: str) -> None:

@@ -1,6 +1,7 @@
 """The attacks on the page, one of each kind, and whether they would notice."""
 
 from collections.abc import Iterator
+from itertools import islice
 
 import pytest
 
@@ -22,6 +23,6 @@ def test_a_real_server_holds(server: Victim, name: str) -> None:
 
 
 def test_scripts_are_stored_and_would_be_noticed() -> None:
-    assert len([*scenarios_with_scripts()]) >= len(SCRIPTS)
+    assert len([*islice(scenarios_with_scripts(), len(SCRIPTS))]) == len(SCRIPTS)
     for each in SCRIPTS[:5]:
         assert runs(f"<div>{each}\n</div>") or "script" in each

@@ -300,16 +300,8 @@ def tokens(server: Victim) -> Iterator[Attempt]:
     """Without the token, or with another."""
     token, name = server.entrance.token, server.entrance.cookie
     host = {"Host": server.own["Host"], "Origin": server.own["Origin"]}
-    wrong = (
-        "",
-        "x",
-        token[:-1],
-        f"{token}x",
-        token.swapcase(),
-        f" {token}x",
-        "A" * len(token),
-        "\xe9",
-    )
+    wrong = ["", "x", token[:-1], f"{token}x", token.swapcase(), f" {token}x", "\xe9"]
+    wrong.append("A" * len(token))
     cookies = [f"{name}={each}" for each in wrong]
     cookies += [f"token={token}", f"other={token}", f"x{name}={token}", "", ";", f"{name}"]
     for cookie in cookies:
@@ -340,29 +332,11 @@ def _no_method(server: Victim, path: str, headers: Mapping[str, str], method: st
 def paths(server: Victim) -> Iterator[Attempt]:
     """Names of files and designs that lead elsewhere, by somebody who may."""
     design = server.design_id
-    ups: tuple[str, ...] = (
-        "..",
-        "%2e%2e",
-        "..%2f",
-        "..%5c",
-        "%2e%2e%2f%2e%2e%2f",
-        "....//",
-        "%252e%252e",
-        "%00",
-        ".",
-    )
-    ups += (
-        "..%c0%af",
-        "~",
-        "C:%5c",
-        "%2fetc%2fpasswd",
-        "-",
+    ups = [
+        *("..", "%2e%2e", "..%2f", "..%5c", "%2e%2e%2f%2e%2e%2f", "....//", "%252e%252e", "%00"),
+        *(".", "..%c0%af", "~", "C:%5c", "%2fetc%2fpasswd", "-", "%ff", "con", "*", "%0d%0aX:1"),
         "a" * 5000,
-        "%ff",
-        "con",
-        "*",
-        "%0d%0aX:1",
-    )
+    ]
     kept = ("design.json", "open.json", "record.json", "etc/passwd", "000.jpg")
     for up in ups:
         for name in kept:
@@ -394,34 +368,13 @@ def uploads(server: Victim) -> Iterator[Attempt]:
     for length in (str(MOST_BYTES + 1), "9" * 30, "-1", "x", "1e9", "0x10"):
         yield f"length {length}", partial(_no_length, server, {"Content-Length": length})
     yield "no length", partial(_no_length, server, {"Transfer-Encoding": "chunked"})
-    names: tuple[str, ...] = (
-        "../../x.toml",
-        "..\\x.toml",
-        "/etc/cron.d/x.toml",
-        "x\0.toml",
-        "..",
-        "",
-        ".toml",
-        "%2e%2e%2fx.toml",
-    )
-    names += (
-        "a" * 4000 + ".toml",
-        "x.toml\r\nX: 1",
-        "con.toml",
-        "<script>.toml",
-        "x.exe",
-        "x.json",
-        "x.dxf",
-        "x.pbf",
-    )
-    contents = (
-        b"",
-        b"\0" * 1000,
-        b"schema_version = ",
-        b"[" * 100_000,
-        b'a = "' + b'\\"' * 40_000,
-        b"{}" * 9,
-    )
+    names = [
+        *("../../x.toml", "..\\x.toml", "/etc/cron.d/x.toml", "..", ".toml", "%2e%2e%2fx.toml"),
+        *("con.toml", "<script>.toml", "x.exe", "x.json", "x.dxf", "x.pbf", "x\0.toml", ""),
+        *("a" * 4000 + ".toml", "x.toml\r\nX: 1"),
+    ]
+    contents = (b"", b"\0" * 1000, b"schema_version = ", b"[" * 100_000, b"{}" * 9)
+    contents += (b'a = "' + b'\\"' * 40_000,)
     for name in names:
         for content in contents:
             attack = f"{name[:20]!r} with {content[:12]!r}"
