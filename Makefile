@@ -57,7 +57,7 @@ $(VENV)/.mutants: $(STAMP)
 MATRIX := 3.11 3.12 3.13 lowest
 MATRIX_EXTRAS ?= all
 MATRIX_TESTS ?= $(QUICK:%=tests/%)
-MATRIX_TOOLS := pytest hypothesis pytest-benchmark pytest-xdist imageio openpyxl pypdfium2
+MATRIX_TOOLS := pytest hypothesis pytest-xdist imageio openpyxl pypdfium2
 MATRIX_PYTHON = out/matrix/$*/bin/python
 # The same tests, and those of what is learnt or compiled, with other roundings: vector instructions
 # of torch, Numba's target without FMA, other kernels of the BLAS, glibc's functions without FMA,

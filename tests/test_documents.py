@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import pytest
-import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field
@@ -21,7 +20,6 @@ from blast_env.documents import (
     parse_toml,
     read_text,
 )
-from tests.site.documents import all_documents
 
 DEEP = MAX_DEPTH + 1
 
@@ -50,11 +48,6 @@ def test_dots_and_brackets_in_texts_and_comments_are_none() -> None:
     document = parse_toml(text)
     assert list(document.values()) == [many] * 4
     assert parse_json(json.dumps({"a": many})) == {"a": many}
-
-
-def test_real_files_are_read() -> None:
-    for document in all_documents():
-        assert parse_toml(tomli_w.dumps(document)) == document
 
 
 @given(st.text(alphabet="ab.=[]{}\"'\\#\n 1-", max_size=60))

@@ -7,9 +7,11 @@ import subprocess
 import sys
 import sysconfig
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from hatchling.builders.sdist import SdistBuilder
+from hatchling.builders.wheel import WheelBuilder
 
 from blast_env import save_scenario
 from tests.scenarios import BALLISTIC_COURTYARD
@@ -51,12 +53,11 @@ def call(*command: str | Path, cwd: Path) -> str:
 def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment with the wheel, the dependencies, and none of the extras that matter here."""
     folder = tmp_path_factory.mktemp("installed")
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "-q")
-    call(*pip, "wheel", REPOSITORY, "--no-deps", "--no-build-isolation", "-w", folder, cwd=folder)
-    (wheel,) = folder.glob("*.whl")
+    (wheel,) = WheelBuilder(str(REPOSITORY)).build(directory=str(folder), versions=["standard"])
     call(sys.executable, "-m", "venv", "--without-pip", "clean", cwd=folder)
     (site,) = (folder / "clean").glob("lib/python*/site-packages")
-    call(*pip, "install", "--no-deps", "--no-compile", "--target", site, wheel, cwd=folder)
+    with ZipFile(wheel) as archive:  # all that an installer does, but for scripts
+        archive.extractall(site)
     # The dependencies only: an editable install of the checkout would be found through a .pth
     # file, and .pth files count only in a site folder, not in one that another .pth file names.
     (site / "dependencies.pth").write_text(sysconfig.get_path("purelib"))

@@ -10,6 +10,7 @@ import pytest
 
 from blast_env import Blast, Charge, Scenario, load_scenario, simulate
 from blast_env.errors import LayoutError, UnknownNameError
+from blast_env.layout.build_scene import draw_charge
 from blast_env.site import ScenarioError
 from blast_env.site.balls import CollisionType
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
@@ -83,7 +84,7 @@ def test_a_charge_fixed_by_hand_leaves_the_fan_as_it_was() -> None:
 
 def test_charges_are_drawn_from_the_whole_threat() -> None:
     """The road of the courtyard runs from y = 6 m to y = 24 m at x = 5 m."""
-    charges = [Blast(COURTYARD, seed=seed).scene.charge for seed in range(200)]
+    charges = [draw_charge(COURTYARD, seed) for seed in range(200)]
     y_m = np.array([charge.position_m[1] for charge in charges])
     assert {charge.position_m[0] for charge in charges} == {5.0}
     assert 6.0 <= y_m.min() < 7.0

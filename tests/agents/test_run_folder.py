@@ -31,11 +31,6 @@ def damage_configuration(run: Path) -> None:
     (run / "config.json").write_text("settings: [")
 
 
-def change_configuration(run: Path) -> None:
-    path = run / "config.json"
-    path.write_text(path.read_text().replace('"n_steps": 16', '"n_steps": "many"'))
-
-
 def remove_configuration(run: Path) -> None:
     (run / "config.json").unlink()
 
@@ -95,7 +90,6 @@ def compress_checkpoint(run: Path) -> None:
     ("damage", "words"),
     [
         (damage_configuration, "config.json: is damaged"),
-        (change_configuration, "n_steps is 'many': Input should be a valid integer"),
         (remove_configuration, "is no run folder: there is no config.json"),
         (change_scenario, "it is another scenario"),
         (cut_checkpoint, "checkpoint.pt: is damaged"),
@@ -109,16 +103,9 @@ def compress_checkpoint(run: Path) -> None:
             "width is 9 in the configuration, must be 8",
         ),
         (edit_configuration('"gamma": 1.0', '"gamma": "2024-01-01"'), "gamma is '2024-01-01'"),
-        (edit_configuration('"seed": 0', '"seed": ' + "9" * 6000), "6000 digits"),
-        (edit_configuration('"seed": 0', '"seed": ' + "[" * 3000), "is nested too deeply"),
-        (
-            edit_configuration('"format": 1', '"format": "2024-01-01"'),
-            "format is '2024-01-01', must be",
-        ),
         (edit_checkpoint(format=1), "format is 1, must be 2"),
         (edit_checkpoint(counters={"steps": "many"}), "counters.steps is 'many'"),
         (edit_checkpoint(policy={"a": torch.zeros(1).expand(10**6, 10**6)}), "not in the file"),
-        (edit_checkpoint(policy={"a": 1}), "policy.a is 1"),
         (edit_checkpoint(optimizer={"a": 1}), "optimiser's state does not fit"),
     ],
 )

@@ -15,7 +15,6 @@ from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
 from gymnasium import spaces
-from pytest_benchmark.fixture import BenchmarkFixture
 from sb3_contrib import MaskablePPO
 
 from blast_env import load_scenario
@@ -140,13 +139,6 @@ def test_a_policy_that_looks_at_planes_is_refused_where_there_are_none(tmp_path:
     chosen = settings(scenario_file(tmp_path), observation="features")
     with pytest.raises(BlastEnvError, match=r"must be one of MlpPolicy for .* 'features'"):
         train(chosen, hyperparameters(), tmp_path / "run")
-
-
-def test_time_of_a_proposal(benchmark: BenchmarkFixture) -> None:
-    """At most 50 ms is the target; see `pytest --benchmark-enable`."""
-    scenario = load_scenario("courtyard")
-    agent, charge = untrained(scenario), Charge((5.0, 8.0), 100.0)
-    assert benchmark(agent.propose, scenario, charge) == agent.propose(scenario, charge)
 
 
 def test_samples_differ_and_follow_from_their_seed(run: Path) -> None:

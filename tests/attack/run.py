@@ -7,7 +7,7 @@ import subprocess
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -315,7 +315,7 @@ def spread(last: int, count: int) -> list[int]:
     return sorted({int(each) for each in np.linspace(0, last, count).round()})
 
 
-def _attacked(size: int, attacks: dict[str, Callable[[], Any]], whole: Any) -> Row:
+def _attacked(size: int, attacks: Mapping[str, Callable[[], Any]], whole: Any) -> Row:
     """Attack a job in each way; it must go on to what comes of it otherwise."""
     began_s, wrong = time(), []
     for words, attacked in attacks.items():

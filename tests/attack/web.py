@@ -373,8 +373,8 @@ def uploads(server: Victim) -> Iterator[Attempt]:
         *("con.toml", "<script>.toml", "x.exe", "x.json", "x.dxf", "x.pbf", "x\0.toml", ""),
         *("a" * 4000 + ".toml", "x.toml\r\nX: 1"),
     ]
-    contents = (b"", b"\0" * 1000, b"schema_version = ", b"[" * 100_000, b"{}" * 9)
-    contents += (b'a = "' + b'\\"' * 40_000,)
+    contents = [b"", b"\0" * 1000, b"schema_version = ", b"[" * 100_000, b"{}" * 9]
+    contents.append(b'a = "' + b'\\"' * 40_000)
     for name in names:
         for content in contents:
             attack = f"{name[:20]!r} with {content[:12]!r}"

@@ -426,18 +426,6 @@ def test_a_safe_engine_gives_the_upper_end_behind_a_barrier() -> None:
         by_hand().upper_ends(guess)
 
 
-def test_in_the_place_of_an_engine_it_tells_peaks_where_they_count() -> None:
-    surrogate, (threat,) = by_hand(), draw_threats(PEAKS, range(1))
-    impulses, peaks = (
-        BlastEvaluator(each, SurrogateEngine(surrogate)).loads((), threat) for each in (YARD, PEAKS)
-    )
-    said = surrogate.guess(site_of(PEAKS), [()], [threat.charge_against(PEAKS, ())])
-    assert said.peak_pa is not None
-    assert [each.peak_pa for each in peaks.protected] == pytest.approx(said.peak_pa[0])
-    assert all(each.peak_pa is None for each in impulses.structures)
-    assert peaks.load(PEAKS.objective) == pytest.approx(said.loads(site_of(PEAKS)).item())
-
-
 def test_an_environment_pays_by_guesses() -> None:
     surrogate = by_hand()
     env = BlastBarrierEnv(scenario=YARD, engine=SurrogateEngine(surrogate), reward="terminal")

@@ -1,12 +1,10 @@
 """Action spaces that choose step by step: the same layouts and rewards as place by place."""
 
-import pickle
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 
 from blast_env.envs.actions import ACTIONS, ActionChoice, ItemThenPlace, NumberedActions
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -16,7 +14,7 @@ from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from tests.catalogue_sites import WALL, yard
-from tests.envs.small import make, play, same, small_scenario
+from tests.envs.small import make, same, small_scenario
 from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 
@@ -159,16 +157,6 @@ def test_a_measure_needs_no_place() -> None:
     )
 
 
-@pytest.mark.parametrize("name", [*BY_CHOICE, "row"])
-def test_it_is_a_sound_environment(name: str) -> None:
-    env = make(action=name, observation="features")
-    check_env(env, skip_render_check=True)
-    first, second = (play(make(action=name), seed=3, policy_seed=1) for _ in range(2))
-    assert same(first, second)
-    assert first[-1][-1]["layout"]
-    assert pickle.loads(pickle.dumps(env)).action_space == env.action_space
-
-
 def test_a_strategy_of_ones_own_is_taken_and_a_wrong_one_is_told() -> None:
     of_four = make(action=ItemThenPlace(block_cells=4))
     assert of_four.action_space == gym.spaces.Discrete(2 * 2 + 16 + 1)
@@ -293,8 +281,3 @@ def test_block_and_cell_mean_the_nearest_ones() -> None:
     env.step(1)
     env.step(4 + 9)  # taken: the cell below, before the equally near ones
     assert env.placement.layout == ((1, 9), (0, 9))
-
-
-def test_invalid_actions_have_two_names() -> None:
-    with pytest.raises(BlastEnvError, match="no invalid_action 'nearst', did you mean 'nearest'"):
-        make(invalid_action="nearst")

@@ -48,6 +48,7 @@ def test_bad_options_are_named(options: dict, error: type, words: str) -> None:
         ({"scenario": "cortyard"}, "did you mean 'courtyard'"),
         ({"scenario": "free_field"}, "'free_field' has no build zone"),
         ({"reward": "teminal"}, "no reward 'teminal', did you mean 'terminal'"),
+        ({"invalid_action": "nearst"}, "no invalid_action 'nearst', did you mean 'nearest'"),
         ({"observation": "feature"}, "did you mean 'features'"),
         ({"threat": "hiden"}, "no threat 'hiden', did you mean 'hidden'"),
         ({"threats": 4}, "threats is 4, must be 1 unless threat is 'hidden'"),

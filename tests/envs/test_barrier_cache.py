@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
-import numpy as np
 import pytest
 
 from blast_env.errors import BlastEnvError
@@ -59,23 +57,6 @@ def test_sites_that_the_memory_has_let_go_are_still_in_the_cache(tmp_path: Path)
         env.reset(seed=seed)
         info = env.step(FINISH)[4]
     assert info["cache_hit_rate"] >= 0.5
-
-
-def test_environments_in_processes_share_a_folder(tmp_path: Path) -> None:
-    arguments: dict[str, Any] = {"engine": ThinEngine(), "cache": str(tmp_path)}
-    for blasts in (1, 0):
-        envs = gym.make_vec(
-            "BlastBarrier-v0",
-            num_envs=2,
-            vectorization_mode="async",
-            scenario=small_scenario(),
-            realisations=1,
-            **arguments,
-        )
-        envs.reset(seed=3)
-        info = envs.step(np.array([FINISH, FINISH]))[4]
-        assert info["blasts"].tolist() == [blasts, blasts]
-        envs.close()
 
 
 def test_what_is_no_cache_is_named() -> None:

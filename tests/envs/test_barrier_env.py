@@ -335,10 +335,3 @@ def test_modules_keep_clear_of_a_charge_that_an_option_puts_into_the_zone() -> N
     assert "closer than the charge's radius" in str(env.explain((5, 2)))
     assert info["action_mask"].sum() > 20
     assert play(env, seed=1, charge_position_m=(8.0, 10.0))[-1][4]["impulse_psi_s"] > 0.0
-
-
-def test_a_full_layout_leaves_only_finishing() -> None:
-    env = make()
-    _, info = env.reset(seed=1, options={"layout": [(0, 0), (1, 1), (2, 2)]})
-    assert np.flatnonzero(info["action_mask"]).tolist() == [FINISH]
-    assert env.step(FINISH)[2]

@@ -18,9 +18,7 @@ pytestmark = pytest.mark.slow
 FINISH = 40
 
 
-@pytest.mark.parametrize(
-    ("mode", "vector_kwargs"), [("sync", {}), ("async", {}), ("async", {"context": "spawn"})]
-)
+@pytest.mark.parametrize(("mode", "vector_kwargs"), [("sync", {}), ("async", {"context": "spawn"})])
 def test_vectors_of_environments_stack_the_information(mode: str, vector_kwargs: dict) -> None:
     envs = gym.make_vec(
         "BlastBarrier-v0",

@@ -2,11 +2,9 @@
 
 from itertools import pairwise
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
-from stable_baselines3 import PPO
 
 from blast_env.envs.observations import FeaturesObservation, ImageObservation
 from blast_env.errors import UnknownNameError
@@ -44,15 +42,6 @@ def test_mask_and_stock_change_with_the_layout() -> None:
         assert after[0]["vector"][0] < before[0]["vector"][0]
         assert same(after[0]["action_mask"], after[4]["action_mask"])
     assert steps[-1][0]["action_mask"].sum() == 1  # the charge has gone off
-
-
-def test_a_policy_with_several_inputs_learns_a_few_steps() -> None:
-    env = gym.make("BlastBarrier-v0", scenario=small_scenario(), observation="dict", realisations=1)
-    model = PPO("MultiInputPolicy", env, n_steps=8, batch_size=8, n_epochs=1, seed=0)
-    model.learn(8)
-    observation, _ = env.reset(seed=0)
-    action, _ = model.predict(observation, deterministic=True)
-    assert action in env.action_space
 
 
 def test_a_run_of_training_takes_single_arrays() -> None:

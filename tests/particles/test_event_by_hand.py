@@ -14,9 +14,7 @@ from tests.particles.scenes import (
     EXPLOSIVE,
     KEEP_MASS,
     balls,
-    energy,
     finished,
-    momentum,
     parameters,
     scene,
     states_at,
@@ -205,15 +203,3 @@ def test_an_inner_corner_sends_a_ball_back_where_it_came_from(lead: float) -> No
     assert found == (normals if lead >= 0.0 else normals[::-1])
     assert hits["module"].tolist() == ([0, 19] if lead >= 0.0 else [19, 0])
     assert hits["transferred_impulse"].tolist() == pytest.approx([1200.0, 1200.0])
-
-
-def test_at_rest_and_out_of_the_way_nothing_changes() -> None:
-    """A bystander close to a collision keeps its place to the last bit."""
-    row = balls(
-        [AIR] * 3, [(60.0, 80.0), (70.0, 80.0), (70.0, 82.5)], [(100.0, 0.0), (0, 0), (0, 0)]
-    )
-    after = states_at(scene(row, [FAR_WALL], rules(1.0)), 0.2)
-    assert after.position[2].tolist() == [70.0, 82.5]
-    assert after.velocity[2].tolist() == [0.0, 0.0]
-    assert momentum(after) == pytest.approx(momentum(row))
-    assert energy(after) == pytest.approx(energy(row))

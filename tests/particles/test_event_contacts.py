@@ -103,13 +103,6 @@ def test_a_line_of_twenty_that_is_hit_moves_on_together(
     assert after.velocity[-1, 0] > 0.0
 
 
-def test_balls_in_touch_at_the_start_collide_once_and_part() -> None:
-    pair = balls([AIR, AIR], [(50.0, 150.0), (52.0, 150.0)], [(300.0, 0.0), (0.0, 0.0)])
-    after, steps = run_to(0.1, pair, rules(1.0), (FAR_WALL,))
-    assert steps == 1
-    assert after.velocity.tolist() == [[0.0, 0.0], [300.0, 0.0]]
-
-
 def test_balls_in_touch_that_part_do_not_collide() -> None:
     pair = balls([AIR, AIR], [(50.0, 150.0), (52.0, 150.0)], [(0.0, 10.0), (50.0, 0.0)])
     after, steps = run_to(0.1, pair, rules(1.0), (FAR_WALL,))
@@ -201,17 +194,3 @@ def test_a_record_too_large_for_memory_ends_a_run(monkeypatch: pytest.MonkeyPatc
     run = finished(scene(balls([AIR], [(101.0, 80.0)], [(10.0, 0.0)]), SLOT, settings))
     assert run.end_reason is EndReason.EVENT_LIMIT
     assert 10_000 <= len(run.log) < 20_000
-
-
-def test_gaps_of_one_module_in_a_barrier_do_not_stop_a_blast() -> None:
-    """Default balls are exactly as wide as a module, and the mouths of gaps catch them."""
-    rows = (6, 8, 10, 12, 14, 26, 28, 30, 32)
-    for seed in range(3):
-        result = simulate(
-            load_scenario("courtyard").with_simulation("ballistic"),
-            [(row, 0) for row in rows],
-            seed=seed,
-            engine="event",
-        )
-        assert result.end_reason is not EndReason.EVENT_LIMIT
-        assert result.steps < 10_000

@@ -101,25 +101,6 @@ def test_the_scenes_are_what_they_are_meant_to_be() -> None:
         assert any(part.destroyed for part in run.obstacles[0].parts), kind
 
 
-def test_the_break_shot_has_ties() -> None:
-    """Only the numbers of the balls decide between them: other numbers, another outcome."""
-    shot = break_shot()
-    of_balls = shot.balls
-    renumbered = Balls(
-        of_balls.kind,
-        of_balls.position[::-1],
-        of_balls.velocity[::-1],
-        of_balls.mass,
-        of_balls.radius,
-    )
-    ends = []
-    for start in (shot, replace(shot, balls=renumbered)):
-        run = EVENT.start(start)
-        run.advance(0.05)
-        ends.append(np.sort(run.balls().position[:, 1]))
-    assert np.abs(ends[0] - ends[1]).max() > 0.1
-
-
 @pytest.mark.parametrize("kind", SCENES)
 def test_cells_of_any_size_give_the_same_run(kind: str) -> None:
     digests = {digest(kind, EventEngine(cell_units=cell)) for cell in CELLS}

@@ -4,9 +4,6 @@ import numpy as np
 import pytest
 
 from blast_env import load_scenario, simulate
-from blast_env.arrays import FloatArray
-from blast_env.evaluation.engines import CALIBRATED_ENGINES, Blast
-from blast_env.evaluation.engines.particles import find_particle_engine
 from blast_env.particles.run import COLLISION_DTYPE, incidence_angle_rad
 
 COURTYARD = load_scenario("courtyard")
@@ -45,23 +42,3 @@ def test_the_record_has_the_columns_of_every_engine() -> None:
             assert of_part["first_contact"].tolist() == [True] + [False] * (part.hits - 1)
         else:
             assert part.first_hit_s is None
-
-
-def test_both_engines_agree_on_a_blast_without_air() -> None:
-    """Without collisions among balls nothing is chaotic: hit by hit the same, but for the steps."""
-    sparse = COURTYARD.with_simulation("ballistic", {"air": {"spacing_units": 0.0}})
-    logs = [
-        find_particle_engine(name).start(Blast(sparse, seed=4).scene) for name in CALIBRATED_ENGINES
-    ]
-    for run in logs:
-        run.advance(0.2)
-    stepped, exact = (np.sort(run.log.to_array(), order=["ball", "time_s"]) for run in logs)
-    assert len(exact) > 50
-    first = [np.unique(log["ball"], return_index=True)[1] for log in (stepped, exact)]
-    stepped, exact = stepped[first[0]], exact[first[1]]
-    assert (stepped["ball"] == exact["ball"]).all()
-    apart_s: FloatArray = stepped["time_s"] - exact["time_s"]
-    assert np.abs(apart_s).max() < 1e-3
-    same_module = stepped["module"] == exact["module"]
-    assert same_module.mean() > 0.95
-    assert stepped["impulse"] == pytest.approx(exact["impulse"], rel=1e-9)

@@ -105,18 +105,6 @@ def test_numbers_that_are_not_to_be_trusted_say_so() -> None:
     assert "~" not in words(comparison_figure(comparison(0.5)))
 
 
-def test_the_legend_has_what_is_drawn_and_nothing_else() -> None:
-    labels = [text.get_text() for text in comparison_figure(comparison(0.5)).legends[0].get_texts()]
-    assert labels == [
-        "charge",
-        "barrier module, as high as the air",
-        "protected structure",
-        "build zone",
-        "no-build area",
-        "site border",
-    ]
-
-
 def test_different_sites_have_their_names_and_their_own_scales(tmp_path: Path) -> None:
     """A legend for all of them, and a site without a no-build area keeps that of another."""
     sites = [generate_site(1), generate_site(2), COURTYARD]

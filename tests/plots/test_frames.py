@@ -149,16 +149,6 @@ def test_a_destroyed_module_looks_different(blast: Blast) -> None:
     assert (changed.max(axis=0)[::-1] <= np.add(high, 2)).all()
 
 
-def test_equal_states_give_equal_frames(barrier_blast: Blast) -> None:
-    frames = []
-    for _ in range(2):
-        run = barrier_blast.start()
-        run.advance(0.01)
-        painter = FramePainter(barrier_blast)
-        frames.append(painter.paint(run.balls(), run.obstacles, run.time_s))
-    assert np.array_equal(frames[0], frames[1])
-
-
 def test_the_scale_of_all_layouts_of_a_scenario_is_the_same(
     blast: Blast, barrier_blast: Blast
 ) -> None:
@@ -184,18 +174,3 @@ def test_frames_need_no_display() -> None:
     )
     assert done.stdout.startswith("(")
     assert done.stderr == ""
-
-
-def test_a_missing_package_is_named_with_the_command_that_installs_it() -> None:
-    code = (
-        "import sys\n"
-        "sys.modules['matplotlib'] = None\n"
-        "from blast_env.errors import BlastEnvError\n"
-        "try:\n"
-        "    import blast_env.plots.frames\n"
-        "except BlastEnvError as error:\n"
-        "    print(error)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "pip install blast-env[render]" in done.stdout
-    assert "'matplotlib" in done.stdout

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
 from blast_env.layout import LayoutState
 from blast_env.plots.frames import FramePainter
@@ -55,14 +54,6 @@ def test_a_known_charge_is_a_star_and_a_hidden_one_a_line_or_a_veil() -> None:
     assert reddish.sum() > 10_000
 
 
-def test_lines_are_written() -> None:
-    painter = PlacingPainter(SCENARIO, SCENARIO.charge)
-    placement = LayoutState.empty(SCENARIO)
-    frames = [painter.paint(placement, lines) for lines in ((), ("a",), ("a", "b"))]
-    assert (frames[0] != frames[1]).any()
-    assert (frames[1] != frames[2]).any()
-
-
 @pytest.mark.parametrize(
     ("sources", "words"),
     [
@@ -73,8 +64,3 @@ def test_lines_are_written() -> None:
 )
 def test_what_is_known_of_the_charge_in_words(sources: tuple, words: str) -> None:
     assert sources_text(sources) == words
-
-
-def test_a_width_out_of_bounds_is_named() -> None:
-    with pytest.raises(BlastEnvError, match="width_px is 100"):
-        PlacingPainter(SCENARIO, SCENARIO.charge, width_px=100)

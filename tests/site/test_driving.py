@@ -205,17 +205,6 @@ def test_what_gives_way_is_what_a_full_search_of_every_round_says(
     assert (drive.held, drive.broken) == (held, broken)
 
 
-def shifted(places: np.ndarray, x: int, y: int, outside: Any) -> np.ndarray:
-    """Return what is at the places that are x columns and y rows on; outside of all, a value."""
-    found = np.full_like(places, outside)
-    rows, columns = places.shape
-    if abs(y) < rows and abs(x) < columns:
-        found[max(0, -y) : rows - max(0, y), max(0, -x) : columns - max(0, x)] = places[
-            max(0, y) : rows - max(0, -y), max(0, x) : columns - max(0, -x)
-        ]
-    return found
-
-
 def test_a_grip_of_twice_as_much_takes_a_circle_root_two_times_as_fast() -> None:
     """A yard of 20 m leaves circles of 9 m; a turn on them is all that limits the speed."""
     fastest = []

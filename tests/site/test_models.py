@@ -29,11 +29,6 @@ def scenario_from(document: Document) -> Scenario:
     return Scenario.from_document(document, "test")
 
 
-def test_point_source_is_always_there() -> None:
-    source = PointSource(tnt_kg=1.0, position_m=(3.0, 4.0))
-    assert source.sample_position_m(np.random.default_rng(0)) == (3.0, 4.0)
-
-
 def test_segment_source_reaches_all_of_the_segment_and_nothing_else() -> None:
     source = SegmentSource(kind="segment", tnt_kg=1.0, start_m=(1.0, 2.0), end_m=(5.0, 10.0))
     rng = np.random.default_rng(0)
@@ -167,12 +162,6 @@ def test_stand_off_needs_the_structure_on_the_right() -> None:
     document = changed(minimal_document(), ("charge", 0, "position_m"), [18.0, 5.0])
     with pytest.raises(BlastEnvError, match="to the right of the charge"):
         scenario_from(document).at_stand_off(15.0)
-
-
-def test_strip_behind_the_structure_keeps_its_width() -> None:
-    scenario = scenario_from(minimal_document()).at_stand_off(20.0)
-    # 3 m before the charge, 20 m, 2 m of structure, 8 m behind it.
-    assert scenario.site.width_m == 33.0
 
 
 def test_another_charge_replaces_the_threat_and_changes_the_hash() -> None:

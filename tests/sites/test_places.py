@@ -55,14 +55,3 @@ def test_the_only_place_is_found() -> None:
 @pytest.mark.parametrize("size_m", [(8.5, 1.0), (1.0, 6.5)])
 def test_there_is_no_place_for_what_is_too_large(size_m: tuple[float, float]) -> None:
     assert draw_place(draws(0), AREA, size_m, []) is None
-
-
-def test_there_is_no_place_where_everything_is_too_near() -> None:
-    assert draw_place(draws(0), AREA, (1.0, 1.0), [Apart(Rectangle(5, 5, 5, 5), 9.0)]) is None
-
-
-def test_every_place_is_drawn_sooner_or_later() -> None:
-    stream = draws(0)
-    area = Rectangle(0.0, 0.0, 2.0, 1.5)
-    found = {draw_place(stream, area, (1.0, 1.0), []) for _ in range(200)}
-    assert len(found) == 6

@@ -99,14 +99,6 @@ def test_a_scenario_without_a_zone_is_an_error() -> None:
         Visibility.of(load_scenario("free_field"))
 
 
-def test_bundled_scenarios_have_lines_of_sight() -> None:
-    # Several sources, structures that hide each other, and a zone that overlaps a structure.
-    for name in ("courtyard", "perimeter_gate", "street_junction"):
-        lines = Visibility.of(load_scenario(name))
-        assert 0.1 < lines.open_share <= 1.0
-        assert np.isfinite(lines.weight).all()
-
-
 def test_the_first_piece_cuts_most_for_its_cost_of_all_that_may_stand() -> None:
     """Piece by piece, by the cells and the height of each."""
     scenario = load_scenario("visitor_entrance")

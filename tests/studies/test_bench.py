@@ -16,7 +16,6 @@ from studies.bench import (
     SiteCost,
     blast_cost,
     environment_cost,
-    random_action,
     site_cost,
     street,
 )
@@ -60,13 +59,6 @@ def test_an_episode_is_its_placements_and_its_blast() -> None:
     assert 0.0 < cost.placing_s < cost.episode_s
     assert cost.blast_s + cost.placing_s == pytest.approx(cost.episode_s)
     assert cost.batch_steps_per_s > 0.0
-
-
-def test_random_actions_are_legal_and_finish_when_nothing_is_free() -> None:
-    rng = np.random.default_rng(0)
-    mask = np.array([False, True, False, True, True])
-    assert {random_action(mask, rng) for _ in range(50)} == {1, 3}
-    assert random_action(np.array([False, False, True]), rng) == 2
 
 
 def test_a_scenario_without_a_build_zone_has_no_environment() -> None:

@@ -87,7 +87,7 @@ def test_generated_sites_of_all_sides_are_named(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("seed", [10_004, 10_005, 10_077, 10_078])
+@pytest.mark.parametrize("seed", [10_004, 10_077])
 def test_walls_of_front_sites_see_the_charge(tmp_path: Path, seed: int) -> None:
     name, out = blast_table.site_name(seed, 18.0, front=True), tmp_path / "blasts.parquet"
     site, whole = blast_table.scenario_of(name), blast_table.scenario_of(f"close_sites/18/{seed}")

@@ -14,7 +14,6 @@ from studies.gas.cells import CellLoads, cell_loads, difference
 from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending, sites
 from studies.gas.loads import impulse_until, protected_impulse_pa_s, with_heights, yard
-from studies.gas.oblique import oblique_loads
 from studies.gas.reference import free_field, wide_wall
 from tests.gas_sites import glazed_hut, hut
 
@@ -82,16 +81,6 @@ def test_the_studied_sites_have_something_to_protect() -> None:
     assert "street_front" in names
 
 
-def test_a_turned_facade_has_its_own_peaks_along_its_own_normal() -> None:
-    """Corners of the staircase raise peaks on faces; what is told hardly feels them."""
-    straight, turned = (oblique_loads(angle_deg, until=0.04) for angle_deg in (0.0, 30.0))
-    assert straight.impulse_pa_s == pytest.approx(straight.covered_pa_s)
-    assert turned.covered_pa_s == pytest.approx(straight.covered_pa_s, rel=0.06)
-    assert turned.largest_peak_pa > 1.2 * straight.largest_peak_pa
-    assert turned.largest_told_pa < 1.1 * straight.largest_told_pa
-    assert turned.told_m == pytest.approx(straight.told_m, rel=0.08)
-
-
 def test_borders_farther_away_change_loads_little(site: Scenario) -> None:
     """What comes back from them comes after the load."""
     until_s = 0.06
@@ -103,14 +92,10 @@ def test_borders_farther_away_change_loads_little(site: Scenario) -> None:
     assert near == pytest.approx(wide, rel=0.01)
 
 
-def test_loads_of_layouts_by_processes_are_the_same(site: Scenario) -> None:
-    charge = draw_charge(site, 0)
-    one = cell_loads(site, [WALL], charge, GasEngine(), until_s=0.03)
-    two = cell_loads(site, [WALL], charge, GasEngine(), until_s=0.03, processes=2)
-    assert one.unprotected_pa_s == two.unprotected_pa_s
-    assert one.impulse_pa_s.tolist() == two.impulse_pa_s.tolist()
-    assert 0.0 < one.reduction[0] < 0.4
-    assert one.cpu_s > 0.0
+def test_loads_of_layouts_are_timed(site: Scenario) -> None:
+    found = cell_loads(site, [WALL], draw_charge(site, 0), GasEngine(), until_s=0.03)
+    assert 0.0 < found.reduction[0] < 0.4
+    assert found.cpu_s > 0.0
 
 
 def test_without_a_time_loads_are_those_of_the_end() -> None:

@@ -100,11 +100,6 @@ def test_every_engine_has_its_own_calibration(name: str, engine: str) -> None:
     stored.check(preset(stored.preset), engine)
 
 
-def test_the_calibrations_of_the_ballistic_preset_are_there_for_both_engines() -> None:
-    for name in ("ballistic_ufc", "ballistic_kb_100kg"):
-        assert calibrated_engines(name) == tuple(sorted(CALIBRATED_ENGINES))
-
-
 def test_settings_of_the_other_engine_do_not_matter() -> None:
     coarse = with_overrides(preset("ballistic"), {"stepping": {"contact_time_s": 1e-5}})
     CALIBRATION.check(coarse, "pymunk")
@@ -220,14 +215,8 @@ def test_saving_and_loading_round_trips(tmp_path: Path) -> None:
 
 
 def damage(content: dict) -> dict[str, str]:
-    whole = json.dumps(content)
     return {
-        "is not JSON": whole[: len(whole) // 2],
         "was edited": json.dumps(content | {"facade_width_m": 99.0}),
-        "must be a calibration": "[]",
-        "nested too deeply": "[" * 1000,
-        "has 6000 digits": whole.replace("{", '{"law": ' + "9" * 6000 + ",", 1),
-        "a key occurs twice": whole.replace("{", '{"law": 1,', 1),
         "the checksum does not match": json.dumps({}),
     }
 

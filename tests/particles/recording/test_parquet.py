@@ -46,11 +46,10 @@ def test_the_same_result_gives_the_same_bytes(blast: BlastResult, tmp_path: Path
     assert first.read_bytes() == second.read_bytes()
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.5, 0.99])
-def test_reading_a_truncated_file(blast: BlastResult, tmp_path: Path, kept: float) -> None:
+def test_reading_a_truncated_file(blast: BlastResult, tmp_path: Path) -> None:
     path = blast.to_parquet(tmp_path / "run.parquet")
     content = path.read_bytes()
-    path.write_bytes(content[: int(kept * len(content))])
+    path.write_bytes(content[: len(content) // 2])
     with pytest.raises(BlastEnvError, match=r"run\.parquet: damaged or not a Parquet file"):
         read_parquet(path)
 
