@@ -17,9 +17,6 @@ def only_line(*structures: Document, **zone: Any) -> str:
     return line.removeprefix("f.toml: build_zone.")
 
 
-LEAST = "Input should be greater than or equal to"
-
-
 @pytest.mark.parametrize(
     ("zone", "line"),
     [
