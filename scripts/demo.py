@@ -1,6 +1,8 @@
 """`make demo`; see `studies.demo`."""
 
+import typer
+
 from studies.demo import main
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -5,16 +5,16 @@ are not enough. After each round a few blasts by gas dynamics correct the guesse
 of the policy by these blasts is judged by gas dynamics under charges that it has not met.
 """
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import exp, isnan, log
 from pathlib import Path
 from time import perf_counter
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 import torch
+import typer
 from matplotlib.figure import Figure
 from sb3_contrib import MaskablePPO
 
@@ -143,8 +143,9 @@ class DemoTraining:
     Attributes:
         settings: The settings.
         scenario: The site.
-        curve: Steps so far, reduction by gas dynamics and guess of the proposal, by round. The
-            first row has the means of draws of the untrained policy, which are random layouts.
+        curve: Steps so far, reduction of the proposal by gas dynamics, and the one promised by the
+            corrected guess before that blast, by round. The first row has the means of draws of the
+            untrained policy, which are random layouts.
     """
 
     settings: DemoSettings
@@ -214,27 +215,28 @@ class DemoTraining:
         return tuple(sorted(info["layout"])), info["reduction"]
 
     def _blast(self, layouts: Sequence[tuple[Layout, float]], shown: int) -> None:
-        """Blast layouts, each with its guess; the curve gets the mean of the first ones."""
+        """Blast layouts, each with its guess; the curve gets the means of the first ones."""
+        promised = np.mean([self.reward.corrected(*each) for each in layouts[:shown]]).item()
         for layout, guessed in layouts:
             judged = compare(self._judge, [self._case], [layout], self.settings.processes)
             self.reward.learn(layout, guessed, judged.reduction.value)
-        rows = [(self.reward.reduction[each], guessed) for each, guessed in layouts[:shown]]
-        by_gas, guessed = np.mean(rows, axis=0).tolist()
-        self.curve.append((self.model.num_timesteps, by_gas, guessed))
+        by_gas = np.mean([self.reward.reduction[each] for each, _ in layouts[:shown]]).item()
+        self.curve.append((self.model.num_timesteps, by_gas, promised))
 
 
 def train_agent(settings: DemoSettings) -> DemoTraining:
     """Train an agent, and print the learning curve as it grows."""
+    torch.set_num_threads(1)  # further threads only wait for these small products
     training = DemoTraining(settings, load_scenario(settings.scenario))
     print_line(f"{AGENT} on guesses that gas dynamics corrects; reductions of its proposals:")
     with progress_bar("training") as progress:
         for number in range(settings.rounds + 1):
             if number:
                 training.do_round()
-            steps, by_gas, guessed = training.curve[-1]
+            steps, by_gas, promised = training.curve[-1]
             print_line(
                 f"  after {steps:>5,} steps, {training.blasts:>3} blasts: {percent(by_gas):>6} by "
-                f"gas dynamics, {percent(guessed):>6} by guess{'' if number else ' (random)'}"
+                f"gas dynamics, {percent(promised):>6} promised{'' if number else ' (random)'}"
             )
             progress(number / settings.rounds)
     return training
@@ -242,11 +244,11 @@ def train_agent(settings: DemoSettings) -> DemoTraining:
 
 def learning_curve(training: DemoTraining) -> Figure:
     """Return the figure of the learning curve."""
-    steps, by_gas, guessed = zip(*training.curve, strict=True)
+    steps, by_gas, promised = zip(*training.curve, strict=True)
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.add_subplot(xlabel="steps of training", ylabel="reduction of the proposal (%)")
     axes.plot(steps, 100.0 * np.array(by_gas), marker="o", label="by gas dynamics")
-    axes.plot(steps, 100.0 * np.array(guessed), ls="--", label="by the surrogate's guess")
+    axes.plot(steps, 100.0 * np.array(promised), ls="--", label="promised by corrected guesses")
     axes.set_title(f"{AGENT} on {training.scenario.name}; first point: random layouts", fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend()
@@ -360,10 +362,18 @@ def compare_methods(settings: DemoSettings, training: DemoTraining) -> AgentComp
     return AgentComparison(results, tuple(rules[0]), evaluators.engine.words)
 
 
-def main() -> None:
-    """Run the demonstration; an argument is the seed of the training."""
+def main(
+    seed: Annotated[int, typer.Option(help="Seed of the training.")] = 0,
+    scenario: Annotated[str, typer.Option(help="Bundled name or file.")] = DemoSettings.scenario,
+    only_train: Annotated[bool, typer.Option(help="Print the learning curve only.")] = False,
+) -> None:
+    """Train MaskablePPO on a site, and compare its layout with every rule."""
+    settings = DemoSettings(seed=seed, scenario=scenario)
     with user_errors():
-        demonstrate(DemoSettings(seed=int(sys.argv[1]) if len(sys.argv) > 1 else 0))
+        if only_train:
+            train_agent(settings)
+        else:
+            demonstrate(settings)
 
 
 def demonstrate(settings: DemoSettings) -> AgentComparison:
@@ -377,7 +387,6 @@ def demonstrate(settings: DemoSettings) -> AgentComparison:
     """
     began = perf_counter()
     make_folder(settings.out)
-    torch.set_num_threads(1)  # further threads only wait for these small products
     training = train_agent(settings)
     comparison = compare_methods(settings, training)
     print_comparison(comparison)
@@ -437,4 +446,4 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)
