@@ -15,7 +15,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Layout, Rectangle
+from blast_env.geometry import Element, Layout, Measure, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, VehicleSource, find_scenario
 from blast_env.site.catalogue import Variant
@@ -223,6 +223,47 @@ def sight_lines(scenario: AnyScenario, charge: AnyCharge | None) -> Layout:
     if charge is not None:
         found = found.model_copy(update={"charge": (source_of(charge),)})
     return visibility_layout(found, Visibility.of(found))
+
+
+def hardening_alone(scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:  # noqa: ARG001
+    """Return the dearest affordable measures that harden facades, and no barrier.
+
+    A measure that only changes components which a dearer one hardens is left out.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; it has a build zone.
+        charge: Ignored.
+
+    Raises:
+        BlastEnvError: If the scenario has no build zone.
+    """
+    found = find_scenario(scenario)
+    placement, hardened = LayoutState.empty(found), set[tuple[str, str]]()
+    for each in sorted(found.zone.hardening, key=lambda it: -it.cost):
+        kinds = [kind for kind in ("glazing", "wall") if getattr(each, kind) is not None]
+        bays = [bay.bay.name for bay in found.named_bays() if each.covers(bay.bay)]
+        changed = {(name, kind) for name in bays for kind in kinds}
+        measure = Measure.named(each.name)
+        if changed - hardened and placement.explain(measure) is None:
+            placement, hardened = placement.place(measure), hardened | changed
+    return placement.layout
+
+
+def hardening_and_sight_lines(scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
+    """Return `hardening_alone`, and the pieces of `sight_lines` that are affordable beside it.
+
+    Args:
+        scenario: As for `hardening_alone`.
+        charge: As for `sight_lines`.
+
+    Raises:
+        BlastEnvError: As for `sight_lines`.
+    """
+    placement = LayoutState(find_scenario(scenario), hardening_alone(scenario))
+    for piece in sight_lines(scenario, charge):
+        if placement.explain(piece) is None:
+            placement = placement.place(piece)
+    return placement.layout
 
 
 def expected_charge(sources: Sequence[AnySource]) -> Charge:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blast_env.design.rules import hardening_alone, hardening_and_sight_lines
+from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import LayoutError
 from blast_env.geometry import Measure, Piece, layout_counts, layout_words, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities, element_table
@@ -92,6 +94,21 @@ def test_of_two_measures_on_a_bay_the_later_one_counts() -> None:
     scenario = glazed_yard(GLASS, better)
     both = [Measure.named("better"), TAKEN]
     assert scenario.bays_with(both) == scenario.bays_with(both[:1]) != scenario.bays_with(both[1:])
+
+
+def test_a_rule_takes_the_dearest_glass_and_then_what_cuts_lines_of_sight() -> None:
+    """Both kinds of glass are for the same windows; panels change other components."""
+    better = {"name": "better", "glazing": "window_laminated_12", "cost": 6.0}
+    scenario = glazed_yard(GLASS, better, PANELS)
+    alone, both = hardening_alone(scenario), hardening_and_sight_lines(scenario)
+    assert {each[2:3] for each in alone} == {("better",), ("panels",)}
+    assert both[: len(alone)] == alone
+    assert len(both) > len(alone)
+    assert LayoutState.of(scenario, both).budget_left >= 0.0
+    needing = set(proposers(ProposerKind.RULE)) - set(
+        proposers(ProposerKind.RULE, suiting=[Scenario.from_document(yard_document(), "yard")])
+    )
+    assert {"hardening_alone", "hardening_and_sight_lines"} <= needing
 
 
 def test_layout_file_has_measures(tmp_path: Path) -> None:

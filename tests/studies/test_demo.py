@@ -53,9 +53,7 @@ def test_it_trains_compares_and_films(tmp_path: Path) -> None:
     assert "judged by the engine gas" in printed
     assert sum(line.startswith("  after") for line in printed.splitlines()) == 2
     names = list(comparison.results)
-    by_rule = [
-        row.title for row in proposers(ProposerKind.RULE).values() if "posts" not in row.title
-    ]
+    by_rule = [row.title for row in proposers(ProposerKind.RULE, suiting=[SITE]).values()]
     assert names == ["no barrier", "random layout", *by_rule, AGENT]
     assert all(name in printed for name in (*names, "best rule for each case"))
     files = ["learning_curve.png", "side_by_side.mp4", "facade.png", "site.png", "loads.xlsx"]

@@ -40,11 +40,14 @@ class Need(Enum):
 
     CATALOGUE = "catalogue (build_zone.items)"
     VEHICLE = "vehicle (a source of kind 'vehicle')"
+    HARDENING = "measure that hardens facades (build_zone.hardening)"
 
     def is_met(self, scenario: Scenario) -> bool:
         """Return whether a scenario has the property."""
         if self is Need.CATALOGUE:
             return bool(scenario.zone.items)
+        if self is Need.HARDENING:
+            return bool(scenario.zone.hardening)
         return bool(scenario.vehicles)
 
 
@@ -119,6 +122,7 @@ _TABLE: Final[Mapping[str, ProposerRow]] = MappingProxyType(
         "sight_lines": ProposerRow(
             f"{_RULES}:sight_lines", "most sight lines cut", ProposerKind.RULE, budget=0
         ),
+        **_rules(_RULES, "hardening alone", "hardening and sight lines", needs=(Need.HARDENING,)),
     }
 )
 
