@@ -17,11 +17,12 @@ from blast_env.provenance import package_version
 if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checkers
     from blast_env.design.proposal import propose, search
     from blast_env.evaluation.cases import LoadCase, LoadCaseSet
+    from blast_env.evaluation.comparison import Evaluation
     from blast_env.evaluation.engines.contract import Engine
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
     from blast_env.evaluation.engines.particles import Blast, BlastResult
     from blast_env.evaluation.engines.simulate import simulate, simulate_many
-    from blast_env.evaluation.report import LayoutEvaluation, evaluate_layout
+    from blast_env.evaluation.evaluate import evaluate_layout
     from blast_env.layout import LayoutState, load_layout, write_layout
     from blast_env.site import Scenario, load_scenario, save_scenario
     from blast_env.site.scene import Charge
@@ -35,11 +36,11 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
         "Engine": "blast_env.evaluation.engines.contract",
         "GasBlast": "blast_env.evaluation.engines.gas",
         "GasResult": "blast_env.evaluation.engines.gas",
-        "LayoutEvaluation": "blast_env.evaluation.report",
+        "Evaluation": "blast_env.evaluation.comparison",
         "LayoutState": "blast_env.layout",
         "Scenario": "blast_env.site",
         "LoadCase": "blast_env.evaluation.cases",
-        "evaluate_layout": "blast_env.evaluation.report",
+        "evaluate_layout": "blast_env.evaluation.evaluate",
         "load_layout": "blast_env.layout",
         "load_scenario": "blast_env.site",
         "propose": "blast_env.design.proposal",
@@ -57,9 +58,9 @@ __all__ = [
     "BlastResult",
     "Charge",
     "Engine",
+    "Evaluation",
     "GasBlast",
     "GasResult",
-    "LayoutEvaluation",
     "LayoutState",
     "LoadCase",
     "LoadCaseSet",

@@ -186,7 +186,7 @@ class DemoTraining:
     @property
     def blasts(self) -> int:
         """Number of blasts so far."""
-        return self._judge.blasts
+        return self._judge.counts.blasts
 
     @property
     def best(self) -> Layout:
@@ -287,7 +287,7 @@ class AgentComparison:
         return replace(
             rules[0],
             layouts=tuple(rules[each].layouts[case] for case, each in enumerate(chosen)),
-            loads=np.array([rules[each].loads[case] for case, each in enumerate(chosen)]),
+            blasts=tuple(rules[each].blasts[case] for case, each in enumerate(chosen)),
         )
 
     @property

@@ -158,7 +158,7 @@ def site_blasts(name: str, recipe: Recipe, threats: int, engine: Engine, cache: 
     for threat in draw_threats(site, range(threats)):
         tried = recipe.of(site, threat, seed)
         evaluator.loads_of_many([(each, threat) for each in tried])
-    return evaluator.blasts
+    return evaluator.counts.blasts
 
 
 @app.command("fit")

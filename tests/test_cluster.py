@@ -153,10 +153,10 @@ def test_a_killed_worker_changes_nothing(two: Dask, tmp_path: Path) -> None:
     assert two.workers[0].wait() < 0
     assert [_bits(each) for each in found] == [_bits(each) for each in alone]
     assert shares == [pytest.approx((done + 1) / len(PAIRS)) for done in range(len(PAIRS))]
-    assert evaluator.blasts == len(PAIRS)
+    assert evaluator.counts.blasts == len(PAIRS)
     again = BlastEvaluator(BALLISTIC_COURTYARD, cache=tmp_path)
     assert [_bits(each) for each in again.loads_of_many(PAIRS)] == [_bits(each) for each in alone]
-    assert again.blasts == 0
+    assert again.counts.blasts == 0
 
 
 def _bits(loads: BlastLoads) -> tuple[object, bytes]:

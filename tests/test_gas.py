@@ -214,7 +214,7 @@ def test_an_evaluation_takes_one_realisation_a_charge() -> None:
     evaluator = BlastEvaluator(HUT, "gas")
     threats = [LoadCase(HUT.sample_charge(np.random.default_rng(0)), seed) for seed in range(4)]
     loads = evaluator.loads_of_many([(WALL, threat) for threat in threats])
-    assert evaluator.blasts == 1
+    assert evaluator.counts.blasts == 1
     assert evaluator.calibration_name == "none"
     assert len({load.protected_impulse_pa_s for load in loads}) == 1
     evaluation = evaluate_layout(HUT, WALL, range(2), engine="gas", cell_m=0.5)

@@ -118,7 +118,6 @@ def _report_cases(
             distinct.setdefault((each.scenario.content_hash, each.charge), each)
         cases = [*distinct.values()]
     evaluators = Evaluators(used, options.cache)
-    coarser = evaluators.coarser()
     if not options.is_json:
         print_line(used.describe([case.scenario for case in cases]))
         print_cost(asked_blasts(cases, used))
@@ -135,7 +134,7 @@ def _report_cases(
             cases,
             layouts,
             options.processes,
-            coarser=coarser,
+            with_error=True,
             cvar_level=options.cvar_level,
             progress=progress,
         )
@@ -147,7 +146,7 @@ def _report_cases(
         exported = export_layouts(plans, options.export)
         if is_family:  # no other file holds the sites
             exported += _write_sites(plans, options.export)
-    if print_json_record(record, [*written, *exported], options, evaluators, coarser):
+    if print_json_record(record, [*written, *exported], options, evaluators.counts):
         return
     title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
     _print_cases(found, used, f"{title}, {threats_text(len(cases), seeds)}")
@@ -158,7 +157,7 @@ def _report_cases(
     print_written(written)
     if exported:
         print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
-    print_line(cache_text(evaluators, coarser))
+    print_line(cache_text(evaluators.counts))
 
 
 def _fixed(case: LoadCaseSet, options: EvaluateOptions) -> LoadCaseSet:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Final
 
 from blast_env.cli.options import GivenCharge
 from blast_env.cli.output import (
@@ -21,8 +21,7 @@ from blast_env.cli.output import (
 )
 from blast_env.evaluation import (
     BlastEvaluator,
-    Evaluators,
-    LayoutEvaluation,
+    Evaluation,
     LoadCase,
     LoadCaseSet,
     draw_threats,
@@ -30,8 +29,8 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
-from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.engines import Engine
+from blast_env.evaluation.evaluator import BlastCounts
 from blast_env.evaluation.grid_error import final_engine, percent, points, with_errors, worse
 from blast_env.files import make_folder
 from blast_env.geometry import layout_counts
@@ -95,27 +94,11 @@ class EvaluateOptions:
             make_folder(self.out)
 
 
-AnyEvaluator: TypeAlias = BlastEvaluator | Evaluators
-
-
-def cache_record(*evaluators: AnyEvaluator | None) -> dict[str, float]:
-    """Return the number of blasts run, the number found in the cache, and the hit rate.
-
-    Args:
-        evaluators: Those that ran the blasts, perhaps with several sizes of cells.
-    """
-    found = [each for each in evaluators if each is not None]
-    blasts, hits = (sum(each.blasts for each in found), sum(each.cache_hits for each in found))
-    asked = blasts + hits
-    return {"blasts": blasts, "hits": hits, "hit_rate": hits / asked if asked else 0.0}
-
-
-def cache_text(*evaluators: AnyEvaluator | None) -> str:
-    """Return the record of the cache in words."""
-    record = cache_record(*evaluators)
+def cache_text(counts: BlastCounts) -> str:
+    """Return the number of blasts run, and of those found in the cache, in words."""
     return (
-        f"{record['blasts']:g} blasts run, {record['hits']:g} known already "
-        f"(cache hit rate {percent(record['hit_rate'])})"
+        f"{counts.blasts:g} blasts run, {counts.cache_hits:g} known already "
+        f"(cache hit rate {percent(counts.cache_hit_rate)})"
     )
 
 
@@ -184,18 +167,13 @@ def print_json_record(
     record: Mapping[str, object],
     files: Sequence[Path],
     options: EvaluateOptions,
-    *evaluators: AnyEvaluator | None,
+    counts: BlastCounts,
 ) -> bool:
-    """Print a record as JSON, short or complete, if that is wanted; return whether it is.
-
-    Args:
-        record: The record of an evaluation.
-        files: The files written.
-        options: The options.
-        evaluators: Those that ran the blasts, as for `cache_record`.
-    """
+    """Print a record as JSON, short or complete, if that is wanted; return whether it is."""
     if options.is_json:
-        more = {"cache": cache_record(*evaluators), "files": [str(path) for path in files]}
+        rate = {"hits": counts.cache_hits, "hit_rate": counts.cache_hit_rate}
+        cache = {"blasts": counts.blasts, **rate}
+        more = {"cache": cache, "files": [str(path) for path in files]}
         left_out = () if options.json_all else _NOT_IN_SHORT
         print_json({key: x for key, x in {**record, **more}.items() if key not in left_out})
     return options.is_json
@@ -226,7 +204,7 @@ def asked_blasts(
 
 def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: EvaluateOptions) -> None:
     """Evaluate a layout on the threats drawn by the seeds; print and write the result."""
-    engine, coarser = evaluator.engine, evaluator.coarser()
+    engine = evaluator.engine
     threats = options.threats(plan.scenario, engine)
     options.prepare_files(1)
     if not options.is_json:
@@ -238,7 +216,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
             plan.layout,
             threats,
             options.processes,
-            coarser=coarser,
+            with_error=True,
             cvar_level=options.cvar_level,
             progress=progress,
         )
@@ -251,14 +229,14 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
         "preset": engine.preset(plan.scenario),
         "provenance": dict(plan.provenance),
     }
-    if print_json_record(record, written, options, evaluator, coarser):
+    if print_json_record(record, written, options, evaluator.counts):
         return
     _print_evaluation(evaluation, options.seeds)
     print_written(written)
-    print_line(cache_text(evaluator, coarser))
+    print_line(cache_text(evaluator.counts))
 
 
-def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
+def _write(evaluation: Evaluation, out: Path) -> list[Path]:
     written = [evaluation.to_json(out / "evaluation.json")]
     tables = {
         "structures.csv": evaluation.table,
@@ -273,14 +251,14 @@ def _write(evaluation: LayoutEvaluation, out: Path) -> list[Path]:
     )
 
 
-def _figure(evaluation: LayoutEvaluation) -> "Figure":
+def _figure(evaluation: Evaluation) -> "Figure":
     # Here, because pictures need the extra `render`.
     from blast_env.plots.evaluation_figures import evaluation_figure
 
     return evaluation_figure(evaluation)
 
 
-def _print_evaluation(evaluation: LayoutEvaluation, seeds: range) -> None:
+def _print_evaluation(evaluation: Evaluation, seeds: range) -> None:
     """Print the buildings' mean loads, and the effect of the layout over all threats."""
     count = len(evaluation.threats)
     rows = []
@@ -329,7 +307,7 @@ def _of_cells(error: str) -> str:
     return error and f" +- {error}"
 
 
-def _print_totals(evaluation: LayoutEvaluation) -> None:
+def _print_totals(evaluation: Evaluation) -> None:
     """Print the loads on the protected structures together, and the worst threat."""
     worst, objective = evaluation.worst, evaluation.scenario.objective
     print_means(evaluation, objective, "threats" if evaluation.engine.has_noise else "charges")

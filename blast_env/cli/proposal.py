@@ -138,7 +138,7 @@ def _compared(
     print_line(engine.describe())
     asked = [(engine, each) for each in case.threats] + [(engine.coarser, case.threats[0])]
     print_cost((each, case.scenario, threat.charge) for each, threat in asked for _ in distinct)
-    coarser, found = evaluators.coarser(), {}
+    found = {}
     with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
         for number, each in enumerate(distinct):
             found[each] = compare(
@@ -146,7 +146,7 @@ def _compared(
                 [case],
                 [each],
                 processes,
-                coarser=coarser,
+                with_error=True,
                 progress=share_of(progress, number, len(distinct)),
             )
     return {name: found[each] for name, each in layouts.items()}

@@ -56,7 +56,7 @@ from blast_env.envs.strategies import HiddenThreat
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
-    LayoutEvaluation,
+    Evaluation,
     LoadCase,
     SeedRange,
     draw_threats,
@@ -241,7 +241,7 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
     turns = islice(cycle(problem.threats), budget)
     print_cost((evaluator.engine, scenario, each.charge) for each in turns)
     problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
-    hits, begun_s = evaluator.cache_hits, perf_counter()
+    hits, begun_s = evaluator.counts.cache_hits, perf_counter()
     with progress_bar(f"{method.name} search in {scenario.name}") as progress:
 
         def report(state: Progress) -> None:
@@ -249,12 +249,12 @@ def _run(method: Proposer, problem: DesignProblem, budget: int, seed: int) -> Se
             progress(state.share, f"{state.blasts} of {budget} blasts{best and f', best {best}'}")
 
         result = method.propose(problem, budget, seed, report)
-    return SearchRun(problem, result, perf_counter() - begun_s, evaluator.cache_hits - hits)
+    return SearchRun(problem, result, perf_counter() - begun_s, evaluator.counts.cache_hits - hits)
 
 
 def _check(
     run: SearchRun, held_out: int, cvar_level: float, *, is_hidden: bool
-) -> LayoutEvaluation | None:
+) -> Evaluation | None:
     """Evaluate the layout on threats of judgement; `None` if the search used all of them.
 
     Without noise a charge is one blast: a charge used by the search is not held out.
@@ -280,7 +280,7 @@ def _check(
         )
 
 
-def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
+def print_search(run: SearchRun, checked: Evaluation | None) -> None:
     """Print the effect of the layout on the search's threats and on others, and the cost."""
     result, problem = run.result, run.problem
     unprotected, load = (
@@ -319,7 +319,7 @@ def print_search(run: SearchRun, checked: LayoutEvaluation | None) -> None:
 
 
 def write_search(
-    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation | None, out: Path
+    run: SearchRun, options: Mapping[str, Any], checked: Evaluation | None, out: Path
 ) -> None:
     """Write the layout and its picture; the history, its figure and the front, if there are any."""
     result = run.result
@@ -345,7 +345,7 @@ def _figure(run: SearchRun) -> "Figure":
 
 
 def _provenance(
-    run: SearchRun, options: Mapping[str, Any], checked: LayoutEvaluation | None
+    run: SearchRun, options: Mapping[str, Any], checked: Evaluation | None
 ) -> dict[str, Any]:
     result, problem = run.result, run.problem
     ends = () if checked is None else checked.ci95

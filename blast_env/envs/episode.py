@@ -233,9 +233,9 @@ class Episode:
             "blast_seeds": tuple(
                 tuple(seeds[index :: len(case.charges)]) for index in range(len(case.charges))
             ),
-            "blasts": evaluators.blasts,
-            "cache_hits": evaluators.cache_hits,
-            "cache_hit_rate": evaluators.cache_hit_rate,
+            "blasts": evaluators.counts.blasts,
+            "cache_hits": evaluators.counts.cache_hits,
+            "cache_hit_rate": evaluators.counts.cache_hit_rate,
         }
 
 

@@ -1,30 +1,39 @@
-"""Comparison of loads with and without a barrier on the same threats.
+"""Layouts compared with no barrier on the same threats: loads, reductions, tables and records.
 
 A reduction is NaN where the load without a barrier is 0. A comparison of layouts is refused for a
 case in which no threat causes a load without a barrier (`check_something_arrives`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import groupby, islice
+from functools import cached_property, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCaseSet, check_distinct
-from blast_env.evaluation.engines.contract import BlastLoads, Engine
-from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
-from blast_env.evaluation.grid_error import GridError, grid_error
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet
+from blast_env.evaluation.engines.contract import (
+    SIM_NAMES,
+    BlastLoads,
+    Engine,
+    ParticleLoad,
+    StructureLoad,
+    on_buildings,
+)
+from blast_env.evaluation.grid_error import GridError, LoadOf
+from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
+from blast_env.files import write_atomically
 from blast_env.geometry import Element, Layout
-from blast_env.layout import check_layout
+from blast_env.layout.build_scene import build_site
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.runner import share_of
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
+from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import (
     CVAR_LEVEL,
     Estimate,
@@ -91,6 +100,212 @@ class Assessment:
         return reductions(self.load, unprotected.load).item()
 
 
+CHARGE_COLUMNS: Final = (
+    Column("charge_x_m", "m", "centre of the charge, from the left border"),
+    Column("charge_y_m", "m", "centre of the charge, from the lower border"),
+    Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
+    Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
+)
+
+CASE_COLUMNS: Final = (
+    Column("scenario", "", "name of the scenario"),
+    Column("seed", "", "seed of the first threat's fan and air; the charge is that threat's"),
+    *CHARGE_COLUMNS,
+    Column("modules", "", "modules, or pieces, of the layout"),
+    Column("load", "", "protected structures, with the layout, over the threats"),
+    Column("unprotected_load", "", "the same without a barrier"),
+    Column("unit", "", "of that load; empty where impulse and peak count together"),
+    Column("reduction", "", "of that load"),
+    Column("in_range", "", "whether the calibration was made for every threat"),
+)
+
+
+STRUCTURE_COLUMNS: Final = (
+    Column("structure", "", "name of the structure"),
+    Column("protected", "", "whether its load counts"),
+    Column("weight", "", "its weight among the protected structures"),
+    Column("impulse_pa_s", "Pa s", "calibrated impulse per area with the barrier"),
+    Column("unprotected_impulse_pa_s", "Pa s", "calibrated impulse per area without it"),
+    Column("reduction", "", "of the calibrated impulse"),
+    Column("reduction_low", "", "lower end of its 95 % confidence interval"),
+    Column("reduction_high", "", "upper end of its 95 % confidence interval"),
+    Column("reduction_error", "", "error of the cells of the reduction; particles have none"),
+    Column("impulse_error_pa_s", "Pa s", "error of the cells of the impulse with the barrier"),
+    Column("unprotected_impulse_error_pa_s", "Pa s", "the same without it"),
+    Column("impulse_psi_s", "psi s", "calibrated impulse per area with the barrier"),
+    Column("unprotected_impulse_psi_s", "psi s", "calibrated impulse per area without it"),
+    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
+    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
+    Column("transferred_impulse_sim", "sim", "momentum really transferred with the barrier"),
+    Column("unprotected_transferred_impulse_sim", "sim", "momentum transferred without it"),
+    Column(
+        "peak_pa", "Pa", "largest overpressure on its walls with the barrier, mean over threats"
+    ),
+    Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
+    Column("threats_in_range", "", "threats that the calibration was made for"),
+    *STANDING_COLUMNS,
+)
+
+_OF_PARTICLES: Final = (*SIM_NAMES, *(f"unprotected_{name}" for name in SIM_NAMES))
+"""Columns that only particle engines have."""
+
+
+def module_columns(has_particles: bool) -> tuple[Column, ...]:
+    """Return the columns of `Evaluation.module_table`, which end with loads and reduction."""
+    unit, words = ("sim", "sum of m |v|") if has_particles else ("n_s", "momentum on its walls")
+    shown = "sim" if has_particles else "N s"
+    return (
+        Column("module_id", "", "name of the module, made from its centre in metres"),
+        Column("structure", "", "structure that the module is part of"),
+        Column("x_m", "m", "centre, from the left border"),
+        Column("y_m", "m", "centre, from the lower border"),
+        Column(f"impulse_{unit}", shown, f"{words} with the barrier"),
+        Column(f"unprotected_impulse_{unit}", shown, f"{words} without it"),
+        Column("reduction", "", f"of the {words}"),
+    )
+
+
+THREAT_COLUMNS: Final = (
+    Column("seed", "", "seed of fan and air"),
+    *CHARGE_COLUMNS,
+    Column("impulse_pa_s", "Pa s", "protected structures, with the barrier"),
+    Column("unprotected_impulse_pa_s", "Pa s", "protected structures, without it"),
+    Column("peak_pa", "Pa", "largest overpressure on them, with the barrier"),
+    Column("unprotected_peak_pa", "Pa", "the same without it; particles have none"),
+    Column("load", "", "load in the scenario's objective, with the barrier"),
+    Column("unprotected_load", "", "the same without it"),
+    Column("reduction", "", "of that load"),
+    Column("in_range", "", "whether the calibration was made for this threat"),
+    Column("stand_off_m", "m", "from the charge to the nearest protected wall, with the barrier"),
+    Column("unprotected_stand_off_m", "m", "the same without it: less only for a vehicle"),
+)
+
+
+def _structure_row(
+    loads: Sequence[StructureLoad],
+    without: Sequence[StructureLoad],
+    error: GridError | None,
+    impulse_of: LoadOf,
+) -> dict[str, object]:
+    first = loads[0]
+    pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, without))
+    reduction = reduction_estimate(pa_s, bare_pa_s)
+    stood = worst_standing(load.stood for load in loads)
+    row: dict[str, object] = {
+        "structure": first.name,
+        "protected": first.protected,
+        "weight": first.weight,
+        "reduction": reduction.value,
+        "reduction_low": reduction.low,
+        "reduction_high": reduction.high,
+        "threats_in_range": sum(load.in_range for load in loads),
+        "standing": stood.standing.label,
+        "reason": stood.reason,
+    }
+    sums = SIM_NAMES if isinstance(first, ParticleLoad) else ()
+    for name in ("impulse_pa_s", *sums):
+        for column, each in ((name, loads), (f"unprotected_{name}", without)):
+            row[column] = float(np.mean([getattr(load, name) for load in each]))
+    off, walled_off, bare_off = np.nan, np.nan, np.nan
+    if error is not None:
+        off = error.of_reduction(impulse_of)
+        walled_off, bare_off = error.of_load(impulse_of), error.of_unprotected(impulse_of)
+    row["reduction_error"] = off
+    row["impulse_error_pa_s"] = walled_off * float(pa_s.mean())
+    row["unprotected_impulse_error_pa_s"] = bare_off * float(bare_pa_s.mean())
+    row["impulse_psi_s"] = float(pa_s.mean()) / PA_PER_PSI
+    row["unprotected_impulse_psi_s"] = float(bare_pa_s.mean()) / PA_PER_PSI
+    for column, each in (("peak_pa", loads), ("unprotected_peak_pa", without)):
+        peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
+        row[column] = float(np.mean(peaks))
+    return row
+
+
+def charge_values(charge: Charge) -> dict[str, object]:
+    """Return the values of `CHARGE_COLUMNS`."""
+    values = (*charge.position_m, charge.height_m, charge.tnt_kg)
+    return {column.name: value for column, value in zip(CHARGE_COLUMNS, values, strict=True)}
+
+
+def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
+    """Refuse a case in which there is nothing to reduce.
+
+    Args:
+        cases: The cases.
+        unprotected: Load on the protected structures without a barrier (cases, threats).
+
+    Raises:
+        BlastEnvError: If it is 0 under every threat of a case, which the message names.
+    """
+    for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
+        if not mean > 0.0:
+            raise BlastEnvError(
+                f"{case.name or case.scenario.name}: nothing arrives at the protected structures "
+                f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
+            )
+
+
+@dataclass(frozen=True)
+class ThreatOutcome:
+    """Loads under one threat; impulses are those of `BlastLoads.protected_impulse_pa_s`.
+
+    Attributes:
+        threat: The threat.
+        charge: Its charge, at its place with the barrier.
+        stand_off_m: Distance of the charge from the nearest protected wall.
+        unprotected_stand_off_m: The same without the barrier; smaller for a vehicle only.
+        impulse_pa_s: Impulse on the protected structures with the barrier, Pa*s.
+        unprotected_impulse_pa_s: The same without it, Pa*s.
+        peak_pa: Largest overpressure on their walls with the barrier, Pa; NaN for particles.
+        unprotected_peak_pa: The same without it, Pa.
+        load: Load of the protected structures with the barrier, in the unit of the objective.
+        unprotected_load: The same without it.
+        in_range: Whether the threat is in the range of the calibration.
+    """
+
+    threat: LoadCase
+    charge: Charge
+    stand_off_m: float
+    unprotected_stand_off_m: float
+    impulse_pa_s: float
+    unprotected_impulse_pa_s: float
+    peak_pa: float
+    unprotected_peak_pa: float
+    load: float
+    unprotected_load: float
+    in_range: bool
+
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        layout: Layout,
+        threat: LoadCase,
+        loads: BlastLoads,
+        unprotected: BlastLoads,
+    ) -> Self:
+        """Return the outcome of a threat from its loads with a layout and without a barrier."""
+        charge, elsewhere = (threat.charge_against(scenario, each) for each in (layout, ()))
+        return cls(
+            threat=threat,
+            charge=charge,
+            stand_off_m=stand_off_m(scenario.structures, charge.position_m),
+            unprotected_stand_off_m=stand_off_m(scenario.structures, elsewhere.position_m),
+            impulse_pa_s=loads.protected_impulse_pa_s,
+            unprotected_impulse_pa_s=unprotected.protected_impulse_pa_s,
+            peak_pa=loads.protected_peak_pa,
+            unprotected_peak_pa=unprotected.protected_peak_pa,
+            load=loads.load(scenario.objective),
+            unprotected_load=unprotected.load(scenario.objective),
+            in_range=loads.in_range,
+        )
+
+    @property
+    def reduction(self) -> float:
+        """Relative reduction of the load; NaN if the load without a barrier is 0."""
+        return reductions(self.load, self.unprotected_load).item()
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """Layouts, one per case, compared with no barrier on the same threats.
@@ -101,13 +316,15 @@ class Evaluation:
     if its risk measure is not the mean, or its objective has a target. Intervals are 95 %
     confidence intervals; they do not include the error of the model.
 
+    Impulses are weighted sums of impulses per area of the protected buildings. Attributes and
+    tables below `outcomes` are those of a single case.
+
     Attributes:
         cases: The cases, all with the same number of threats.
         layouts: One per case.
-        loads: Loads on the protected structures with the layouts, in the unit of the objective
-            (cases, threats); see `BlastLoads.load`.
-        unprotected: The same without a barrier (cases, threats).
-        within: Whether each blast is in the range of the calibration (cases, threats).
+        blasts: Loads with the layouts (cases, threats).
+        unprotected_blasts: Loads without a barrier (cases, threats).
+        engine: The engine.
         cvar_level: Level of `cvar`: 0.8 is the mean of the worst 20 %.
         grid_error: Error of the cells, from the threat with the largest load behind a layout;
             `None` without one.
@@ -118,9 +335,9 @@ class Evaluation:
 
     cases: tuple[LoadCaseSet, ...]
     layouts: tuple[Layout, ...]
-    loads: FloatArray
-    unprotected: FloatArray
-    within: BoolArray
+    blasts: tuple[tuple[BlastLoads, ...], ...]
+    unprotected_blasts: tuple[tuple[BlastLoads, ...], ...]
+    engine: Engine
     cvar_level: float = CVAR_LEVEL
     grid_error: GridError | None = None
 
@@ -132,6 +349,21 @@ class Evaluation:
     def has_one_case(self) -> bool:
         """Whether there is a single case, so that intervals and the worst are over its threats."""
         return len(self.cases) == 1
+
+    @cached_property
+    def loads(self) -> FloatArray:
+        """Loads on the protected structures in the unit of the objective (cases, threats)."""
+        return self._counted(self.blasts)
+
+    @cached_property
+    def unprotected(self) -> FloatArray:
+        """The same without a barrier (cases, threats)."""
+        return self._counted(self.unprotected_blasts)
+
+    @cached_property
+    def within(self) -> BoolArray:
+        """Whether each blast is in the range of the calibration (cases, threats)."""
+        return np.array([[each.in_range for each in of_case] for of_case in self.blasts])
 
     @property
     def in_range(self) -> bool:
@@ -233,147 +465,250 @@ class Evaluation:
         rows = zip(self.cases, loads, layouts, strict=True)
         return np.array([case.objective_value(row, layout) for case, row, layout in rows])
 
+    def _counted(self, blasts: Sequence[Sequence[BlastLoads]]) -> FloatArray:
+        rows = zip(self.cases, blasts, strict=True)
+        return np.array(
+            [[each.load(case.scenario.objective) for each in own] for case, own in rows]
+        )
 
-def compare(
-    evaluators: Evaluators,
-    cases: Sequence[LoadCaseSet],
-    layouts: Sequence[Sequence[Element]],
-    processes: int = 1,
-    *,
-    coarser: Evaluators | None = None,
-    cvar_level: float = CVAR_LEVEL,
-    progress: Callable[[float], None] | None = None,
-) -> Evaluation:
-    """Compare layouts with no barrier, each on the threats of its case.
+    @property
+    def case(self) -> LoadCaseSet:
+        """The scenario and the threats."""
+        return self.cases[0]
 
-    Args:
-        evaluators: Run and cache the blasts.
-        cases: At least one, all with the same number of threats.
-        layouts: One per case: (row, column) of the cells that hold a module, in any order.
-        processes: Number of worker processes; it changes only the time.
-        coarser: `evaluators.coarser()`, for the error of the cells; there is none without it.
-        cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level`.
-        progress: Called with the finished share of the blasts.
+    @property
+    def calibration(self) -> str:
+        """Name of the calibration; `"none"` for gas dynamics."""
+        found = self.engine.calibration(self.scenario)
+        return "none" if found is None else found.name
 
-    Raises:
-        LayoutError: If a layout does not fit the build zone of its case.
-        CalibrationError: If a scenario names no calibration, or one that was made with other
-            parameters or another engine.
-        BlastEnvError: If there are no cases, a threat is repeated, `processes` or `cvar_level` is
-            out of bounds, or no load arrives in a case even without a barrier.
-    """
-    check_cvar_level(cvar_level)
-    if not cases:
-        raise BlastEnvError("cases: there are none, must be at least one")
-    cells = [
-        tuple(check_layout(case.scenario, layout))
-        for case, layout in zip(cases, layouts, strict=True)
-    ]
-    blasts = list(loads_of_both(evaluators.of, cases, cells, processes, progress))
-    loads = _counted(cases, [protected for protected, _ in blasts])
-    error = None
-    if coarser is not None:
-        number, worst = (int(each) for each in np.unravel_index(loads.argmax(), loads.shape))
-        case, (protected, unprotected) = cases[number], blasts[number]
-        fine = protected[worst], unprotected[worst]
-        threat, there = case.threats[worst], coarser.of(case.scenario)
-        error = grid_error(there, case, cells[number], threat, fine, processes)
-    return Evaluation(
-        cases=tuple(cases),
-        layouts=tuple(cells),
-        loads=loads,
-        unprotected=_counted(cases, [unprotected for _, unprotected in blasts]),
-        within=np.array([[load.in_range for load in protected] for protected, _ in blasts]),
-        cvar_level=cvar_level,
-        grid_error=error,
-    )
+    @property
+    def layout(self) -> Layout:
+        """The layout's cells."""
+        return self.layouts[0]
 
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return self.case.scenario
 
-def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
-    """Refuse a case in which there is nothing to reduce.
+    @property
+    def threats(self) -> tuple[LoadCase, ...]:
+        """The threats of the case."""
+        return self.case.threats
 
-    Args:
-        cases: The cases.
-        unprotected: Load on the protected structures without a barrier (cases, threats).
+    @cached_property
+    def outcomes(self) -> tuple[ThreatOutcome, ...]:
+        """The loads under each threat."""
+        of = partial(ThreatOutcome.of, self.scenario, self.layout)
+        return tuple(map(of, self.threats, self.blasts[0], self.unprotected_blasts[0]))
 
-    Raises:
-        BlastEnvError: If it is 0 under every threat of a case, which the message names.
-    """
-    for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
-        if not mean > 0.0:
-            raise BlastEnvError(
-                f"{case.name or case.scenario.name}: nothing arrives at the protected structures "
-                f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
-            )
+    @property
+    def load(self) -> float:
+        """The objective value over all threats with the barrier, in the objective's unit."""
+        return self.case.objective_value(self.loads[0], self.layout)
 
+    @property
+    def unprotected_load(self) -> float:
+        """The same without the barrier."""
+        return self.case.objective_value(self.unprotected[0])
 
-def loads_of_both(
-    evaluator_of: Callable[[Scenario], BlastEvaluator],
-    cases: Sequence[LoadCaseSet],
-    layouts: Sequence[Layout],
-    processes: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> Iterator[tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]]:
-    """Yield the loads with the layout of each case and those without a barrier, one per threat.
+    @property
+    def mean_reduction(self) -> float:
+        """The value of `reduction`: 0 for an unchanged load, 1 for none."""
+        return self.reduction.value
 
-    Consecutive cases on one scenario run together.
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """95 % confidence interval of `mean_reduction`; NaN with a single threat."""
+        return self.reduction.low, self.reduction.high
 
-    Raises:
-        BlastEnvError: If a threat is repeated, or `processes` is below 1.
-    """
-    done = 0
-    for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):
-        together = list(group)
-        for case, _ in together:
-            check_distinct(case.threats)
-        pairs = [
-            (cells, threat)
-            for case, layout in together
-            for threat in case.threats
-            for cells in (layout, ())
+    @property
+    def impulse_pa_s(self) -> Estimate:
+        """Mean impulse with the barrier, Pa*s, for any objective."""
+        return mean_estimate(_impulses_pa_s(self.blasts[0]))
+
+    @property
+    def unprotected_impulse_pa_s(self) -> Estimate:
+        """Mean impulse without the barrier, Pa*s."""
+        return mean_estimate(_impulses_pa_s(self.unprotected_blasts[0]))
+
+    @cached_property
+    def worst(self) -> ThreatOutcome:
+        """The threat with the largest load behind the barrier."""
+        return max(self.outcomes, key=lambda outcome: outcome.load)
+
+    @property
+    def cvar_pa_s(self) -> float:
+        """Mean impulse of the worst threats with the barrier, Pa*s; see `cvar_level`."""
+        return conditional_value_at_risk(_impulses_pa_s(self.blasts[0]), self.cvar_level)
+
+    @property
+    def unprotected_cvar_pa_s(self) -> float:
+        """Mean impulse of the worst threats without the barrier, Pa*s."""
+        return conditional_value_at_risk(
+            _impulses_pa_s(self.unprotected_blasts[0]), self.cvar_level
+        )
+
+    @cached_property
+    def table(self) -> "pd.DataFrame":
+        """One row per structure; see `STRUCTURE_COLUMNS`."""
+        return self._by_name(lambda loads: loads.structures)
+
+    @cached_property
+    def building_table(self) -> "pd.DataFrame":
+        """One row per building, with the columns of `table`.
+
+        Impulses are means over the area of the protected parts, as in rewards; the peak is the
+        largest of the parts.
+        """
+        return self._by_name(lambda loads: on_buildings(loads.structures))
+
+    def _by_name(self, loads_of: Callable[[BlastLoads], Sequence[StructureLoad]]) -> "pd.DataFrame":
+        """Return one row per load in the result of `loads_of`."""
+        loads, without = (
+            zip(*map(loads_of, blasts), strict=True)
+            for blasts in (self.blasts[0], self.unprotected_blasts[0])
+        )
+
+        def impulse_of(blast: BlastLoads, number: int) -> float:
+            return loads_of(blast)[number].impulse_pa_s
+
+        rows = [
+            _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
+            for number, both in enumerate(zip(loads, without, strict=True))
         ]
-        known_charge = share_of(progress, done, len(cases), len(together))
-        evaluator = evaluator_of(together[0][0].scenario)
-        loads = iter(evaluator.loads_of_many(pairs, processes, known_charge))
-        for case, _ in together:
-            own = list(islice(loads, 2 * len(case.threats)))
-            yield tuple(own[0::2]), tuple(own[1::2])
-        done += len(together)
+        absent = () if self.blasts[0][0].has_particles else _OF_PARTICLES
+        return table_of(rows, [each for each in STRUCTURE_COLUMNS if each.name not in absent])
 
+    @cached_property
+    def module_table(self) -> "pd.DataFrame":
+        """One row per module of the structures, in the scene's order; see `module_columns`."""
+        from blast_env.particles.tables import module_table
 
-def _counted(cases: Sequence[LoadCaseSet], loads: Sequence[Sequence[BlastLoads]]) -> FloatArray:
-    return np.array(
-        [
-            [each.load(case.scenario.objective) for each in of_case]
-            for case, of_case in zip(cases, loads, strict=True)
+        threat = self.threats[0]
+        scene = build_site(self.scenario, (), threat.seed, threat.charge)
+        impulse, without = (
+            np.mean([load.module_impulse for load in loads], axis=0)
+            for loads in (self.blasts[0], self.unprotected_blasts[0])
+        )
+        names = [column.name for column in module_columns(self.blasts[0][0].has_particles)]
+        values = dict(
+            zip(names[-3:], (impulse, without, reductions(impulse, without)), strict=True)
+        )
+        return module_table(scene.obstacles()).assign(**values)[names]
+
+    @cached_property
+    def threat_table(self) -> "pd.DataFrame":
+        """One row per threat; see `THREAT_COLUMNS`."""
+        rows = [
+            {"seed": each.threat.seed, **charge_values(each.charge), **vars(each)}
+            | {"reduction": each.reduction}
+            for each in self.outcomes
         ]
-    )
+        return table_of(rows, THREAT_COLUMNS)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """The caveats of the engine, and the threats outside its checked or calibrated range."""
+        notes = [self.engine.caveat] if self.engine.caveat else []
+        notes += [] if self.engine.knows_heights else self.scenario.height_notes
+        checked = self.engine.validated_range
+        if self.engine.needs_calibration:
+            checked = f"the range of calibration {self.calibration!r}"
+        for of_structure in zip(*(load.structures for load in self.blasts[0]), strict=True):
+            outside = [load for load in of_structure if not load.in_range]
+            if outside:
+                notes.append(
+                    f"{outside[0].name}: {len(outside)} of {len(self.threats)} threats are outside "
+                    f"{checked}, e.g. {'; '.join(outside[0].notes)}"
+                )
+        return tuple(notes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the inputs, the versions and the results as plain data.
+
+        The same arguments and versions give the same data; NaN becomes `None`.
+        """
+        scenario = self.scenario
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "scenario": scenario.model_dump(mode="json", exclude_none=True),
+            "scenario_hash": scenario.content_hash,
+            "layout": [list(cell) for cell in self.layout],
+            "engine": self.engine.name,
+            "calibration": self.calibration,
+            "versions": versions(self.engine.version),
+            "result": _result(self),
+            "notes": list(self.notes),
+            "threats": table_records(self.threat_table),
+            "structures": table_records(self.table),
+            "buildings": table_records(self.building_table),
+            "modules": table_records(self.module_table),
+        }
+
+    def to_json(self, path: str | Path) -> Path:
+        """Write `to_dict` to a file.
+
+        Returns:
+            The path.
+
+        Raises:
+            BlastEnvError: If it cannot be written there; nothing is left behind then.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        with write_atomically(path) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+        return Path(path)
 
 
-CHARGE_COLUMNS: Final = (
-    Column("charge_x_m", "m", "centre of the charge, from the left border"),
-    Column("charge_y_m", "m", "centre of the charge, from the lower border"),
-    Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
-    Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
-)
-
-CASE_COLUMNS: Final = (
-    Column("scenario", "", "name of the scenario"),
-    Column("seed", "", "seed of the first threat's fan and air; the charge is that threat's"),
-    *CHARGE_COLUMNS,
-    Column("modules", "", "modules, or pieces, of the layout"),
-    Column("load", "", "protected structures, with the layout, over the threats"),
-    Column("unprotected_load", "", "the same without a barrier"),
-    Column("unit", "", "of that load; empty where impulse and peak count together"),
-    Column("reduction", "", "of that load"),
-    Column("in_range", "", "whether the calibration was made for every threat"),
-)
+def _impulses_pa_s(loads: Sequence[BlastLoads]) -> FloatArray:
+    return np.array([load.protected_impulse_pa_s for load in loads])
 
 
-def charge_values(charge: Charge) -> dict[str, object]:
-    """Return the values of `CHARGE_COLUMNS`."""
-    values = (*charge.position_m, charge.height_m, charge.tnt_kg)
-    return {column.name: value for column, value in zip(CHARGE_COLUMNS, values, strict=True)}
+SCHEMA_VERSION: Final = 1
+"""Version of the file written by `Evaluation.to_json`."""
+
+
+def _result(evaluation: "Evaluation") -> dict[str, Any]:
+    return {
+        "reduction": estimate_record(evaluation.reduction),
+        "impulse_pa_s": estimate_record(evaluation.impulse_pa_s),
+        "impulse_psi_s": estimate_record(evaluation.impulse_pa_s.scaled(1.0 / PA_PER_PSI)),
+        "unprotected_impulse_pa_s": estimate_record(evaluation.unprotected_impulse_pa_s),
+        "unprotected_impulse_psi_s": estimate_record(
+            evaluation.unprotected_impulse_pa_s.scaled(1.0 / PA_PER_PSI)
+        ),
+        "cvar_level": evaluation.cvar_level,
+        "cvar_pa_s": evaluation.cvar_pa_s,
+        "cvar_psi_s": evaluation.cvar_pa_s / PA_PER_PSI,
+        "unprotected_cvar_pa_s": evaluation.unprotected_cvar_pa_s,
+        "unprotected_cvar_psi_s": evaluation.unprotected_cvar_pa_s / PA_PER_PSI,
+        "objective": {
+            **evaluation.scenario.objective.model_dump(mode="json", exclude_none=True),
+            "unit": evaluation.scenario.objective.unit,
+            "load": evaluation.load,
+            "unprotected_load": evaluation.unprotected_load,
+        },
+        "worst": _worst(evaluation.worst),
+        "grid_error": grid_error_record(evaluation, evaluation.engine),
+        "in_range": evaluation.in_range,
+    }
+
+
+def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
+    return {
+        "seed": outcome.threat.seed,
+        "charge_position_m": list(outcome.charge.position_m),
+        "charge_height_m": outcome.charge.height_m,
+        "tnt_kg": outcome.charge.tnt_kg,
+        "impulse_pa_s": outcome.impulse_pa_s,
+        "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
+        "load": outcome.load,
+        "unprotected_load": outcome.unprotected_load,
+        "reduction": number_or_none(outcome.reduction),
+        "in_range": outcome.in_range,
+    }
 
 
 def case_table(comparison: Evaluation) -> "pd.DataFrame":

@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -16,8 +17,27 @@ from blast_env.layout.placement import load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.site import AnyCharge, AnyScenario, find_scenario
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.scene import Charge
+
+
+@dataclass
+class BlastCounts:
+    """Counts of loads that were asked for.
+
+    Attributes:
+        blasts: Number of simulated blasts.
+        cache_hits: Number of requested loads that needed no blast.
+    """
+
+    blasts: int = 0
+    cache_hits: int = 0
+
+    @property
+    def cache_hit_rate(self) -> float:
+        """Share of the requested loads that needed no blast; 0 without requests."""
+        asked = self.blasts + self.cache_hits
+        return self.cache_hits / asked if asked else 0.0
 
 
 class BlastEvaluator:
@@ -36,6 +56,7 @@ class BlastEvaluator:
         cache_size: Maximum number of loads in memory, unless `cache` is a store.
         cache: Folder of a store, for other processes and later runs, or a store that several
             evaluators share; see `BlastStore`.
+        counts: Counts that several evaluators share; its own unless given.
 
     Attributes:
         scenario: The scenario.
@@ -43,8 +64,7 @@ class BlastEvaluator:
         calibration: The scenario's calibration, checked against its parameters and the engine;
             `None` for engines without particles, which need none.
         store: Where the loads are.
-        blasts: Number of simulated blasts.
-        cache_hits: Number of requested loads that needed no blast.
+        counts: Counts of blasts.
 
     Raises:
         CalibrationError: If the scenario names no calibration, or one that was made with other
@@ -60,13 +80,13 @@ class BlastEvaluator:
         engine: str | Engine = "event",
         cache_size: int = 4096,
         cache: str | Path | BlastStore | None = None,
+        counts: BlastCounts | None = None,
     ) -> None:
         self.scenario = find_scenario(scenario)
         self.engine = find_engine(engine)
         self.engine.check(self.scenario)
         self.calibration: Calibration | None = self.engine.calibration(self.scenario)
-        self.blasts = 0
-        self.cache_hits = 0
+        self.counts = BlastCounts() if counts is None else counts
         self.store = BlastStore.of(cache, cache_size)
         self._key_of_nothing = BlastKey(
             scenario_hash=self.scenario.content_hash,
@@ -88,16 +108,16 @@ class BlastEvaluator:
         """Name of the calibration; `"none"` for engines without particles, which need none."""
         return "none" if self.calibration is None else self.calibration.name
 
-    @property
-    def cache_hit_rate(self) -> float:
-        """Share of the requested loads that needed no blast; 0 without requests."""
-        asked = self.blasts + self.cache_hits
-        return self.cache_hits / asked if asked else 0.0
-
     def coarser(self) -> "BlastEvaluator | None":
         """Return an evaluator with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
-        return None if engine is None else BlastEvaluator(self.scenario, engine, cache=self.store)
+        if engine is None:
+            return None
+        return BlastEvaluator(self.scenario, engine, cache=self.store, counts=self.counts)
+
+    def of(self, scenario: Scenario) -> "BlastEvaluator":  # noqa: ARG002
+        """Return itself, as `Evaluators.of` of its scenario."""
+        return self
 
     def loads(self, layout: Sequence[Element], threat: LoadCase) -> BlastLoads:
         """Return the loads of one blast.
@@ -146,7 +166,7 @@ class BlastEvaluator:
             found[key] = loads
             if progress is not None:
                 progress(1.0 - (len(missing) - done) / len(keys))
-        self.cache_hits += len(keys) - len(missing)
+        self.counts.cache_hits += len(keys) - len(missing)
         objective, loads_of = self.scenario.objective, [found[key] for key in keys]
         if objective.kind != "response":
             return loads_of
@@ -181,7 +201,7 @@ class BlastEvaluator:
 
     def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
         """Count and store a blast."""
-        self.blasts += 1
+        self.counts.blasts += 1
         self.store.add(key, loads)
 
 
@@ -243,8 +263,7 @@ _MOST_EVALUATORS: Final = 4
 class Evaluators:
     """The evaluators of the most recent scenarios.
 
-    Only few are kept, so that a new site at every reset does not fill the memory. The counts of
-    dropped evaluators are retained.
+    Only few are kept, so that a new site at every reset does not fill the memory.
 
     Args:
         engine: Name of an engine, or an engine.
@@ -254,6 +273,7 @@ class Evaluators:
     Attributes:
         engine: The engine.
         most: Maximum number of evaluators.
+        counts: Counts of the blasts of all of them.
 
     Raises:
         BlastEnvError: If the cache is not usable.
@@ -265,34 +285,18 @@ class Evaluators:
         engine: str | Engine,
         cache: str | Path | BlastStore | None = None,
         most: int = _MOST_EVALUATORS,
+        counts: BlastCounts | None = None,
     ) -> None:
         self.engine = find_engine(engine)
         self.most = most
         self._store = BlastStore.of(cache)
         self._kept: OrderedDict[str, BlastEvaluator] = OrderedDict()
-        self._gone_blasts = 0
-        self._gone_cache_hits = 0
-
-    @property
-    def blasts(self) -> int:
-        """Number of simulated blasts."""
-        return self._gone_blasts + sum(each.blasts for each in self._kept.values())
-
-    @property
-    def cache_hits(self) -> int:
-        """Number of requested loads that needed no blast."""
-        return self._gone_cache_hits + sum(each.cache_hits for each in self._kept.values())
-
-    @property
-    def cache_hit_rate(self) -> float:
-        """Share of the requested loads that needed no blast; 0 without requests."""
-        asked = self.blasts + self.cache_hits
-        return self.cache_hits / asked if asked else 0.0
+        self.counts = BlastCounts() if counts is None else counts
 
     def coarser(self) -> "Evaluators | None":
         """Return evaluators with `Engine.coarser` and the same store, if there is one."""
         engine = self.engine.coarser
-        return None if engine is None else Evaluators(engine, self._store, self.most)
+        return None if engine is None else Evaluators(engine, self._store, self.most, self.counts)
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
         """Return the evaluator of a scenario.
@@ -311,12 +315,12 @@ class Evaluators:
         found = find_scenario(scenario)
         key = found.content_hash
         if key not in self._kept:
-            self._kept[key] = BlastEvaluator(found, self.engine, cache=self._store)
+            self._kept[key] = BlastEvaluator(
+                found, self.engine, cache=self._store, counts=self.counts
+            )
         self._kept.move_to_end(key)
         if len(self._kept) > self.most:
-            _, gone = self._kept.popitem(last=False)
-            self._gone_blasts += gone.blasts
-            self._gone_cache_hits += gone.cache_hits
+            self._kept.popitem(last=False)
         return self._kept[key]
 
 

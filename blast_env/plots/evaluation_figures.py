@@ -10,7 +10,6 @@ import numpy as np
 from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.evaluation.grid_error import points
-from blast_env.evaluation.report import LayoutEvaluation
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout.build_scene import build_site, charge_against
 from blast_env.plots.plan import (
@@ -67,7 +66,7 @@ def _shown(scenario: Scenario, layout: Layout, charge: Charge | None = None) -> 
     return [*without(features, Kinds.CHARGE_PLACE, Kinds.CHARGE), *entries]
 
 
-def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
+def _draw_charges(axes: Axes, evaluation: Evaluation) -> None:
     # The smallest reduction last, on top.
     outcomes = sorted(evaluation.outcomes, key=lambda outcome: -np.nan_to_num(outcome.reduction))
     reduction = _PERCENT * np.array([outcome.reduction for outcome in outcomes])
@@ -94,7 +93,7 @@ def _draw_charges(axes: Axes, evaluation: LayoutEvaluation) -> None:
     bar.set_label("charges: reduction of the impulse on the protected structures (%)")
 
 
-def _charge_legend(evaluation: LayoutEvaluation) -> list[Artist]:
+def _charge_legend(evaluation: Evaluation) -> list[Artist]:
     handles: list[Artist] = [_charge_handle("o", "charge")]
     if not evaluation.in_range:
         handles.append(_charge_handle("s", "charge outside the validated range"))
@@ -139,7 +138,7 @@ _MOST_UPRIGHT_NAMES = 16
 _MOST_UPRIGHT_LETTERS = 64
 
 
-def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
+def evaluation_figure(evaluation: Evaluation) -> Figure:
     """Return a figure of an evaluation.
 
     On the left the site with the layout and all charges, coloured by the reduction of their
@@ -176,7 +175,7 @@ def evaluation_figure(evaluation: LayoutEvaluation) -> Figure:
     return figure
 
 
-def _title(evaluation: LayoutEvaluation) -> str:
+def _title(evaluation: Evaluation) -> str:
     layout = evaluation.layout
     barrier = layout_counts(layout, "barrier") if layout else "no barrier"
     noun = evaluation.scenario.objective.noun
@@ -185,7 +184,7 @@ def _title(evaluation: LayoutEvaluation) -> str:
     return f"{evaluation.scenario.name}, {barrier}: {reduction}{_interval(evaluation.reduction)}"
 
 
-def _subtitle(evaluation: LayoutEvaluation) -> str:
+def _subtitle(evaluation: Evaluation) -> str:
     stand_off = stand_off_text(evaluation.scenario, evaluation.layout)
     law = f"calibration {evaluation.calibration}, " if evaluation.engine.needs_calibration else ""
     range_note = "" if evaluation.in_range else "; partly outside the validated range"
@@ -215,7 +214,7 @@ def _interval(reduction: Estimate) -> str:
     return f" (95 %: {_percent(reduction.low)} to {_percent(reduction.high)})"
 
 
-def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
+def _draw_threats(axes: Axes, evaluation: Evaluation) -> None:
     """Draw the load of each threat without and with the barrier, the worst first."""
     outcomes = sorted(evaluation.outcomes, key=lambda outcome: -outcome.load)
     place = np.arange(1, len(outcomes) + 1)
@@ -250,15 +249,15 @@ def _draw_threats(axes: Axes, evaluation: LayoutEvaluation) -> None:
         _name_threats(axes, "charge of the threat (m)", names)
 
 
-def _load_text(evaluation: LayoutEvaluation, load: float) -> str:
+def _load_text(evaluation: Evaluation, load: float) -> str:
     """Return a load with its unit, in the notation of figures."""
     return evaluation.scenario.objective.text(load).replace("Pa s", "Pa·s")
 
 
-def _load_name(evaluation: LayoutEvaluation) -> str:
+def _load_name(evaluation: Evaluation) -> str:
     """Return the name of the loads: that of one structure, or a weighted sum."""
     noun = evaluation.scenario.objective.noun
-    protected = evaluation.blasts[0].protected
+    protected = evaluation.blasts[0][0].protected
     weighted = len(protected) > 1 or protected[0].weight != 1.0
     return f"weighted sum of the {noun} on the" if weighted else f"{noun} on the"
 
@@ -278,7 +277,7 @@ def _name_threats(axes: Axes, what: str, names: Sequence[str]) -> None:
     axes.set_xlabel(f"{what}{bands}")
 
 
-def _draw_modules(panels: Sequence[Axes], evaluation: LayoutEvaluation, scene: BlastSite) -> None:
+def _draw_modules(panels: Sequence[Axes], evaluation: Evaluation, scene: BlastSite) -> None:
     """Draw the mean load on the modules of one building, without and with the barrier.
 
     Of a building of several parts the impulse is that of the building, as rewards count it.

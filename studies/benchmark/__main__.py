@@ -74,7 +74,7 @@ def references(
             best, rule = known[name].best, known[name].rule
             print_line(
                 f"{name}: {rule.method} {rule.shares[_CELL]:.3f}, {best.method} "
-                f"{best.shares[_CELL]:.3f}, {evaluator.blasts} blasts"
+                f"{best.shares[_CELL]:.3f}, {evaluator.counts.blasts} blasts"
             )
             with write_atomically(out) as temporary:
                 temporary.write_bytes(_REFERENCES.dump_json(dict(sorted(known.items()))) + b"\n")

@@ -198,7 +198,7 @@ def test_a_race_ends_with_the_best_of_those_that_met_all_threats() -> None:
     judge = Judge(Evaluators("event"))
     (met,) = race(judge, [case], [layouts])
     assert sorted(len(each) for each in met.values()) == [1, 1, 2, 3]
-    assert judge.asked == judge.evaluators.blasts == 7
+    assert judge.asked == judge.evaluators.counts.blasts == 7
     evaluator = BlastEvaluator(scenario, "event")
     for layout, impulses in met.items():
         blasts = [evaluator.loads(layout, threat) for threat in case.threats]

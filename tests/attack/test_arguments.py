@@ -65,7 +65,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "layout floats": (blast(layout=[(1.0, 2)]), "layout"),
     "layout enormous": (blast(layout=[(ENORMOUS, 0)]), "an integer of about 400 digits"),
     "scenario 5": (blast(scenario=5), "^scenario is 5, must be a name"),
-    "scenario keys": (blast(scenario={1: 2}), "has the key 1, keys must be strings"),
+    "scenario keys": (blast(scenario={1: 2}), "has the key 1: Keys should be strings"),
     "scenario null": (blast(scenario="\0"), r"null characters"),
     "scenario long": (blast(scenario=f"{LONG}.toml"), r"path is .* of 100005 characters"),
     "cells tiny": (blast(engine="gas", cell_m=1e-9), "^cell_m is 1e-09, .* at least 0.001 m"),

@@ -12,7 +12,7 @@ from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.run_folder import RunConfiguration
 from matplotlib.figure import Figure
 
-from blast_env.evaluation import LayoutEvaluation, evaluate_layout
+from blast_env.evaluation import Evaluation, evaluate_layout
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.files import scratch_folder
 from blast_env.io.export import LayoutPlan, export_layout
@@ -53,7 +53,7 @@ def _figure() -> Figure:
 
 
 @cache
-def _evaluation() -> LayoutEvaluation:
+def _evaluation() -> Evaluation:
     return evaluate_layout("courtyard", (), (0, 1), engine="event")
 
 

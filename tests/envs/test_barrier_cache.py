@@ -47,7 +47,7 @@ def test_an_evaluator_finds_the_blasts_of_an_environment(tmp_path: Path) -> None
     evaluator = BlastEvaluator(small_scenario(), ThinEngine(), cache=BlastStore(tmp_path))
     threat = LoadCase(info["charges"][0], info["blast_seeds"][0][0])
     loads = evaluator.loads(info["layout"], threat)
-    assert evaluator.blasts == 0
+    assert evaluator.counts.blasts == 0
     assert loads.protected_impulse_pa_s == info["impulse_pa_s"]
 
 

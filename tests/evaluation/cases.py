@@ -1,7 +1,10 @@
 """Scenario, layouts and threats that the tests of evaluations share."""
 
+import numpy as np
+
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import LoadCase, draw_threats
+from blast_env.evaluation import BlastLoads, LoadCase, StructureLoad, draw_threats
+from blast_env.site import Scenario
 
 COURTYARD = load_scenario("courtyard")
 SEEDS = (0, 1, 2, 3)
@@ -16,3 +19,9 @@ SHADOW = tuple((row, 0) for row in range(22, 32))
 """All of the building as seen from `BEHIND_SHADOW`: y = 16.4 m to 20 m at x = 13 m."""
 
 BEHIND_SHADOW = tuple(LoadCase(Charge((5.0, 20.0), 100.0), seed) for seed in (0, 1, 2))
+
+
+def loads_of(scenario: Scenario, impulse_pa_s: float, *, in_range: bool = True) -> BlastLoads:
+    """Return loads by hand, the same on every structure."""
+    loads = (StructureLoad.on(each, impulse_pa_s, 0.0, in_range) for each in scenario.structures)
+    return BlastLoads(tuple(loads), np.zeros(0))

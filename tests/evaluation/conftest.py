@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from blast_env.evaluation import BlastEvaluator, LayoutEvaluation, evaluate_against
+from blast_env.evaluation import BlastEvaluator, Evaluation, evaluate_against
 from tests.evaluation.cases import COURTYARD, THREATS, WALL
 from tests.figures import undrawn_figures
 
@@ -15,7 +15,7 @@ def evaluator() -> BlastEvaluator:
 
 
 @pytest.fixture(scope="session")
-def evaluation(evaluator: BlastEvaluator) -> LayoutEvaluation:
+def evaluation(evaluator: BlastEvaluator) -> Evaluation:
     return evaluate_against(evaluator, WALL, THREATS)
 
 

@@ -74,10 +74,10 @@ def test_a_damaged_blast_is_simulated_again_and_kept_again(tmp_path: Path) -> No
     changed(tmp_path, b"12345678")
     again = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
     assert all(map(same, again.loads_of_many(PAIRS), first))
-    assert (again.blasts, again.cache_hits) == (1, 1)
+    assert (again.counts.blasts, again.counts.cache_hits) == (1, 1)
     third = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
     third.loads_of_many(PAIRS)
-    assert third.cache_hit_rate == 1.0
+    assert third.counts.cache_hit_rate == 1.0
 
 
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
@@ -95,7 +95,7 @@ def test_worker_processes_leave_the_writing_to_the_parent(tmp_path: Path) -> Non
     assert len(BlastStore(tmp_path)) == 2
     again = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
     assert all(map(same, again.loads_of_many(PAIRS, processes=2), first))
-    assert again.blasts == 0
+    assert again.counts.blasts == 0
 
 
 def test_evaluations_share_a_folder_or_a_cache(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_file_that_cannot_be_written_costs_a_warning_and_no_result(tmp_path: P
         pytest.warns(RuntimeWarning, match=r"a blast is not kept: .*blasts.sqlite: cannot be used"),
     ):
         evaluator.loads(*PAIRS[0])
-    assert evaluator.blasts == 1
+    assert evaluator.counts.blasts == 1
 
 
 def test_a_file_that_is_damaged_later_costs_warnings_and_no_result(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_loads_that_cannot_be_those_of_the_scenario_are_simulated_again(
     BlastStore(tmp_path).add(first.key(*PAIRS[0]), wrong(good))
     again = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
     assert same(again.loads(*PAIRS[0]), good)
-    assert again.blasts == 1
+    assert again.counts.blasts == 1
 
 
 def test_loads_of_gas_dynamics_are_kept_too(tmp_path: Path) -> None:
@@ -197,4 +197,4 @@ def test_loads_of_gas_dynamics_are_kept_too(tmp_path: Path) -> None:
     for blasts in (1, 0):
         evaluator = BlastEvaluator(site, find_engine("gas", 0.5), cache=tmp_path)
         evaluator.loads((), threat)
-        assert evaluator.blasts == blasts
+        assert evaluator.counts.blasts == blasts

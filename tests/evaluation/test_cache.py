@@ -129,11 +129,11 @@ def test_the_version_of_the_code_counts(monkeypatch: pytest.MonkeyPatch) -> None
     BlastEvaluator(COURTYARD, "event", cache=shared).loads(FEW, THREATS[0])
     same = BlastEvaluator(COURTYARD, "event", cache=shared)
     same.loads(FEW, THREATS[0])
-    assert same.blasts == 0
+    assert same.counts.blasts == 0
     monkeypatch.setattr("blast_env.evaluation.evaluator.code_version", lambda: "0.0.1+00")
     newer = BlastEvaluator(COURTYARD, "event", cache=shared)
     newer.loads(FEW, THREATS[0])
-    assert newer.blasts == 1
+    assert newer.counts.blasts == 1
 
 
 def test_the_version_of_the_engine_counts() -> None:
@@ -144,11 +144,11 @@ def test_the_version_of_the_engine_counts() -> None:
     ]
     for evaluator in evaluators:
         evaluator.loads(FEW, THREATS[0])
-    assert [evaluator.blasts for evaluator in evaluators] == [1, 1, 0]
+    assert [evaluator.counts.blasts for evaluator in evaluators] == [1, 1, 0]
 
 
 def test_the_hit_rate_is_the_share_that_needed_no_blast() -> None:
     evaluator = BlastEvaluator(COURTYARD, "event")
-    assert evaluator.cache_hit_rate == 0.0
+    assert evaluator.counts.cache_hit_rate == 0.0
     evaluator.loads_of_many([(FEW, THREATS[0])] * 4)
-    assert evaluator.cache_hit_rate == 0.75
+    assert evaluator.counts.cache_hit_rate == 0.75

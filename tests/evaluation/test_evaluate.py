@@ -10,7 +10,7 @@ from blast_env import Charge, simulate
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import (
     BlastEvaluator,
-    LayoutEvaluation,
+    Evaluation,
     LoadCase,
     draw_threats,
     evaluate_against,
@@ -49,7 +49,7 @@ def test_a_wall_across_the_line_of_sight_reduces(evaluator: BlastEvaluator) -> N
     assert evaluation.impulse_pa_s.high < evaluation.unprotected_impulse_pa_s.low
 
 
-def test_the_numbers_are_those_of_the_blasts(evaluation: LayoutEvaluation) -> None:
+def test_the_numbers_are_those_of_the_blasts(evaluation: Evaluation) -> None:
     """Worked out again from `simulate`, without anything of this package."""
     with_wall, without = (
         np.array(
@@ -74,13 +74,13 @@ def test_the_numbers_are_those_of_the_blasts(evaluation: LayoutEvaluation) -> No
     ]
 
 
-def test_modules_are_named_as_in_a_blast(evaluation: LayoutEvaluation) -> None:
+def test_modules_are_named_as_in_a_blast(evaluation: Evaluation) -> None:
     modules = simulate(COURTYARD, seed=0, engine="event").modules
     columns = ["module_id", "structure", "x_m", "y_m"]
     assert evaluation.module_table[columns].equals(modules[columns])
 
 
-def test_evaluate_layout_draws_the_threats_of_its_seeds(evaluation: LayoutEvaluation) -> None:
+def test_evaluate_layout_draws_the_threats_of_its_seeds(evaluation: Evaluation) -> None:
     """In two processes and with the cells in another order: the same to the last digit."""
     again = evaluate_layout(COURTYARD, WALL[::-1], SEEDS, processes=2, engine="event")
     assert again.to_dict() == evaluation.to_dict()
@@ -105,7 +105,7 @@ def test_the_empty_site_is_simulated_once_for_all_layouts() -> None:
     evaluator = BlastEvaluator(COURTYARD)
     for layout in (FEW, FEW[:1], FEW[:2]):
         evaluate_against(evaluator, layout, THREATS[:1])
-    assert evaluator.blasts == 4
+    assert evaluator.counts.blasts == 4
 
 
 def test_a_file_repeats_its_evaluation(tmp_path: Path) -> None:

@@ -97,9 +97,9 @@ def test_parallel_and_serial_are_the_same(evaluator: BlastEvaluator) -> None:
         parallel.loads_of_many(pairs, processes=2), evaluator.loads_of_many(pairs), strict=True
     ):
         assert same(one, other)
-    assert parallel.blasts == len(pairs)
+    assert parallel.counts.blasts == len(pairs)
     parallel.loads_of_many(pairs)
-    assert (parallel.blasts, parallel.cache_hits) == (len(pairs), len(pairs))
+    assert (parallel.counts.blasts, parallel.counts.cache_hits) == (len(pairs), len(pairs))
 
 
 def test_equal_blasts_are_simulated_once() -> None:
@@ -107,11 +107,11 @@ def test_equal_blasts_are_simulated_once() -> None:
     threat = THREATS[0]
     pairs = [(FEW, threat), ((), threat), (FEW[::-1], threat)]
     first, unprotected, again = evaluator.loads_of_many(pairs)
-    assert (evaluator.blasts, evaluator.cache_hits) == (2, 1)
+    assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (2, 1)
     assert first is again
     assert not same(first, unprotected)
     assert evaluator.loads((), threat) is unprotected
-    assert (evaluator.blasts, evaluator.cache_hits) == (2, 2)
+    assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (2, 2)
 
 
 def test_evicted_loads_are_simulated_again_with_the_same_result() -> None:
@@ -119,7 +119,7 @@ def test_evicted_loads_are_simulated_again_with_the_same_result() -> None:
     first = evaluator.loads(FEW, THREATS[0])
     evaluator.loads(FEW, THREATS[1])
     assert same(evaluator.loads(FEW, THREATS[0]), first)
-    assert (evaluator.blasts, evaluator.cache_hits) == (3, 0)
+    assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (3, 0)
 
 
 def test_an_engine_may_be_given_as_an_object(evaluator: BlastEvaluator) -> None:
@@ -134,7 +134,7 @@ def test_loads_that_are_given_out_twice_cannot_be_changed(evaluator: BlastEvalua
 
 
 def protected_impulse(evaluator: BlastEvaluator) -> tuple[float, int]:
-    return evaluator.loads(FEW, THREATS[0]).protected_impulse_pa_s, evaluator.blasts
+    return evaluator.loads(FEW, THREATS[0]).protected_impulse_pa_s, evaluator.counts.blasts
 
 
 def test_an_evaluator_works_in_a_spawned_process_and_keeps_what_it_remembers() -> None:
@@ -163,7 +163,7 @@ def test_layouts_and_process_counts_are_checked_before_any_blast() -> None:
         evaluator.loads_of_many([((), THREATS[0]), ([(0, 99)], THREATS[0])])
     with pytest.raises(BlastEnvError, match="processes is 0, must be a whole number of at least 1"):
         evaluator.loads_of_many([((), THREATS[0])], processes=0)
-    assert evaluator.blasts == 0
+    assert evaluator.counts.blasts == 0
 
 
 @pytest.mark.slow

@@ -128,13 +128,11 @@ def test_several_cases_have_that_of_the_worst_charge() -> None:
     document["charge"][0]["tnt_kg"] = 2.0
     light = hut().from_document(document, "light")
     evaluators = Evaluators(GasEngine(cell_m=0.25, border_m=0.0))
-    coarser = evaluators.coarser()
-    assert coarser is not None
     cases = [LoadCaseSet(each, draw_threats(each, [0])) for each in (light, hut())]
-    found = compare(evaluators, cases, [WALL, WALL], coarser=coarser)
+    found = compare(evaluators, cases, [WALL, WALL], with_error=True)
     assert found.grid_error is not None
     assert found.grid_error.case is cases[1]
-    assert coarser.blasts == 2
+    assert evaluators.counts.blasts == 2 * 2 + 2
     assert 0.0 < found.reduction_error < 0.05
     assert 0.0 < found.mean_error < 0.1 * found.mean.value
 

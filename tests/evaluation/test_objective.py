@@ -100,8 +100,8 @@ def test_several_charges_become_one_as_the_objective_says(
 def test_the_worst_charge_decides_in_evaluation_and_search() -> None:
     evaluator = BlastEvaluator(site(charges="worst"), "gas")
     evaluation = evaluate_against(evaluator, WALL, [NEAR, FAR])
-    loads = [each.protected_impulse_pa_s for each in evaluation.blasts]
-    unprotected = [each.protected_impulse_pa_s for each in evaluation.unprotected_blasts]
+    loads = [each.protected_impulse_pa_s for each in evaluation.blasts[0]]
+    unprotected = [each.protected_impulse_pa_s for each in evaluation.unprotected_blasts[0]]
     assert evaluation.load == max(loads)
     assert evaluation.mean_reduction == pytest.approx(1.0 - max(loads) / max(unprotected))
     assert np.isnan(evaluation.ci95).all()  # nothing is said of threats that were not met

@@ -35,10 +35,10 @@ def evaluator() -> BlastEvaluator:
 
 
 def test_measures_need_no_blast(evaluator: BlastEvaluator) -> None:
-    before = evaluator.blasts
+    before = evaluator.counts.blasts
     unprotected, hardened = evaluator.loads_of_many([((), THREAT), ((TAKEN, PANELS), THREAT)])
     evaluator.loads((*WALL, TAKEN), THREAT)
-    assert evaluator.blasts == before == 2
+    assert evaluator.counts.blasts == before == 2
     assert hardened.load(DAMAGE.objective) < unprotected.load(DAMAGE.objective)
     assert hardened.protected_impulse_pa_s == unprotected.protected_impulse_pa_s
 
@@ -68,7 +68,7 @@ def test_cache_keeps_the_damage_of_bays(tmp_path: Path, evaluator: BlastEvaluato
     load = first.loads((TAKEN,), THREAT).load(DAMAGE.objective)
     second = BlastEvaluator(DAMAGE, "surrogate", cache=tmp_path)
     assert second.loads((TAKEN,), THREAT).load(DAMAGE.objective) == load
-    assert second.blasts == 0
+    assert second.counts.blasts == 0
     again = pickle.loads(pickle.dumps(evaluator))
     assert again.loads((TAKEN,), THREAT).load(DAMAGE.objective) == (
         evaluator.loads((TAKEN,), THREAT).load(DAMAGE.objective)

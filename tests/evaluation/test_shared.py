@@ -43,6 +43,6 @@ def test_a_stored_blast_has_the_same_consequences(
     assert (one.standings, one.known, one.charge) == (other.standings, other.known, other.charge)
     known = evaluator(tmp_path)
     known.loads(LAYOUT, LoadCase(CHARGE))
-    assert known.blasts == 0  # an evaluation has the loads of the same blast, too
+    assert known.counts.blasts == 0  # an evaluation has the loads of the same blast, too
     with pytest.raises(TypeError):
         shared_consequences(known, (), [CHARGE])  # another layout is another blast

@@ -6,8 +6,8 @@ import pytest
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
+    Evaluation,
     Evaluators,
-    LayoutEvaluation,
     LoadCase,
     LoadCaseSet,
     compare,
@@ -28,13 +28,13 @@ GAS = GasEngine()
 
 
 @pytest.fixture(scope="module")
-def evaluation() -> LayoutEvaluation:
+def evaluation() -> Evaluation:
     """Posts against two places, by gas."""
     return evaluate_layout(SITE, POSTS, seeds=range(2), engine=GAS)
 
 
 def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
-    evaluation: LayoutEvaluation,
+    evaluation: Evaluation,
 ) -> None:
     with_posts, unprotected = worst_places(SITE, SOURCE, POSTS), worst_places(SITE, SOURCE)
     for rank, outcome in enumerate(evaluation.outcomes):
@@ -53,7 +53,7 @@ def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
 
 
 def test_the_mechanism_is_the_same_for_all_that_judge_layouts(
-    evaluation: LayoutEvaluation,
+    evaluation: Evaluation,
 ) -> None:
     case = LoadCaseSet(SITE, evaluation.threats)
     together = compare(Evaluators(GAS), [case, case], [POSTS, ()])
@@ -66,7 +66,7 @@ def test_more_threats_than_places_meet_the_worst_ones_again_and_cost_nothing() -
     ranks = [each.charge.rank for each in threats if isinstance(each.charge, VehicleCharge)]
     assert ranks == list(range(5))
     loads = evaluator.loads_of_many([(POSTS, threat) for threat in threats])
-    assert evaluator.blasts == 2
+    assert evaluator.counts.blasts == 2
     impulses = np.array([each.protected_impulse_pa_s for each in loads])
     assert (impulses[[0, 1, 0, 1, 0]] == impulses).all()
 
@@ -76,7 +76,7 @@ def test_layouts_that_leave_the_vehicle_where_it_is_share_no_blast() -> None:
     evaluator = BlastEvaluator(SITE, GAS)
     threat = draw_threats(SITE, [0])[0]
     evaluator.loads_of_many([(POSTS, threat), (POSTS[::-1], threat), ((), threat)])
-    assert (evaluator.blasts, evaluator.cache_hits) == (2, 1)
+    assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (2, 1)
 
 
 def test_particles_judge_a_vehicle_too() -> None:

@@ -11,12 +11,14 @@ from matplotlib.text import Text
 
 from blast_env import Charge, load_scenario
 from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet
+from blast_env.evaluation.engines import find_engine
 from blast_env.plots.evaluation_figures import MOST_SHOWN, comparison_figure
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import Kinds
 from blast_env.site import Scenario
 from blast_env.sites import generate_site
 from blast_env.units import MODULE_SIDE_M
+from tests.evaluation.cases import loads_of
 
 COURTYARD = load_scenario("courtyard")
 
@@ -34,9 +36,14 @@ def comparison(
     return Evaluation(
         cases=tuple(cases),
         layouts=tuple(tuple((row, 0) for row in range(index + 1)) for index in range(len(cases))),
-        loads=600.0 * (1.0 - np.array([reductions]).T),
-        unprotected=np.full((len(cases), 1), 600.0),
-        within=np.array([list(in_range) or [True] * len(cases)]).T,
+        blasts=tuple(
+            (loads_of(case.scenario, 600.0 * (1.0 - share), in_range=within),)
+            for case, share, within in zip(
+                cases, reductions, in_range or [True] * len(cases), strict=True
+            )
+        ),
+        unprotected_blasts=tuple((loads_of(case.scenario, 600.0),) for case in cases),
+        engine=find_engine("event"),
     )
 
 

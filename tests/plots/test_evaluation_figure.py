@@ -8,7 +8,7 @@ from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import LayoutEvaluation, LoadCase, evaluate_layout
+from blast_env.evaluation import Evaluation, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.plots.evaluation_figures import evaluation_figure
 from blast_env.plots.figures import save_figure
@@ -27,17 +27,17 @@ THREATS_OF_HUT = (LoadCase(Charge((2.0, 4.0), 5.0), 0),)
 
 
 @pytest.fixture(scope="module")
-def evaluation() -> LayoutEvaluation:
+def evaluation() -> Evaluation:
     return evaluate_layout(load_scenario("courtyard"), WALL, engine="event", threats=THREATS)
 
 
 @pytest.fixture(scope="module")
-def figure(evaluation: LayoutEvaluation) -> Figure:
+def figure(evaluation: Evaluation) -> Figure:
     return evaluation_figure(evaluation)
 
 
 def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
-    figure: Figure, evaluation: LayoutEvaluation
+    figure: Figure, evaluation: Evaluation
 ) -> None:
     plan = figure.axes[0]
     circles, squares = (each for each in plan.collections if isinstance(each, PathCollection))
@@ -57,7 +57,7 @@ def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
 
 
 def test_every_threat_has_its_pair_and_the_worst_comes_first(
-    figure: Figure, evaluation: LayoutEvaluation
+    figure: Figure, evaluation: Evaluation
 ) -> None:
     panel = figure.axes[1]
     without, with_barrier = (
@@ -79,7 +79,7 @@ def test_every_threat_has_its_pair_and_the_worst_comes_first(
 
 
 def test_both_facades_have_their_mean_loads_on_one_scale(
-    figure: Figure, evaluation: LayoutEvaluation
+    figure: Figure, evaluation: Evaluation
 ) -> None:
     panels = figure.axes[2:4]
     modules = [
@@ -95,7 +95,7 @@ def test_both_facades_have_their_mean_loads_on_one_scale(
 
 
 def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
-    figure: Figure, evaluation: LayoutEvaluation
+    figure: Figure, evaluation: Evaluation
 ) -> None:
     title = figure.get_suptitle()
     low, high = (f"{100.0 * end:.0f} %" for end in evaluation.ci95)

@@ -4,12 +4,12 @@ from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.design.surrogate import site_of
 from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet, SeedRange
+from blast_env.evaluation.engines import find_engine
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, save_scenario
@@ -24,6 +24,7 @@ from studies.demo import (
     demonstrate,
 )
 from tests.catalogue_sites import WALL, yard_document
+from tests.evaluation.cases import loads_of
 
 POINT = {"kind": "point", "position_m": [2.0, 6.0], "tnt_kg": 1.0}
 """A small charge, whose blasts are soon over."""
@@ -86,13 +87,12 @@ def comparison_of(
 ) -> AgentComparison:
     """Loads by hand, a threat each; without a barrier it is 10 Pa s everywhere."""
     cases = tuple(LoadCaseSet(SITE, (LoadCase(CHARGE, seed),)) for seed in range(len(agent)))
-    unprotected = np.full((len(agent), 1), 10.0)
 
     def of(loads: list[float]) -> Evaluation:
-        layouts = ((),) * len(agent)
-        return Evaluation(
-            cases, layouts, np.array(loads)[:, None], unprotected, np.ones_like(unprotected, bool)
-        )
+        count, engine = len(agent), find_engine("gas")
+        blasts = tuple((loads_of(SITE, each),) for each in loads)
+        bare = ((loads_of(SITE, 10.0),),) * count
+        return Evaluation(cases, ((),) * count, blasts, bare, engine)
 
     rules = {"wall near the charge": rule or random, "wall near the building": other or random}
     methods = {NOTHING: [10.0] * len(agent), RANDOM: random, **rules, AGENT: agent}

@@ -430,7 +430,8 @@ class SelfLabelling:
     def do_round(self) -> None:
         """Race layouts, train the policy, and record the round."""
         began, before = perf_counter(), self.progress.counters
-        blasts, hits = self.judge.evaluators.blasts, self.judge.evaluators.cache_hits
+        counts = self.judge.evaluators.counts
+        blasts, hits = counts.blasts, counts.cache_hits
         hyperparameters, number = self.configuration.self_labelling, before.rollouts
         rng = np.random.default_rng((self.configuration.settings.seed, number))
         if number == 0:
@@ -443,7 +444,7 @@ class SelfLabelling:
             updates = hyperparameters.updates
         self.judge.asked = max(self.judge.asked, before.steps + 1)  # so that training ends
         loss = self._imitate(updates, rng)
-        simulated = self.judge.evaluators.blasts - blasts + self.uncounted
+        simulated = counts.blasts - blasts + self.uncounted
         counters = replace(
             before,
             steps=self.judge.asked,
@@ -452,7 +453,7 @@ class SelfLabelling:
             episodes=before.episodes + len(tried),
             blasts=before.blasts + simulated,
             # Each blast is run ahead, and then found in the cache.
-            cache_hits=before.cache_hits + self.judge.evaluators.cache_hits - hits - simulated,
+            cache_hits=before.cache_hits + counts.cache_hits - hits - simulated,
             seconds=before.seconds + perf_counter() - began,
         )
         self.progress.counters, self.uncounted = counters, 0

@@ -72,7 +72,7 @@ def test_a_search_uses_up_the_stock_with_it() -> None:
     found = find_proposer("random").propose(problem, 8, seed=0)
     best = max(found.history, key=lambda each: len(each.layout))
     assert found.load == pytest.approx(problem.load(()) * 0.9 ** len(best.layout))
-    assert evaluator.blasts <= 9
+    assert evaluator.counts.blasts <= 9
 
 
 def test_without_a_blast_there_is_none_to_show() -> None:

@@ -1,0 +1,196 @@
+"""Functions that evaluate layouts: `evaluate_layout`, and comparisons on many cases."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby, islice
+from pathlib import Path
+
+import numpy as np
+
+from blast_env.errors import BlastEnvError
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct, draw_threats, in_turn
+from blast_env.evaluation.comparison import Evaluation
+from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.engines.contract import BlastLoads
+from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
+from blast_env.evaluation.grid_error import final_engine, grid_error
+from blast_env.evaluation.store import BlastStore
+from blast_env.geometry import Element, Layout
+from blast_env.layout import check_layout
+from blast_env.runner import share_of
+from blast_env.site import AnyScenario, Scenario, find_scenario
+from blast_env.statistics import CVAR_LEVEL, check_cvar_level
+
+
+def evaluate_layout(
+    scenario: AnyScenario,
+    layout: Sequence[Element],
+    seeds: Iterable[int] = range(16),
+    processes: int = 1,
+    engine: str | Engine = JUDGE,
+    *,
+    threats: Iterable[LoadCase] | None = None,
+    cvar_level: float = CVAR_LEVEL,
+    cache: str | Path | BlastStore | None = None,
+    progress: Callable[[float], None] | None = None,
+    cell_m: float | None = None,
+    cells: str | None = None,
+) -> Evaluation:
+    """Estimate the load reduction of a layout on the protected structures, with its uncertainty.
+
+    Every seed draws a threat from the scenario; fixed charges come in turn, each once before any
+    repeats. The layout and the empty site are under the same threats. Use seeds other than those of
+    the layout's search, on which it is overrated.
+
+    Args:
+        scenario: The scenario, or its bundled name or path; for the particle engines it must name
+            a calibration.
+        layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
+        seeds: At least one, without repetition; 16 or more for a useful interval.
+        processes: Number of worker processes; it changes only the time.
+        engine: Name of an engine, or an engine, which keeps its cells; gas dynamics by default.
+            There, a seed only draws the charge, a charge has one realisation, and no calibration
+            is needed. The worst threat runs on cells twice as large as well, for their error.
+        threats: Used instead of threats drawn with `seeds`.
+        cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level` of the threats.
+        cache: Folder or store of earlier blasts; see `BlastEvaluator`.
+        progress: Called with the finished share of the blasts.
+        cell_m: Side of the cells of gas dynamics, 0.25 m unless given.
+        cells: Growth of these cells with the blast; see `GasSettings`. On sites wider than 40 m
+            they grow from 0.25 m unless one of the two is given.
+
+    Raises:
+        LayoutError: If the layout does not fit the build zone.
+        CalibrationError: If the scenario names no calibration, or one that was made with other
+            parameters or another engine.
+        UnknownNameError: If there is no such engine.
+        ScenarioError: If a threat's charge is not clear of a structure or the border.
+        BlastEnvError: If there are no seeds or threats, one is repeated or a seed is negative, if
+            `processes` or `cvar_level` is out of bounds, or if no load reaches the protected
+            structures even without a barrier.
+    """
+    found = find_scenario(scenario)
+    judge = final_engine(engine, [found], cell_m, cells=cells)
+    evaluator = BlastEvaluator(found, judge, cache=cache)
+    drawn = in_turn(found, draw_threats(found, seeds)) if threats is None else tuple(threats)
+    return evaluate_against(
+        evaluator,
+        layout,
+        drawn,
+        processes,
+        with_error=True,
+        cvar_level=cvar_level,
+        progress=progress,
+    )
+
+
+def evaluate_against(
+    evaluator: BlastEvaluator,
+    layout: Sequence[Element],
+    threats: Sequence[LoadCase],
+    processes: int = 1,
+    *,
+    with_error: bool = False,
+    cvar_level: float = CVAR_LEVEL,
+    progress: Callable[[float], None] | None = None,
+) -> Evaluation:
+    """Evaluate a layout as in `evaluate_layout`, with the cached blasts of an evaluator.
+
+    For several layouts on the same threats, the empty site is simulated only once. `with_error` is
+    that of `compare`.
+    """
+    scenario = evaluator.scenario
+    return compare(
+        evaluator,
+        [LoadCaseSet(scenario, tuple(threats))],
+        [sorted(check_layout(scenario, layout))],
+        processes,
+        with_error=with_error,
+        cvar_level=cvar_level,
+        progress=progress,
+    )
+
+
+def compare(
+    evaluators: Evaluators | BlastEvaluator,
+    cases: Sequence[LoadCaseSet],
+    layouts: Sequence[Sequence[Element]],
+    processes: int = 1,
+    *,
+    with_error: bool = False,
+    cvar_level: float = CVAR_LEVEL,
+    progress: Callable[[float], None] | None = None,
+) -> Evaluation:
+    """Compare layouts with no barrier, each on the threats of its case.
+
+    Args:
+        evaluators: Run and cache the blasts; a single one is for cases on its scenario.
+        cases: At least one, all with the same number of threats.
+        layouts: One per case: (row, column) of the cells that hold a module, in any order.
+        processes: Number of worker processes; it changes only the time.
+        with_error: Whether the worst threat runs on coarser cells too, for the error of the cells.
+        cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level`.
+        progress: Called with the finished share of the blasts.
+
+    Raises:
+        LayoutError: If a layout does not fit the build zone of its case.
+        CalibrationError: If a scenario names no calibration, or one that was made with other
+            parameters or another engine.
+        BlastEnvError: If there are no cases, a threat is repeated, `processes` or `cvar_level` is
+            out of bounds, or no load arrives in a case even without a barrier.
+    """
+    check_cvar_level(cvar_level)
+    if not cases:
+        raise BlastEnvError("cases: there are none, must be at least one")
+    pairs = zip(cases, layouts, strict=True)
+    cells = [tuple(check_layout(case.scenario, layout)) for case, layout in pairs]
+    blasts, unprotected = zip(
+        *loads_of_both(evaluators.of, cases, cells, processes, progress), strict=True
+    )
+    found = Evaluation(
+        tuple(cases), tuple(cells), blasts, unprotected, evaluators.engine, cvar_level
+    )
+    coarser = evaluators.coarser() if with_error else None
+    if coarser is None:
+        return found
+    number, worst = (
+        int(each) for each in np.unravel_index(found.loads.argmax(), found.loads.shape)
+    )
+    case, fine = cases[number], (blasts[number][worst], unprotected[number][worst])
+    there = coarser.of(case.scenario)
+    error = grid_error(there, case, cells[number], case.threats[worst], fine, processes)
+    return replace(found, grid_error=error)
+
+
+def loads_of_both(
+    evaluator_of: Callable[[Scenario], BlastEvaluator],
+    cases: Sequence[LoadCaseSet],
+    layouts: Sequence[Layout],
+    processes: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[tuple[tuple[BlastLoads, ...], tuple[BlastLoads, ...]]]:
+    """Yield the loads with the layout of each case and those without a barrier, one per threat.
+
+    Consecutive cases on one scenario run together.
+
+    Raises:
+        BlastEnvError: If a threat is repeated, or `processes` is below 1.
+    """
+    done = 0
+    for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):
+        together = list(group)
+        for case, _ in together:
+            check_distinct(case.threats)
+        pairs = [
+            (cells, threat)
+            for case, layout in together
+            for threat in case.threats
+            for cells in (layout, ())
+        ]
+        known_charge = share_of(progress, done, len(cases), len(together))
+        evaluator = evaluator_of(together[0][0].scenario)
+        loads = iter(evaluator.loads_of_many(pairs, processes, known_charge))
+        for case, _ in together:
+            own = list(islice(loads, 2 * len(case.threats)))
+            yield tuple(own[0::2]), tuple(own[1::2])
+        done += len(together)
