@@ -1,4 +1,5 @@
 import math
+import re
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ HOUSE = ("structures", 0)
 BUNKER = ("structures", 1)
 AREAS = ("build_zone.keep_outs[0]", "build_zone.cost_areas[0]")
 OVERRIDES = ("simulation", "overrides")
+PLACE = ("charge", 0, "position_m")
 
 
 @pytest.mark.parametrize(
@@ -30,57 +32,39 @@ OVERRIDES = ("simulation", "overrides")
         (
             (*BUNKER, "corner_m"),
             [21.0, 11.0],
-            "structures[1]: 'bunker' (x 21 to 23 m, y 11 to 13 m) overlaps structures[0], 'house'"
-            " (x 20 to 22 m, y 8 to 12 m)",
+            "structures[1]: 'bunker' .x 21 .* overlaps .*'house'",
         ),
         (
             (*HOUSE, "corner_m"),
             [28.5, 8.0],
-            "structures[0]: 'house' (x 28.5 to 30.5 m, y 8 to 12 m) must lie inside the site"
-            " (x 0 to 30 m, y 0 to 20 m)",
+            "structures[0]: .* must lie inside the site .x 0 to 30",
         ),
         ((*BUNKER, "name"), "house", "structures[1].name: is 'house', already the name of struct"),
         ((*BUNKER, "name"), "barrier", "structures[1].name: is 'barrier', the name of the modules"),
         ((*HOUSE, "protected"), False, "structures: none is protected, at least one must have"),
-        (
-            ("charge", 0, "position_m"),
-            [19.75, 10.0],
-            "charge[0]: its centre comes as near as 0.25 m to structures[0], 'house'"
-            " (x 20 to 22 m, y 8 to 12 m), must keep clear of it by 0.5 m, the charge's radius",
-        ),
-        (("charge", 0, "position_m"), [21.0, 10.0], "charge[0]: its centre comes as near as 0 m"),
+        (PLACE, [19.75, 10.0], "charge[0]: .* as near as 0.25 m .* by 0.5 m, the charge's radius"),
+        (PLACE, [21.0, 10.0], "charge[0]: its centre comes as near as 0 m"),
         (("charge", 1, "end_m"), [25.0, 12.0], "charge[1]: its centre comes as near as 0 m to str"),
         (("charge", 2, "size_m"), [17.9, 8.0], "charge[2]: its centre comes as near as 0.1 m to"),
         (
-            ("charge", 0, "position_m"),
+            PLACE,
             [0.25, 10.0],
-            "charge[0]: its centre may be at x 0.25 to 0.25 m, y 10 to 10 m, must lie inside the"
-            " site (x 0 to 30 m, y 0 to 20 m) by 0.5 m, the charge's radius",
+            "charge[0]: .* x 0.25 to 0.25 m, .* inside the site .* by 0.5 m, the",
         ),
         (("charge", 1, "end_m"), [5.0, 19.75], "charge[1]: its centre may be at x 3 to 5 m, y 2"),
         (("charge", 2, "size_m"), [3.0, 18.0], "charge[2]: its centre may be at x 2 to 5 m, y 2"),
-        (
-            ("build_zone", "rows"),
-            31,
-            "build_zone: the zone (x 8 to 13 m, y 5 to 20.5 m) must lie inside the site"
-            " (x 0 to 30 m, y 0 to 20 m)",
-        ),
+        (("build_zone", "rows"), 31, "build_zone: .* y 5 to 20.5 m. must lie inside the site .x 0"),
         (
             ("build_zone", "keep_outs", 0, "corner_m"),
             [13.0, 9.0],
-            "build_zone.keep_outs[0]: covers x 13 to 18 m, y 9 to 10 m, must overlap the build"
-            " zone (x 8 to 13 m, y 5 to 15 m)",
+            "build_zone.keep_outs[0]: covers x 13 to 18 m, y 9 to 10 m, must overlap the build",
         ),
         # 20 rows of 10 cells, two rows of which are the path.
-        (
-            ("build_zone", "stock"),
-            181,
-            "build_zone.stock: is 181, must be at most 180, the number of usable cells",
-        ),
+        (("build_zone", "stock"), 181, "build_zone.stock: is 181, must be at most 180, the number"),
         (
             (*OVERRIDES, "air", "spacing_units"),
             1.5,
-            "simulation.overrides.air.spacing_units: is 1.5, must be 0 (no air) or at least 2,",
+            "simulation.overrides.air.spacing_units: is 1.5, must be 0 .no air. or at least 2,",
         ),
         (
             (*OVERRIDES, "explosive", "collide_within_charge"),
@@ -92,7 +76,7 @@ OVERRIDES = ("simulation", "overrides")
 def test_sections_that_do_not_fit_are_named(path: KeyPath, value: object, line: str) -> None:
     lines = lines_for(changed(full_document(), path, value))
     assert len(lines) == 1, lines
-    assert lines[0].startswith(f"f.toml: {line}")
+    assert re.match(f"f.toml: {line}".replace("[", r"\["), lines[0]), lines
 
 
 @pytest.mark.parametrize(
