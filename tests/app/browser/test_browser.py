@@ -320,7 +320,7 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     save_scenario(site, tmp_path / "courtyard_high.toml")
     page.open()
     (tmp_path / "broken.toml").write_text("schema_version = 1\nname = 3\n")
-    upload = page.all("input[type=file]")[0]
+    upload = page.until(lambda: page.all("input[type=file]"))[0]
     upload.send_keys(str(tmp_path / "broken.toml"))
     page.sees("This could not be done")
     sleep(0.5)  # until it does not shine through any more
