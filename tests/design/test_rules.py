@@ -118,7 +118,7 @@ def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
     budget=st.floats(4.0, 20.0),
     way_m=st.sampled_from([1.0, 2.5, 4.0]),
 )
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 def test_a_wall_keeps_every_condition(
     charge_y_m: float,
     share: float,

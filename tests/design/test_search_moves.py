@@ -24,7 +24,7 @@ SITES["budget_and_way"] = site(
 
 
 @given(name=st.sampled_from(sorted(SITES)), seed=st.integers(0, 10_000))
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 def test_every_neighbour_is_legal_and_close(name: str, seed: int) -> None:
     """A walk of many moves on sites with budgets and access ways.
 
