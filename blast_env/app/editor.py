@@ -134,6 +134,11 @@ class Editor:
         if free:
             self.attempt("keep roads free", edits.with_roads_free)
 
+    def named_at(self, x_m: float, y_m: float) -> str:
+        """Return the label of the thing at a place; empty without one."""
+        thing = edits.thing_at(self.scenario, x_m, y_m, _HANDLE_M)
+        return next((words for each, words in edits.things(self.scenario) if each == thing), "")
+
     # The mouse.
 
     def press(self, x_m: float, y_m: float, erase: bool = False) -> None:

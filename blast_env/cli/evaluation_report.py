@@ -279,15 +279,16 @@ def _print_evaluation(evaluation: Evaluation, seeds: range) -> None:
     barriers = layout_counts(evaluation.layout, "barrier")
     title = f"{evaluation.scenario.name}: {barriers} against none, {threats_text(count, seeds)}"
     print_table(title, _HEADERS, rows, text_columns=2)
-    print_standings(evaluation.scenario, evaluation.building_table, "structure")
+    for line in standing_lines(evaluation.scenario, evaluation.building_table, "structure"):
+        print_line(line)
     _print_totals(evaluation)
     print_if_all_charges(evaluation.scenario, [each.charge for each in evaluation.threats])
     for note in evaluation.notes:
         print_line(f"note: {note}")
 
 
-def print_standings(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> None:
-    """Print the standing of the load on each building, with its reason.
+def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:
+    """Yield the standing of the load on each building, with its reason.
 
     Args:
         scenario: It has the titles of the buildings.
@@ -296,7 +297,7 @@ def print_standings(scenario: Scenario, buildings: "pd.DataFrame", column: str) 
     """
     for each in buildings.to_dict("records"):
         name = building_words(scenario, str(each[column]))
-        print_line(f"standing of the load, {name}: {each['standing']} ({each['reason']})")
+        yield f"standing of the load, {name}: {each['standing']} ({each['reason']})"
 
 
 def _number(load: float, error: float) -> str:

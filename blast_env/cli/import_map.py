@@ -1,7 +1,7 @@
 """`blast-env import`: a site from a map or drawing."""
 
 from collections import Counter
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -19,6 +19,7 @@ from blast_env.cli.output import (
 )
 from blast_env.cli.targets import PICTURES
 from blast_env.evaluation.answers import titled
+from blast_env.evaluation.screening import facades_for
 from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions
 from blast_env.site import save_scenario
 
@@ -110,6 +111,10 @@ def import_map(
     clearance_m: float = typer.Option(
         1.0, "--clearance", help="Least distance of modules from structures, m.", min=0.0
     ),
+    glazing: str | None = typer.Option(
+        None, help="Windows of protected buildings without any in the file, a component."
+    ),
+    wall: str | None = typer.Option(None, help="Their walls, a component."),
     preset: str = typer.Option("collisional", help="Parameters of the particle model."),
     height_from: str | None = typer.Option(None, help="Property with the height."),
     default_height_m: float | None = typer.Option(
@@ -143,6 +148,7 @@ def import_map(
     from blast_env.io.importing import import_site
 
     imported = import_site(file, _options(context))
+    imported = replace(imported, scenario=facades_for(imported.scenario, glazing, wall))
     save_scenario(imported.scenario, out)
     written = [out, *save_pictures((picture, partial(_plan, imported)))]
     if ledger is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from blast_env.cli.command import writes
-from blast_env.cli.evaluation_report import print_standings
+from blast_env.cli.evaluation_report import standing_lines
 from blast_env.cli.options import (
     BY_SITE,
     CELL_HELP,
@@ -272,7 +272,6 @@ def _print_gas(result: "GasResult") -> None:
         for each in result.buildings.to_dict("records")
     ]
     _print_loads(result, charge, f"{charge.height_m:g} m high", _GAS_HEADERS, rows)
-    print_standings(scenario, result.buildings, "building")
     gauges = [
         (
             *(each["name"], f"{each['x_m']:.2f}", f"{each['y_m']:.2f}", f"{each['z_m']:.2f}"),
@@ -286,7 +285,8 @@ def _print_gas(result: "GasResult") -> None:
         print_table("gauges", _GAUGES, gauges)
     print_answer(pieces_answer(result.pieces, "stability of the barrier"))
     notes = dict.fromkeys(note for each in scaled.values() for note in each.get("notes", ()))
-    texts = [f"outside the validated range (marked ~): {note}" for note in notes]
+    texts = [*standing_lines(scenario, result.buildings, "building")]
+    texts += [f"outside the validated range (marked ~): {note}" for note in notes]
     texts += (*result.stepped_notes, *result.moved_gauges)
     texts += (f"{each.building}: {each.words}" for each in result.unjudged)
     cells = " x ".join(str(count) for count in result.run.grid.shape)

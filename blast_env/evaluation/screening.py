@@ -18,6 +18,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.places import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
@@ -231,7 +232,7 @@ class Screening:
             f"{threat.broken_panes:.1f} of {threat.panes}",
             "-" if pane is None else pane.words,
             "-" if panel is None else panel.name.lower(),
-            ("passes" if kept else "fails") + (" (may be breached)" if threat.may_breach else ""),
+            Verdict.of(kept).word().lower() + (" (may be breached)" if threat.may_breach else ""),
         )
 
     def stand_off_rows(self, threat: Screened) -> Iterator[tuple[str, ...]]:

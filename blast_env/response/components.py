@@ -26,7 +26,7 @@ from blast_env.response.walls import Masonry, Panel, ReinforcedConcrete, Sheetin
 from blast_env.values import plain_text
 
 _MM: Final = 1e-3
-_Size = Annotated[StrictFloat, Field(ge=0.05, le=20.0)]
+PaneSide = Annotated[StrictFloat, Field(ge=0.05, le=20.0)]
 _Text = Annotated[str, Field(min_length=1, max_length=300), AfterValidator(plain_text)]
 
 
@@ -68,8 +68,8 @@ class Glazing(_Component):
     """
 
     kind: Literal["glazing"] = "glazing"
-    width_m: _Size
-    height_m: _Size
+    width_m: PaneSide
+    height_m: PaneSide
     thickness_mm: Annotated[StrictFloat, Field(ge=1.0, le=100.0)]
     glass: GlassKind = GlassKind.ANNEALED
     interlayer: Interlayer | None = None

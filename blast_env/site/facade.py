@@ -3,6 +3,7 @@
     [structures.facade]
     storey_m = 3.5
     glazing = "window_annealed_6"
+    pane_width_m = 1.2                  # else the size of the component
     wall = "brick_215"
 
     [[structures.facade.parts]]         # other components in some of the bays
@@ -45,12 +46,14 @@ class NamedBay:
         window: Component of its windows in the facade, which has their sizes and sills.
         glazing: Component of their glass.
         wall: Component of its wall panel.
+        pane_m: Width and height of the panes, where the facade states them.
     """
 
     bay: Bay
     window: str | None
     glazing: str | None
     wall: str | None
+    pane_m: tuple[float | None, float | None] = (None, None)
 
     def hardened(self, measures: Sequence[Hardening]) -> "NamedBay":
         """Return it with measures taken; the last one for a component counts."""
@@ -72,6 +75,10 @@ class NamedBay:
         )
         assert window is None or isinstance(window, Glazing)
         assert wall is None or isinstance(wall, Wall)
+        stated = zip(("width_m", "height_m"), self.pane_m, strict=True)
+        sides_m = {side: value for side, value in stated if value is not None}
+        if window is not None and sides_m:
+            window = window.model_copy(update=sides_m)
         if window is not None and self.glazing != self.window:
             assert isinstance(glass, Glazing)
             window = with_glass(window, glass)
@@ -150,7 +157,8 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
         if bay.line is not None and bay.width_m < 0.5 * facade.bay_m:
             glazing = None
         if glazing or wall or bay.line is None:
-            named.append(NamedBay(bay, glazing, glazing, wall))
+            pane_m = facade.pane_width_m, facade.pane_height_m
+            named.append(NamedBay(bay, glazing, glazing, wall, pane_m))
     return tuple(named)
 
 

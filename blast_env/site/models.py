@@ -298,8 +298,10 @@ class Scenario(Section):
             structure.pop("title")
             if not self.objective.is_response:
                 structure.pop("facade", None)
-            elif structure["facade"] and structure["facade"]["storeys"] is None:
-                del structure["facade"]["storeys"]
+            elif structure["facade"]:
+                for key in ("storeys", "pane_width_m", "pane_height_m"):
+                    if structure["facade"][key] is None:
+                        del structure["facade"][key]
         if self.objective.is_response and self.components:
             words = {"title", "source"}
             content["components"] = {

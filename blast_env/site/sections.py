@@ -27,6 +27,7 @@ from pydantic import (
 
 from blast_env.errors import type_word
 from blast_env.geometry import Cell, Rectangle
+from blast_env.response.components import PaneSide
 from blast_env.response.facade import BAY_M, STOREY_M, Bay
 from blast_env.site.parameters import PRESETS, SimulationParameters, preset, with_overrides
 from blast_env.site.presets import CHARGE_PRESETS, TNT_EQUIVALENTS, tnt_equivalent_kg
@@ -422,6 +423,8 @@ class FacadeSection(Section):
         storeys: Number of storeys of equal height, in the place of `storey_m`.
         bay_m: Width of a bay; bays of a wall are made equally wide.
         glazing: Name of the component of its windows; none unless given.
+        pane_width_m: Width of their panes; by default that of the component.
+        pane_height_m: Height of their panes; by default that of the component.
         wall: Name of the component of its walls; none unless given.
         parts: Bays with other components; the last one that covers a bay counts.
     """
@@ -430,6 +433,8 @@ class FacadeSection(Section):
     storeys: Annotated[StrictInt, Field(ge=1, le=200)] | None = None
     bay_m: Annotated[StrictFloat, Field(ge=0.5, le=50.0)] = BAY_M
     glazing: Name | None = None
+    pane_width_m: PaneSide | None = None
+    pane_height_m: PaneSide | None = None
     wall: Name | None = None
     parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
 

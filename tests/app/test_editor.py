@@ -10,6 +10,7 @@ from blast_env.app.editor import Editor, Tool
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
+from blast_env.app.page.fields import change_of, fields_of
 from blast_env.app.plan import PixelView, overlay_svg, plan_svg
 from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
@@ -103,9 +104,16 @@ def test_a_facade_is_that_of_the_whole_building(tmp_path: Path) -> None:
     other = {**west, "name": "other", "corner_m": [8.5, 3.0]}
     del other["building"], other["title"]
     site = hut(structures=[west, east, other])
-    facade = {"wall": "brick_215", "storeys": 1}
-    after = edits.with_values(site, SiteThing(ThingKind.STRUCTURE, 1), {"facade": facade})
+    thing = SiteThing(ThingKind.STRUCTURE, 1)
+    facade = {"wall": "brick_215", "glazing": "window_annealed_6", "storeys": 1}
+    facade |= {"pane_width_m": 0.6, "pane_height_m": 1.0}
+    after = edits.with_values(site, thing, {"facade": facade})
     assert [each.facade is not None for each in after.structures] == [True, True, False]
+    (width,) = (each for each in fields_of(after, thing) if each.key == "pane_width_m")
+    after = edits.with_values(after, thing, change_of(edits.section_of(after, thing), width, 0.8))
+    panes = {(each.glazing.width_m, each.glazing.height_m) for each in after.bays if each.glazing}
+    assert panes == {(0.8, 1.0)}
+    assert {each.bay.structure for each in after.bays} == {"west", "east"}
     labels = [words for thing, words in edits.things(after) if thing.kind is ThingKind.STRUCTURE]
     assert labels[:2] == ["Town Hall, protected", "Town Hall: east, protected"]
 

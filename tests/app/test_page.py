@@ -25,6 +25,8 @@ from blast_env.app.jobs import Workers
 from blast_env.app.page import uploads
 from blast_env.app.page.fields import fields_of
 from blast_env.app.page.numbers import NumberField
+from blast_env.app.page.plan_view import HEIGHT_PX, WIDTH_PX
+from blast_env.app.plan import PixelView
 from blast_env.app.records import EngineRecord
 from blast_env.app.server import add_pages
 from blast_env.app.session import Sessions
@@ -123,6 +125,9 @@ def test_a_site_is_chosen_a_module_placed_and_taken_back(tmp_path: Path) -> None
 def test_the_reason_is_said_while_the_mouse_is_there(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         await opened(user, sessions, load_scenario("courtyard"))
+        x_px, y_px = PixelView.of(load_scenario("courtyard"), WIDTH_PX, HEIGHT_PX).pixel(28.0, 15.0)
+        mouse(user, "mousemove", x_px, y_px)
+        await user.should_see("select and move   building, protected")  # its name, before a click
         user.find("Place").click()
         mouse(user, "mousemove", 260.0, 280.0)
         await user.should_see("the path from the road to the door must stay open")

@@ -55,6 +55,17 @@ def test_report_as_json_has_the_same(tmp_path: Path) -> None:
     assert report["georeference"]["kind"] == "map"
 
 
+def test_protected_buildings_have_the_windows_and_walls_that_are_asked_for(tmp_path: Path) -> None:
+    out = tmp_path / "block.toml"
+    filled = ("--glazing", "window_annealed_6", "--wall", "brick_215")
+    assert run(BLOCK, "--protect", "Town Hall", *filled, "--out", out)[0] == 0
+    facades = {each.name: each.facade for each in load_scenario(out).structures}
+    hall = facades.pop("Town_Hall")
+    assert hall is not None
+    assert (hall.glazing, hall.wall) == ("window_annealed_6", "brick_215")
+    assert set(facades.values()) == {None}
+
+
 @pytest.mark.parametrize("text", ["7.5", "a,b", "1,2,3"])
 def test_place_of_a_charge_that_is_none(text: str, tmp_path: Path) -> None:
     code, _, error = run(BLOCK, "--charge-at", text, "--out", tmp_path / "a.toml")

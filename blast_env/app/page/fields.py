@@ -125,6 +125,7 @@ _OF_STRUCTURE: Final = (
         hint="barriers and buildings may stand on its top; it needs a height, and begins at 0",
     ),
 )
+_PANES: Final = "of all windows of the building; else the size of the component"
 _FILLINGS: Final = frozenset({"glazing", "wall"})
 _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
     "ModularObstacle": (
@@ -139,6 +140,8 @@ _LAST_OF_STRUCTURE: Final = (
     FormField("weight", "weight"),
     FormField("assessed walls", "faces", "walls"),
     FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
+    FormField("width of a pane (m)", "pane_width_m", optional=True, inside="facade", hint=_PANES),
+    FormField("height of a pane (m)", "pane_height_m", optional=True, inside="facade", hint=_PANES),
     FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
     FormField(
         "storeys",

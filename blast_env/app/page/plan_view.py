@@ -177,6 +177,8 @@ class PlanPanel:
         elif editor.move(x_m, y_m, erase and bool(event.buttons)):
             self._draw()
             self._say(words_of_place(self._view, x_m, y_m))
+        elif editor.tool is Tool.SELECT:
+            self._say(editor.named_at(x_m, y_m))
 
     def _pan(self, x_px: float, y_px: float) -> None:
         if self._pan_from is None:
