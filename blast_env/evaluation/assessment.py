@@ -278,16 +278,10 @@ def _response(
     found: Consequences, building: str, coarse: Consequences | None = None
 ) -> tuple[str, ...]:
     """Return the response of a building; of the panes with the error of the cells."""
-    facades = [each.facade for each in found.of(building)]
-    worst = max(facades, key=lambda facade: facade.broken_panes)
-    broken = f"{worst.broken_panes:.1f}"
+    whole = found.summary(building)
+    broken = f"{whole.broken:.1f}"
     if coarse is not None:
-        fine = facades[found.worst_number].broken_panes
+        fine = found.of(building)[found.worst_number].facade.broken_panes
         other = coarse.of(building)[0].facade.broken_panes
         broken += f" +- {convergence_index(fine, other):.1f}"
-    return (
-        found.level_words(building),
-        f"{broken} of {worst.panes}",
-        max(facade.worst_condition for facade in facades).words,
-        max(facade.worst_damage for facade in facades).name.lower(),
-    )
+    return whole.level, f"{broken} of {whole.panes}", whole.condition, whole.damage

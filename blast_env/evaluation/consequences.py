@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -58,6 +58,7 @@ from blast_env.response.facade import (
 )
 from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
+from blast_env.response.walls import DamageLevel
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.facade import with_glass
 from blast_env.site.scene import WALLS, BlastSite, Charge
@@ -216,6 +217,28 @@ class BarrierResponse:
     taken_away: Layout = ()
 
 
+class BuildingSummary(NamedTuple):
+    """The response of a building with a facade: the worst of all charges.
+
+    Attributes:
+        level: Level of protection in words, with that on the cells where it is higher.
+        broken: Expected number of broken panes.
+        panes: Number of its panes.
+        condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
+        failed: Number of wall panels with hazardous damage or worse.
+        panels: Number of its wall panels.
+        damage: Damage of the worst panel.
+    """
+
+    level: str
+    broken: float
+    panes: int
+    condition: str
+    failed: int
+    panels: int
+    damage: str
+
+
 @dataclass(frozen=True, eq=False)
 class Consequences:
     """The consequences of charges for the buildings of a site behind a layout.
@@ -343,6 +366,20 @@ class Consequences:
         """Return the level of a building as text, with that on the cells where it is higher."""
         level, on_cells = self.level(building), self.level_on_cells(building)
         return level.label + (f" ({on_cells.label} on the cells)" if on_cells > level else "")
+
+    def summary(self, building: str) -> BuildingSummary:
+        """Return the response of a building under the worst charge, number by number."""
+        found = [each.facade for each in self.of(building)]
+        hazardous = [[each >= DamageLevel.HAZARDOUS for each in one.walls.levels] for one in found]
+        return BuildingSummary(
+            level=self.level_words(building),
+            broken=max(each.broken_panes for each in found),
+            panes=found[0].panes,
+            condition=max(each.worst_condition for each in found).words,
+            failed=max(map(sum, hazardous)),
+            panels=len(found[0].walled),
+            damage=max(each.worst_damage for each in found).name.lower(),
+        )
 
     def worst_damage(self, scenario: Scenario) -> float:
         """Return the worst damage of the protected buildings in the objective, from 0 to 5.

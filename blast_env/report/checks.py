@@ -66,7 +66,11 @@ def _stand_off(study: Study) -> HandCheck:
             kingery_bulmash(quantity, away_m, charge.tnt_kg, burst)
             for quantity in ("reflected_overpressure", "reflected_impulse")
         )
-        fine = study.pair(target, threat, study.options.cells[1]).unprotected
+        fine = next(
+            each.unprotected
+            for each in study.fine
+            if (each.target.name, each.threat.name) == (target.name, threat.name)
+        )
         lines += [
             f"Kingery and Bulmash, {burst}, normal reflection: {peak_pa / PA_PER_KPA:,.1f} kPa,"
             f" {impulse_pa_s:,.0f} Pa s",

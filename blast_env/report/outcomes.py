@@ -3,10 +3,9 @@
 This module has no model of damage: judging loads takes knowledge of the building.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
-from typing import Self
+from math import inf, isfinite, nan
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase
@@ -91,6 +90,8 @@ class LoadPair:
         cells: The cells.
         unprotected: Without the layout.
         protected: With it.
+        coarse: The same on coarser cells, for the errors of the cells; `None` without.
+        ratio: Side of those cells over that of these.
     """
 
     target: ReportedBuilding
@@ -98,42 +99,33 @@ class LoadPair:
     cells: Cells
     unprotected: TargetLoad
     protected: TargetLoad
+    coarse: "LoadPair | None" = None
+    ratio: float = 1.0
 
     @property
     def reduction(self) -> float:
         """Share of the impulse that is gone; NaN if there is none."""
         return reductions(self.protected.impulse_pa_s, self.unprotected.impulse_pa_s).item()
 
+    @property
+    def reduction_error(self) -> float:
+        """Error of the cells of the reduction, an absolute share; NaN with one size."""
+        return self._error(lambda pair: pair.reduction)
 
-@dataclass(frozen=True)
-class LoadErrors:
-    """Errors of the cells of the impulses on a building under a threat.
+    @property
+    def unprotected_error_pa_s(self) -> float:
+        """Error of the cells of the impulse without the layout; NaN with one size."""
+        return self._error(lambda pair: pair.unprotected.impulse_pa_s)
 
-    Attributes:
-        bare_pa_s: Of the impulse without the layout.
-        walled_pa_s: Of that with it.
-        reduction: Of its reduction, an absolute share.
-    """
+    @property
+    def protected_error_pa_s(self) -> float:
+        """Error of the cells of the impulse with the layout; NaN with one size."""
+        return self._error(lambda pair: pair.protected.impulse_pa_s)
 
-    bare_pa_s: float
-    walled_pa_s: float
-    reduction: float
-
-    @classmethod
-    def of(cls, fine: LoadPair, coarse: LoadPair, ratio: float) -> Self:
-        """Return the errors from the loads with two sizes of cells.
-
-        Args:
-            fine: The loads with the finer cells.
-            coarse: The same with the coarser ones.
-            ratio: Side of the coarser cells over that of the finer ones.
-        """
-        pairs = (
-            (fine.unprotected.impulse_pa_s, coarse.unprotected.impulse_pa_s),
-            (fine.protected.impulse_pa_s, coarse.protected.impulse_pa_s),
-            (fine.reduction, coarse.reduction),
-        )
-        return cls(*(convergence_index(*each, ratio) for each in pairs))
+    def _error(self, number_of: Callable[["LoadPair"], float]) -> float:
+        if self.coarse is None:
+            return nan
+        return convergence_index(number_of(self), number_of(self.coarse), self.ratio)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from hashlib import sha256
 from math import isfinite, isnan
 from pathlib import Path
 from types import CodeType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from warnings import catch_warnings, filterwarnings
 
 import numpy as np
@@ -36,11 +36,11 @@ from blast_env.report.figures import (
     worth_map,
 )
 from blast_env.report.loads import TargetLoad, UnitSystem
-from blast_env.report.outcomes import LoadErrors, LoadPair
+from blast_env.report.outcomes import LoadPair
 from blast_env.report.peaks import PeakSource
 from blast_env.report.study import Study
 from blast_env.report.threats import other_places, place_text
-from blast_env.report.verdict import ReportVerdict, counted, verdict_of
+from blast_env.report.verdict import StudyVerdict, counted
 from blast_env.response.buildings import BuildingDamage
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
@@ -170,7 +170,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         each.charge_against(scenario, study.layout)
         for each in other_places(scenario, options.places)
     ]
-    verdict, summary = verdict_of(study), _summary(study)
+    verdict, summary = StudyVerdict(study), _summary(study)
+    standing = "" if verdict.barrier is None else outcome_words(verdict.barrier.pieces)
     return {
         "study": study,
         "scenario": scenario,
@@ -187,8 +188,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "stand_off": stand_off_text(scenario, study.layout),
         "summary": summary,
         "verdict": verdict,
-        "sources": _sources(study, verdict, summary),
-        "standing": _standing(verdict),
+        "sources": _sources(study, verdict, standing, summary),
+        "standing": standing,
         "standings": {each.name: _standings(study, each.name) for each in study.threats},
         "checks": checks_of(study),
         "details": options.details,
@@ -225,47 +226,32 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class SummaryLine:
-    """The effect of a layout on one building, over all threats, with the finer cells.
+class SummaryLine(NamedTuple):
+    """The effect of a layout on a building, over all threats, with the finer cells.
 
     Attributes:
-        name: The building.
-        worst: The threat with the largest impulse with the layout.
+        worst: The loads under the threat with the largest impulse with the layout.
         least: Smallest reduction of its impulse under a threat.
         most: Largest reduction.
-        errors: Errors of the cells of the impulses under the worst threat.
         error: Largest error of the cells of a reduction.
     """
 
-    name: str
     worst: LoadPair
     least: float
     most: float
-    errors: LoadErrors
     error: float
 
 
 def _summary(study: Study) -> list[SummaryLine]:
-    fine = study.options.cells[1]
     lines = []
     for target in study.targets:
-        own = [
-            each
-            for each in study.pairs
-            if each.target.name == target.name and each.cells == fine and target.protected
-        ]
+        own = [each for each in study.fine if each.target.name == target.name and target.protected]
         if own:
             gone = [each.reduction for each in own]
             worst = max(own, key=lambda each: each.protected.impulse_pa_s)
-            error = max(study.errors(each).reduction for each in own)
-            ends = float(min(gone)), float(max(gone))
-            lines.append(SummaryLine(target.name, worst, *ends, study.errors(worst), error))
+            error = max(each.reduction_error for each in own)
+            lines.append(SummaryLine(worst, float(min(gone)), float(max(gone)), error))
     return lines
-
-
-def _standing(verdict: ReportVerdict) -> str:
-    return "" if verdict.barrier is None else outcome_words(verdict.barrier.pieces)
 
 
 def _standings(study: Study, threat: str) -> list[str]:
@@ -393,7 +379,9 @@ Source = tuple[str, str, str]
 """A number of the summary: its name, its value and its source."""
 
 
-def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine]) -> list[Source]:
+def _sources(
+    study: Study, verdict: StudyVerdict, standing: str, summary: Sequence[SummaryLine]
+) -> list[Source]:
     """Return every number of the summary with its source."""
     units, fine = study.options.units, study.options.words[1]
     digests, titled = dict(study.digests), study.scenario.title_of
@@ -407,32 +395,35 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
 
     sides = (("without", "without a barrier"), ("with the layout", "with the layout"))
     found: list[Source] = []
-    for each in verdict.buildings:
-        for number, (words, of_blast) in enumerate(sides):
+    for name, both in verdict.buildings.items():
+        for (words, of_blast), each in zip(sides, both, strict=True):
             where = f"worst of the threats; {blasts(of_blast)}; response of its bays"
             values = (
-                ("level of protection", each.levels[number]),
-                ("panes that break", f"{each.broken[number]:.1f} of {each.panes}"),
-                ("panels that fail", f"{each.failed[number]} of {each.panels}"),
+                ("level of protection", each.level),
+                ("panes that break", f"{each.broken:.1f} of {each.panes}"),
+                ("panels that fail", f"{each.failed} of {each.panels}"),
             )
-            name = titled(each.name)
-            found += [(f"{name}, {words}: {what}", value, where) for what, value in values]
+            found += [(f"{titled(name)}, {words}: {what}", value, where) for what, value in values]
     for line in summary:
         for words, of_blast, load, error in (
-            (*sides[0], line.worst.unprotected, line.errors.bare_pa_s),
-            (*sides[1], line.worst.protected, line.errors.walled_pa_s),
+            (*sides[0], line.worst.unprotected, line.worst.unprotected_error_pa_s),
+            (*sides[1], line.worst.protected, line.worst.protected_error_pa_s),
         ):
             label = f"{line.worst.threat.name} {of_blast}, {fine}"
             where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
             impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
             impulse += _of_cells(_error(units.impulse_of(error)))
             peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
-            found.append((f"{titled(line.name)}, {words}: impulse", impulse, where))
-            found.append((f"{titled(line.name)}, {words}: peak", peak, where))
+            found.append((f"{titled(line.worst.target.name)}, {words}: impulse", impulse, where))
+            found.append((f"{titled(line.worst.target.name)}, {words}: peak", peak, where))
         span = f"{_gone(line.least)} to {_gone(line.most)}"
         span += _of_cells(_error(100.0 * line.error, 1))
         found.append(
-            (f"{titled(line.name)}: reduction", span, "1 - impulse with / without, all threats")
+            (
+                f"{titled(line.worst.target.name)}: reduction",
+                span,
+                "1 - impulse with / without, all threats",
+            )
         )
     cost = study.scenario.zone.priced(study.cost)
     found.append(("cost of the layout", cost, "bill of quantities"))
@@ -446,7 +437,7 @@ def _sources(study: Study, verdict: ReportVerdict, summary: Sequence[SummaryLine
         )
     if verdict.barrier is not None:
         where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
-        found.append(("barriers", _standing(verdict), where))
+        found.append(("barriers", standing, where))
     for neighbour in study.protected.worst_neighbours:
         share = _percent(neighbour.probability[BuildingDamage.MAJOR])
         where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "

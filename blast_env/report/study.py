@@ -44,7 +44,6 @@ from blast_env.report.outcomes import (
     FrontPoint,
     ItemWorth,
     Limit,
-    LoadErrors,
     LoadPair,
     check_limits,
 )
@@ -213,38 +212,27 @@ class Study:
         asked = (self.options.target, self.scenario.objective.level, LevelOfProtection.LOW)
         return next(each for each in asked if each is not None)
 
-    def pair(self, target: ReportedBuilding, threat: LoadCase, cells: Cells) -> LoadPair:
-        """Return the loads on a building under a threat with one size of cells."""
-        return next(
-            each
-            for each in self.pairs
-            if (each.target.name, each.threat.name, each.cells) == (target.name, threat.name, cells)
-        )
-
-    def errors(self, pair: LoadPair) -> LoadErrors:
-        """Return the errors of the cells of the impulses on a building; NaN with one size."""
-        coarse, fine = self.options.cells
-        if self.options.ratio == 1.0 or pair.cells != fine:
-            return LoadErrors(float("nan"), float("nan"), float("nan"))
-        return LoadErrors.of(pair, self.pair(pair.target, pair.threat, coarse), self.options.ratio)
+    @property
+    def fine(self) -> tuple[LoadPair, ...]:
+        """Loads by threat and building with the finer cells."""
+        return tuple(each for each in self.pairs if each.cells == self.options.cells[1])
 
     @property
     def uncertainty(self) -> Uncertainty:
         """The uncertain quantities, with the largest error of the cells of an impulse."""
-        fine = self.options.cells[1]
-        own = [each for each in self.pairs if each.target.protected and each.cells == fine]
-        shares = [self.errors(each).walled_pa_s / each.protected.impulse_pa_s for each in own]
+        shares = (
+            each.protected_error_pa_s / each.protected.impulse_pa_s
+            for each in self.fine
+            if each.target.protected
+        )
         cells = max((share for share in shares if np.isfinite(share)), default=0.0)
         return Uncertainty(mass=self.options.mass_error, cells=cells)
 
     @property
     def grid_error(self) -> float:
         """Largest error of the cells of a reduction of the impulse; NaN with one size."""
-        fine = self.options.cells[1]
-        own = [each for each in self.pairs if each.target.protected and each.cells == fine]
-        found = [self.errors(each).reduction for each in own]
-        known = [each for each in found if np.isfinite(each)]
-        return max(known, default=float("nan"))
+        found = (each.reduction_error for each in self.fine if each.target.protected)
+        return max((each for each in found if np.isfinite(each)), default=float("nan"))
 
 
 Told = Callable[[str, float], None]
@@ -551,10 +539,17 @@ class Runs:
             self._found.setdefault((cells, bool(layout)), []).append(each.found)
             self._evaluators[cells].keep(layout, threat, each.loads)
             keep_consequences(self._evaluators[cells], layout, threat.charge, each.found)
+        coarser = {
+            each.target.name: each
+            for each in self.pairs
+            if each.threat is threat and self.options.ratio > 1.0
+        }
         for target in self.targets:
             if target.name in unprotected.on_targets and target.name in protected.on_targets:
                 loads = unprotected.on_targets[target.name], protected.on_targets[target.name]
-                self.pairs.append(LoadPair(target, threat, cells, *loads))
+                coarse = coarser.get(target.name)
+                ratio = self.options.ratio
+                self.pairs.append(LoadPair(target, threat, cells, *loads, coarse, ratio))
 
     def _moments_s(self) -> list[float]:
         """Return the times of the stills, s: around the arrival at a protected building."""

@@ -2,58 +2,20 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from blast_env.evaluation.consequences import (
     BarrierResponse,
+    BuildingSummary,
     Consequences,
     Verdict,
     other_glazing,
 )
+from blast_env.report.loads import TargetLoad
 from blast_env.report.outcomes import Limit, LoadPair
 from blast_env.report.study import Study
-from blast_env.response.walls import DamageLevel
-
-
-@dataclass(frozen=True)
-class KeptLimit:
-    """Whether a building keeps its limit under a threat.
-
-    Attributes:
-        limit: The limit.
-        pair: The loads, with the finer cells.
-        kept: Whether it is kept with the layout.
-        kept_bare: Whether it is kept without.
-    """
-
-    limit: Limit
-    pair: LoadPair
-    kept: bool
-    kept_bare: bool
-
-
-@dataclass(frozen=True)
-class BuildingLine:
-    """A building with a facade, without the layout and with it: the worst of all threats.
-
-    Attributes:
-        name: The building.
-        levels: Level of protection in words, with that on the cells if it differs.
-        broken: Expected number of broken panes.
-        panes: Number of its panes.
-        conditions: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
-        failed: Number of wall panels with hazardous damage or worse.
-        panels: Number of its wall panels.
-        damages: Damage of the worst panel.
-    """
-
-    name: str
-    levels: tuple[str, ...]
-    broken: tuple[float, ...]
-    panes: int
-    conditions: tuple[str, ...]
-    failed: tuple[int, ...]
-    panels: int
-    damages: tuple[str, ...]
+from blast_env.response.buildings import LevelOfProtection
 
 
 @dataclass(frozen=True)
@@ -64,137 +26,156 @@ class OtherGlass:
         title: Its title.
         cost: Cost by the measures of the site, without those already in the layout; `None` if they
             do not put it into all windows.
-        passes: Whether the buildings pass with it behind the layout.
-        passes_bare: The same without the layout.
+        bare_word: The verdict on the buildings without the layout.
+        word: The same behind it.
     """
 
     title: str
     cost: float | None
-    passes: bool
-    passes_bare: bool
+    bare_word: str
+    word: str
 
 
-@dataclass(frozen=True)
-class ReportVerdict:
-    """Whether the layout passes.
+class Side(NamedTuple):
+    """The verdict on a site without the layout, or with it.
 
     Attributes:
-        passes: Whether all requirements are kept; `None` without any.
-        passes_bare: The same without the layout.
+        found: The response of its buildings.
+        passes: Whether all requirements are kept.
         flagged: Whether a load behind the verdict has a note.
-        flagged_bare: The same without the layout.
-        words: The verdict on each requirement, such as `level of protection below Low`.
-        doubt: Why a fail rests on sharper peaks; empty if it does not.
-        buildings: The buildings with a facade.
-        limits: The given limits.
-        barrier: The barrier under the threat that tilts a piece most.
-        glazing: Other glass in all windows.
     """
 
-    passes: bool | None
-    passes_bare: bool | None
+    found: Consequences
+    passes: bool
     flagged: bool
-    flagged_bare: bool
-    words: str
-    doubt: str
-    buildings: tuple[BuildingLine, ...]
-    limits: tuple[KeptLimit, ...]
-    barrier: BarrierResponse | None
-    glazing: tuple[OtherGlass, ...]
+
+    @classmethod
+    def of(
+        cls,
+        found: Consequences,
+        target: LevelOfProtection,
+        loads: Sequence[tuple[Limit, TargetLoad]],
+    ) -> "Side":
+        """Return the verdict by the level of the buildings, and by limits of loads."""
+        kept = all(limit.is_kept(load) for limit, load in loads)
+        flagged = found.is_flagged or any(load.flagged for _, load in loads)
+        return cls(found, kept and found.passes(target), flagged)
 
     @property
     def word(self) -> str:
         """The verdict in a word."""
-        return "NO VERDICT" if self.passes is None else Verdict.of(self.passes).word(self.flagged)
+        return Verdict.of(self.passes).word(self.flagged)
 
 
-def verdict_of(study: Study) -> ReportVerdict:
-    """Return the verdict of a report.
+@dataclass(frozen=True, eq=False)
+class StudyVerdict:
+    """Whether the layout of a study passes.
 
     It goes by the required level of protection, if buildings have facades, and by the given limits;
     both must be kept, on the finer cells and under every threat.
+
+    Attributes:
+        study: The study.
     """
-    limits = tuple(_limits(study))
-    target = study.target
-    kept, kept_bare = ([each.kept for each in limits], [each.kept_bare for each in limits])
-    asked = [_limit_words(limits)] if limits else []
-    doubt = ""
-    glazing: tuple[OtherGlass, ...] = ()
-    if study.protected.buildings:
-        asked.insert(0, study.protected.level_words_for(target))
-        kept.append(study.protected.passes(target))
-        kept_bare.append(study.unprotected.passes(target))
-        doubt = study.protected.doubt(target)
-        glazing = tuple(_glazing(study))
-    return ReportVerdict(
-        passes=all(kept) if asked else None,
-        passes_bare=all(kept_bare) if asked else None,
-        flagged=study.protected.is_flagged or any(each.pair.protected.flagged for each in limits),
-        flagged_bare=study.unprotected.is_flagged
-        or any(each.pair.unprotected.flagged for each in limits),
-        words="; ".join(asked),
-        doubt=doubt,
-        buildings=tuple(_line(study, name) for name in study.protected.buildings),
-        limits=limits,
-        barrier=study.protected.worst_barrier,
-        glazing=glazing,
-    )
 
+    study: Study
 
-def _limits(study: Study) -> Iterator[KeptLimit]:
-    fine = study.options.cells[1]
-    for limit in study.options.limits:
-        for pair in study.pairs:
-            if pair.target.name == limit.target and pair.cells == fine:
-                yield KeptLimit(
-                    limit, pair, limit.is_kept(pair.protected), limit.is_kept(pair.unprotected)
-                )
+    @cached_property
+    def limits(self) -> tuple[tuple[Limit, LoadPair], ...]:
+        """Each limit, with the loads under each threat."""
+        given = self.study.options.limits
+        return tuple(
+            (limit, pair)
+            for limit in given
+            for pair in self.study.fine
+            if pair.target.name == limit.target
+        )
 
+    @property
+    def buildings(self) -> dict[str, tuple[BuildingSummary, BuildingSummary]]:
+        """The buildings with a facade, without the layout and with it."""
+        sides = self.study.unprotected, self.study.protected
+        return {
+            name: (sides[0].summary(name), sides[1].summary(name))
+            for name in self.study.protected.buildings
+        }
 
-def _limit_words(limits: Sequence[KeptLimit]) -> str:
-    """Return how many limits are exceeded, and under which threats."""
-    exceeded = [each.pair.threat.name for each in limits if not each.kept]
-    if not exceeded:
-        return f"{counted(len(limits), 'load limit')} kept"
-    threats = list(dict.fromkeys(exceeded))
-    noun = "threat" if len(threats) == 1 else "threats"
-    return f"{counted(len(exceeded), 'load limit')} exceeded ({noun} {', '.join(threats)})"
+    @cached_property
+    def sides(self) -> tuple["Side", "Side"]:
+        """The verdicts without the layout and with it."""
+        target = self.study.target
+        loads = [(limit, pair.unprotected, pair.protected) for limit, pair in self.limits]
+        return (
+            Side.of(self.study.unprotected, target, [(limit, load) for limit, load, _ in loads]),
+            Side.of(self.study.protected, target, [(limit, load) for limit, _, load in loads]),
+        )
+
+    @property
+    def passes(self) -> bool | None:
+        """Whether all requirements are kept with the layout; `None` without any."""
+        is_asked = self.limits or self.study.protected.buildings
+        return self.sides[1].passes if is_asked else None
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word."""
+        return "NO VERDICT" if self.passes is None else self.sides[1].word
+
+    def kept(self, side: int) -> int:
+        """Return the number of limits that are kept without the layout (0) or with it (1)."""
+        loads = [(limit, (pair.unprotected, pair.protected)) for limit, pair in self.limits]
+        return sum(limit.is_kept(both[side]) for limit, both in loads)
+
+    @property
+    def words(self) -> str:
+        """The verdict on each requirement, such as `level of protection below Low`."""
+        study = self.study
+        words = [study.protected.level_words_for(study.target)] * bool(study.protected.buildings)
+        exceeded = [
+            pair.threat.name for limit, pair in self.limits if not limit.is_kept(pair.protected)
+        ]
+        if exceeded:
+            threats = list(dict.fromkeys(exceeded))
+            noun = "threat" if len(threats) == 1 else "threats"
+            limits = counted(len(exceeded), "load limit")
+            words.append(f"{limits} exceeded ({noun} {', '.join(threats)})")
+        elif self.limits:
+            words.append(f"{counted(len(self.limits), 'load limit')} kept")
+        return "; ".join(words)
+
+    @property
+    def doubt(self) -> str:
+        """Why a fail rests on sharper peaks; empty if it does not."""
+        has_buildings = bool(self.study.protected.buildings)
+        return self.study.protected.doubt(self.study.target) if has_buildings else ""
+
+    @property
+    def barrier(self) -> BarrierResponse | None:
+        """The barrier under the threat that tilts a piece most."""
+        return self.study.protected.worst_barrier
+
+    @cached_property
+    def glazing(self) -> tuple[OtherGlass, ...]:
+        """Other glass in all windows, if any building has panes."""
+        return tuple(self._glazing())
+
+    def _glazing(self) -> Iterator[OtherGlass]:
+        study = self.study
+        if not any(each.facade.panes for each in study.protected.responses):
+            return
+        for name, glazing in other_glazing(study.scenario).items():
+            words = (
+                Verdict.of(each.found.with_glazing(glazing).passes(study.target))
+                .word(each.flagged)
+                .lower()
+                for each in self.sides
+            )
+            yield OtherGlass(glazing.title, _price(study, name), *words)
 
 
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun: `1 load limit`, `2 load limits`."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def _line(study: Study, name: str) -> BuildingLine:
-    both: Sequence[Consequences] = (study.unprotected, study.protected)
-    facades = [[response.facade for response in each.of(name)] for each in both]
-    first = facades[0][0]
-    return BuildingLine(
-        name=name,
-        levels=tuple(each.level_words(name) for each in both),
-        broken=tuple(max(each.broken_panes for each in own) for own in facades),
-        panes=first.panes,
-        conditions=tuple(max(each.worst_condition for each in own).words for own in facades),
-        failed=tuple(
-            max(sum(level >= DamageLevel.HAZARDOUS for level in each.walls.levels) for each in own)
-            for own in facades
-        ),
-        panels=len(first.walled),
-        damages=tuple(max(each.worst_damage for each in own).name.lower() for own in facades),
-    )
-
-
-def _glazing(study: Study) -> Iterator[OtherGlass]:
-    """Yield the verdicts with other glass, if any building has panes."""
-    if not any(each.facade.panes for each in study.protected.responses):
-        return
-    for name, glazing in other_glazing(study.scenario).items():
-        protected, unprotected = (
-            each.with_glazing(glazing).passes(study.target)
-            for each in (study.protected, study.unprotected)
-        )
-        yield OtherGlass(glazing.title, _price(study, name), protected, unprotected)
 
 
 def _price(study: Study, glazing: str) -> float | None:

@@ -10,7 +10,7 @@ from blast_env.report.outcomes import Limit
 from blast_env.report.page import report_html
 from blast_env.report.peaks import CountedPeak, PeakSource, counted_peak
 from blast_env.report.study import Study
-from blast_env.report.verdict import verdict_of
+from blast_env.report.verdict import StudyVerdict
 from blast_env.response.facade import peak_factor
 from tests.gas_sites import WALL, hut
 
@@ -43,7 +43,7 @@ def test_out_of_sight_the_peak_is_extrapolated_from_the_cells(
 
 
 def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(study: Study) -> None:
-    pair = study.pair(study.targets[0], study.threats[0], 0.25)
+    pair = study.fine[0]
     unprotected = pair.unprotected
     assert unprotected.counted.source is PeakSource.CURVE
     limit = Limit("hut", peak_pa=0.5 * (unprotected.peak_pa + unprotected.counted.pa))
@@ -51,4 +51,4 @@ def test_a_report_fails_a_limit_between_the_clipped_peak_and_the_counted_one(stu
     assert not limit.is_kept(unprotected)
     words = f"(Kingery-Bulmash reflected; gas {unprotected.peak_pa / 1e3:.0f})"
     assert words in report_html(study, ["blast-env"])
-    assert [each.pair for each in verdict_of(study).limits] == [pair]
+    assert [each for _, each in StudyVerdict(study).limits] == [pair]

@@ -29,7 +29,7 @@ from blast_env.report.loads import MeasuredBlast, measure, targets_of
 from blast_env.report.page import report_html
 from blast_env.report.study import Runs, blasts_of
 from blast_env.report.threats import other_places
-from blast_env.report.verdict import verdict_of
+from blast_env.report.verdict import StudyVerdict
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario, save_scenario
@@ -76,7 +76,8 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     (threat,), (target,) = study.threats, study.targets
     result = blast_env.simulate(glazed_hut(), LAYOUT, engine="gas")
     (row,) = result.structures.to_dict("records")
-    pair = study.pair(target, threat, 0.5)
+    pair = next(each for each in study.pairs if each.cells == 0.5)
+    assert (pair.target, pair.threat) == (target, threat)
     assert pair.protected.impulse_pa_s == pytest.approx(row["impulse_pa_s"])
     assert pair.protected.peak_pa == row["peak_pa"]
     assert pair.protected.arrival_s == row["arrival_s"]
@@ -85,13 +86,12 @@ def test_loads_are_those_of_the_blast(study: Study, measured: MeasuredBlast) -> 
     assert pair.protected == measured.loads["hut"]
     assert 0.1 < pair.reduction < 0.5
     assert {each.cells for each in study.pairs} == {0.5, 0.25}
-    fine = study.pair(target, threat, 0.25)
-    errors = study.errors(fine)
-    assert study.grid_error == errors.reduction
-    assert errors.reduction == pytest.approx(convergence_index(fine.reduction, pair.reduction))
+    (fine,) = study.fine
+    assert study.grid_error == fine.reduction_error
+    assert fine.reduction_error == pytest.approx(convergence_index(fine.reduction, pair.reduction))
     both = (each.protected.impulse_pa_s for each in (fine, pair))
-    assert errors.walled_pa_s == pytest.approx(convergence_index(*both))
-    assert np.isnan(study.errors(pair).reduction)  # of the coarser cells there is none
+    assert fine.protected_error_pa_s == pytest.approx(convergence_index(*both))
+    assert np.isnan(pair.reduction_error)  # of the coarser cells there is none
     digests = dict(study.digests)
     assert digests["T1 with the layout, cells of 0.5 m"] == result.digest
 
@@ -161,10 +161,13 @@ def test_page_needs_nothing_else(page: str) -> None:
 
 
 def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: str) -> None:
-    fine = study.pair(study.targets[0], study.threats[0], 0.25)
-    pm, errors = "\N{PLUS-MINUS SIGN}", study.errors(fine)
-    assert f"<td>{fine.unprotected.impulse_pa_s:.0f} {pm} {errors.bare_pa_s:.1f}</td>" in page
-    assert f"<td>{100 * fine.reduction:.1f} % {pm} {100 * errors.reduction:.1f}</td>" in page
+    fine = study.fine[0]
+    pm = "\N{PLUS-MINUS SIGN}"
+    assert (
+        f"<td>{fine.unprotected.impulse_pa_s:.0f} {pm} {fine.unprotected_error_pa_s:.1f}</td>"
+        in page
+    )
+    assert f"<td>{100 * fine.reduction:.1f} % {pm} {100 * fine.reduction_error:.1f}</td>" in page
     assert small_hut().content_hash in page
     assert "<code>blast-env report &#34;a site.toml&#34;</code>" in page
     assert "&#34;cells&#34;: [[1, 0], [2, 0], [3, 0], [4, 0]]" in page
@@ -188,7 +191,7 @@ def test_page_has_the_numbers_and_all_it_takes_to_repeat_it(study: Study, page: 
 
 
 def test_limits_are_passed_or_failed(study: Study, page: str) -> None:
-    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    fine = study.fine[0]
     assert fine.protected.wall_impulse_pa_s < 300.0 < fine.unprotected.wall_impulse_pa_s
     whole, *limits = re.findall(r'<span class="(\w+)">([^<]+)</span>', page)
     assert fine.unprotected.flagged  # 6.8 cells per m/kg^(1/3)
@@ -205,7 +208,7 @@ def test_other_units_and_loads_within_what_was_checked(study: Study, page: str) 
     assert "outside the validated range of the engine" in page
     other = replace(study, notes=(), options=replace(study.options, units=UNITS["psi"]))
     changed = report_html(other, ["blast-env"])
-    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    fine = study.fine[0]
     assert f"<td>{fine.unprotected.impulse_pa_s / 6.894757:.1f} \N{PLUS-MINUS SIGN} " in changed
     assert f"<td>{fine.unprotected.peak_pa / 6894.757:.1f}</td>" in changed
     assert "Impulses in psi·ms, overpressures in psi" in changed
@@ -284,14 +287,13 @@ def test_engines_of_both_sizes_are_gas() -> None:
 
 
 def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: str) -> None:
-    verdict = verdict_of(study)
-    (line,) = verdict.buildings
-    assert line.levels[0] <= line.levels[1]
-    assert (line.panes, line.panels) == (8, 4)
-    assert verdict.passes == (study.protected.passes(study.target) and verdict.limits[0].kept)
+    verdict = StudyVerdict(study)
+    ((_, behind),) = verdict.buildings.values()
+    assert (behind.panes, behind.panels) == (8, 4)
+    assert verdict.passes == (study.protected.passes(study.target) and verdict.kept(1) == 1)
     first = page[page.index("<h3>Verdict") : page.index("<h2>")]
     assert f">{verdict.word}<" in first
-    assert f"<td>{line.broken[1]:.1f} of 8</td>" in first
+    assert f"<td>{behind.broken:.1f} of 8</td>" in first
     assert '<td class="l">4, for 4 modules</td>' in first
     assert f"level {study.target.label!r}".replace("'", "&#39;") in first
     assert "driven by" in first
@@ -305,7 +307,7 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
 
 def test_page_one_has_the_verdict_in_the_words_of_the_field(study: Study) -> None:
     harsh = replace(study.options, limits=(Limit("hut", impulse_pa_s=1.0),))
-    verdict = verdict_of(replace(study, options=replace(harsh, target=LevelOfProtection.HIGH)))
+    verdict = StudyVerdict(replace(study, options=replace(harsh, target=LevelOfProtection.HIGH)))
     assert verdict.word == "DOES NOT COMPLY"
     assert verdict.words == "level of protection below High; 1 load limit exceeded (threat T1)"
 
@@ -351,9 +353,9 @@ def test_a_barrier_that_adds_load_is_named(study: Study) -> None:
 
 def test_a_stricter_target_fails_and_limits_count_as_well(study: Study) -> None:
     strict = replace(study, options=replace(study.options, target=LevelOfProtection.HIGH))
-    assert verdict_of(strict).passes is False
+    assert StudyVerdict(strict).passes is False
     harsh = replace(study.options, limits=(Limit("hut", impulse_pa_s=1.0),))
-    assert verdict_of(replace(study, options=harsh)).passes is False
+    assert StudyVerdict(replace(study, options=harsh)).passes is False
 
 
 def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) -> None:
@@ -362,7 +364,7 @@ def test_without_facades_and_limits_there_is_no_verdict_but_loads(study: Study) 
     unprotected = replace(
         study, unprotected=empty, protected=empty, walled_coarse=empty, options=options
     )
-    assert verdict_of(unprotected).word == "NO VERDICT"
+    assert StudyVerdict(unprotected).word == "NO VERDICT"
     page = report_html(unprotected, ["blast-env"])
     assert "no building has a facade" in page
     assert "Loads of the protected buildings" in page
@@ -373,7 +375,7 @@ def test_every_number_of_the_verdict_names_its_blast(study: Study, page: str) ->
     digests = dict(study.digests)
     for words in ("without a barrier", "with the layout"):
         assert digests[f"T1 {words}, cells of 0.25 m"][:16] in table
-    fine = study.pair(study.targets[0], study.threats[0], 0.25)
+    fine = study.fine[0]
     assert f"{fine.protected.impulse_pa_s:.0f} Pa\N{MIDDLE DOT}s" in table.replace(" Pa s", " Pa·s")
     assert "bill of quantities" in table
 
@@ -443,7 +445,7 @@ def test_other_glass_has_the_price_of_the_measures_that_put_it_into_all_windows(
     def price(*measures: Hardening, taken: tuple[Measure, ...] = ()) -> float | None:
         zone = study.scenario.zone.model_copy(update={"hardening": measures})
         site = study.scenario.model_copy(update={"build_zone": zone})
-        verdict = verdict_of(replace(study, scenario=site, layout=(*LAYOUT, *taken)))
+        verdict = StudyVerdict(replace(study, scenario=site, layout=(*LAYOUT, *taken)))
         title = catalogue()[glass].title
         return next(each.cost for each in verdict.glazing if each.title == title)
 
