@@ -47,19 +47,7 @@ def print_assessment(
     without_fallen: bool,
     cache: Path | None,
 ) -> Assessed:
-    """Run the blasts, and print the verdict.
-
-    Args:
-        scenario: The scenario.
-        layouts: The layouts by name: no barrier, and perhaps the one to judge.
-        charges: The charges.
-        engine: Gas dynamics.
-        target: Required level of protection.
-        required: Further requirements.
-        mass_error: Uncertainty of the masses; see `Uncertainty`.
-        without_fallen: Whether pieces that overturn are removed, and the blasts run again.
-        cache: Folder of stored blasts, not used for those without fallen pieces.
-    """
+    """Run the blasts, print the verdict, and write the files that are asked for."""
     print_line(engine.describe([scenario]))
     asked = [(engine, each) for each in charges] + [(engine.coarser, charges[0])]
     print_cost((each, scenario, charge) for each, charge in asked for _ in layouts)

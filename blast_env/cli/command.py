@@ -26,11 +26,7 @@ _TARGETS: Final = "blast_env.targets"
 def writes(words: str, *suffixes: str, default: Any = None, panel: str | None = None) -> Any:
     """Return an option that names a file or folder to write.
 
-    Args:
-        words: Its help, without the suffixes.
-        suffixes: The allowed suffixes of a file; none for a folder.
-        default: Its default; `...` if it is required.
-        panel: Heading under which help shows it.
+    Its help is `words` with the allowed suffixes of a file; without any it is a folder.
     """
     shown = f"{words}: {', '.join(suffixes)}." if suffixes else f"{words}."
     callback = checked_first(*suffixes)

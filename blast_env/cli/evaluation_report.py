@@ -80,14 +80,7 @@ class EvaluateOptions:
         return threats if engine.has_noise else one_of_each_charge(threats)
 
     def prepare_files(self, layouts: int) -> None:
-        """Check the targets before the blasts, so that no result is lost.
-
-        Args:
-            layouts: Number of layouts to write.
-
-        Raises:
-            BlastEnvError: If `out` cannot be a folder, or `export` cannot be written.
-        """
+        """Check the targets for some layouts before the blasts, so that no result is lost."""
         if self.export is not None:
             check_target(self.export, layouts)
         if self.out is not None:
@@ -112,10 +105,7 @@ def interval(estimate: Estimate) -> str:
 def share_text(estimate: Estimate, error: float = nan, sampled: str = "charges") -> str:
     """Return a share with its errors: `48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)`.
 
-    Args:
-        estimate: The share with its 95 % interval.
-        error: Its error of the cells; NaN for none.
-        sampled: The samples of the interval.
+    `sampled` names the samples of its interval.
     """
     half = points(estimate.value - estimate.low)
     return with_errors(percent(estimate.value), points(error), half and f"{half} (95 %, {sampled})")
@@ -146,10 +136,7 @@ def print_if_all_charges(
 ) -> None:
     """Print a note if charges include all possible ones of a scenario, which are fixed.
 
-    Args:
-        scenario: The scenario.
-        charges: The charges.
-        training: Words on their part in a training.
+    `training` has words on their part in a training.
     """
     count = len(fixed_charges(scenario))
     if count > 1 and are_all(scenario, charges):
@@ -339,13 +326,7 @@ def _objective_text(objective: ObjectiveSection) -> str:
 def print_means(
     comparison: Evaluation, objective: ObjectiveSection, sampled: str = "charges"
 ) -> None:
-    """Print the reduction, and the mean loads without and with barrier.
-
-    Args:
-        comparison: The loads.
-        objective: Their quantity and unit.
-        sampled: The samples of the intervals.
-    """
+    """Print the reduction, and the mean loads without and with barrier."""
     reduction = share_text(comparison.reduction, comparison.reduction_error, sampled)
     words = worse(comparison.reduction.value)
     print_line(f"protected structures, by weight: mean reduction {reduction}{words}")

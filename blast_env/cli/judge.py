@@ -139,11 +139,7 @@ def _definitions(
     threat: str,
     cases: int,
 ) -> Mapping[str, Definition]:
-    """Return the problems of the methods by name: those named, secret ones, or of your own sites.
-
-    Raises:
-        BlastEnvError: If several kinds of them are given.
-    """
+    """Return the problems of the methods by name: those named, secret, or of your own sites."""
     asked = {"--problem": problems, "--secret": secret, "--scenario": scenarios}
     given = [name for name, each in asked.items() if each]
     if len(given) > 1:

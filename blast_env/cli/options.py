@@ -127,11 +127,7 @@ JsonAllOption = Annotated[
 
 
 def any_json(as_json: bool, json_all: bool) -> bool:
-    """Return whether the result is printed as JSON.
-
-    Raises:
-        BlastEnvError: If the short and the complete form are both given.
-    """
+    """Return whether the result is printed as JSON, short or complete; refuse both at once."""
     if as_json and json_all:
         raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
     return as_json or json_all
@@ -163,13 +159,9 @@ _COUNTS: Final = MappingProxyType({2: "two", 3: "three", 4: "four"})
 
 
 def numbers(option: str, text: str, form: str) -> tuple[Any, ...]:
-    """Return the numbers of a text with commas.
+    """Return the numbers of a text with commas, as in a form such as `X,Y[,KG]`.
 
-    Args:
-        option: The option, for the error.
-        text: Its value.
-        form: The form of its value, such as `X,Y[,KG]`: brackets enclose a number that may be left
-            out.
+    Brackets enclose a number that may be left out.
 
     Raises:
         BlastEnvError: If the text has another form.
@@ -185,16 +177,7 @@ def numbers(option: str, text: str, form: str) -> tuple[Any, ...]:
 
 
 def refuse_given(context: typer.Context, names: Collection[str], reason: str) -> None:
-    """Refuse options on the command line that do not apply.
-
-    Args:
-        context: The context of the command.
-        names: The parameters of these options.
-        reason: The reason, after the option in the error.
-
-    Raises:
-        BlastEnvError: If one of them was given.
-    """
+    """Refuse options on the command line that do not apply, with the reason."""
     for parameter in context.command.params:
         name = parameter.name or ""
         source = context.get_parameter_source(name)
@@ -205,16 +188,7 @@ def refuse_given(context: typer.Context, names: Collection[str], reason: str) ->
 def wanted_level(
     label: str | None, scenario: Scenario, otherwise: LevelOfProtection
 ) -> LevelOfProtection:
-    """Return the requested level of protection, else the scenario's target.
-
-    Args:
-        label: Label of the requested level, if any.
-        scenario: Its objective may have a target.
-        otherwise: The level if it has none.
-
-    Raises:
-        UnknownNameError: If there is no such level.
-    """
+    """Return the requested level of protection, else the scenario's target, else another one."""
     if label is not None:
         return LevelOfProtection.named(label)
     target = scenario.objective.level
@@ -235,11 +209,7 @@ class GivenCharge:
 
     @classmethod
     def of(cls, charge: str | None, tnt_kg: float | None) -> "GivenCharge":
-        """Return the charge of the options `--charge` and `--tnt-kg`.
-
-        Raises:
-            BlastEnvError: If the charge has another form, or the mass is given twice.
-        """
+        """Return the charge of the options `--charge` and `--tnt-kg`; refuse two masses."""
         if charge is None:
             return cls(None, tnt_kg)
         x_m, y_m, *own_kg = numbers("--charge", charge, CHARGE)
@@ -251,14 +221,9 @@ class GivenCharge:
         return cls((x_m, y_m), own_kg[0] if own_kg else tnt_kg)
 
     def fixed(self, scenario: Scenario, drawn: AnyCharge) -> AnyCharge:
-        """Return a charge with the given place and mass, if any.
+        """Return a charge drawn from a scenario with the given place and mass, if any.
 
-        Args:
-            scenario: The scenario.
-            drawn: The charge drawn without them; with a given place, it is in no vehicle.
-
-        Raises:
-            ScenarioError: If it is out of bounds, or not clear of a structure or the border.
+        With a given place it is in no vehicle. One that is out of bounds or not clear is refused.
         """
         options = ResetOptions(charge_position_m=self.place_m, tnt_kg=self.mass_kg)
         if not options.fix_charge:
@@ -269,11 +234,6 @@ class GivenCharge:
         return charge
 
     def fixed_charges(self, scenario: Scenario, draws: int) -> list[AnyCharge]:
-        """Return the drawn charges, each place once, with the given place and mass.
-
-        Args:
-            scenario: The scenario.
-            draws: Number of draws.
-        """
+        """Return the drawn charges, each place once, with the given place and mass."""
         threats = one_of_each_charge(draw_threats(scenario, range(draws)))
         return list(dict.fromkeys(self.fixed(scenario, threat.charge) for threat in threats))

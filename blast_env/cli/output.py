@@ -72,11 +72,7 @@ def _plain(**options: Any) -> Console:
 
 
 class InterruptedCommandError(Exception):
-    """A command was interrupted after it had written a part of its result.
-
-    Args:
-        parts: Sentences on the results kept and the way to resume.
-    """
+    """A command was interrupted after a part of its result; sentences on it and the way on."""
 
     def __init__(self, *parts: str) -> None:
         self.parts = parts
@@ -108,11 +104,7 @@ def user_errors() -> Iterator[None]:
 
 @contextmanager
 def resumable(words: str | Callable[[], str]) -> Iterator[None]:
-    """End an interruption of the block with the way to resume.
-
-    Args:
-        words: The way to resume, or a function that returns it; empty if there is none.
-    """
+    """End an interruption of the block with the way to resume, if there is one."""
     try:
         yield
     except KeyboardInterrupt as interruption:
@@ -149,15 +141,7 @@ def print_json(content: Mapping[str, object]) -> None:
 
 
 def save_figures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Path]:
-    """Draw and save the figures that have a path; return their files.
-
-    Args:
-        asked: Path of each figure, and the function that draws it.
-
-    Raises:
-        MissingExtraError: If the extra `render` is not installed.
-        BlastEnvError: If a file cannot be written.
-    """
+    """Draw and save the figures that have a path; return their files."""
     figures = [(path, draw()) for path, draw in asked if path is not None]
     if not figures:
         return []
@@ -177,11 +161,7 @@ def save_pictures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Pa
 
 
 def layout_picture(scenario: Scenario, layout: Sequence[Element]) -> "Figure":
-    """Draw the plan and the oblique view of a layout on its site.
-
-    Raises:
-        MissingExtraError: If the extra `render` is not installed.
-    """
+    """Draw the plan and the oblique view of a layout on its site."""
     # Here, because pictures need the extra `render`.
     from blast_env.plots.site_picture import site_picture
 
@@ -193,9 +173,6 @@ def progress_bar(label: str) -> Iterator[Callable[..., None]]:
     """Show a progress bar on standard error, and remove it at the end of the work.
 
     If standard error is no terminal, as in a log file, print a line every half minute instead.
-
-    Args:
-        label: The current work.
 
     Yields:
         A function to call with the completed share, 0 to 1, and perhaps words on the state.
@@ -212,11 +189,7 @@ def progress_bar(label: str) -> Iterator[Callable[..., None]]:
 
 
 def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> None:
-    """Print the cost of blasts before they start, if it can be estimated.
-
-    Args:
-        asked: Engine, scenario and charge of each blast; without an engine there is none.
-    """
+    """Print the cost of blasts before they start, if it can be estimated."""
     known: dict[Any, CostGuess | None] = {}
     costs = []
     for engine, scenario, charge in asked:

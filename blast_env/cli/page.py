@@ -49,11 +49,7 @@ def page(
 
 
 def check_run(folder: Path) -> None:
-    """Refuse a folder that is no run, before anything is started.
-
-    Raises:
-        BlastEnvError: If it is no run folder.
-    """
+    """Refuse a folder that is no run, before anything is started."""
     from blast_agents.training.run_folder import RunFolder  # here, because it imports torch
 
     RunFolder(folder).configuration()

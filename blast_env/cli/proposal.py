@@ -107,11 +107,7 @@ def _write(scenario: Scenario, layout: Layout, source: Mapping[str, str], out: P
 def verify_proposal(
     problem: DesignProblem, layout: Layout, budget: int | None, cells: str | None
 ) -> None:
-    """Compare a proposal by gas dynamics with no barrier and the rules, within the budget.
-
-    Raises:
-        BlastEnvError: If the budget is below 2 blasts.
-    """
+    """Compare a proposal by gas dynamics with no barrier and the rules, within the budget."""
     if budget is not None and budget < 2:
         raise BlastEnvError(f"--budget is {budget}, must be at least 2 with --verify")
     case, rules = problem.case, layouts_by_rule(problem.scenario, problem.known_charge)

@@ -146,11 +146,7 @@ def _study_options(scenario: Scenario, values: Mapping[str, Any]) -> "StudyOptio
 
 
 def _charge(given: str, scenario: Scenario) -> Charge:
-    """Return the charge of an option.
-
-    Raises:
-        BlastEnvError: If it has no mass, and the scenario's sources have different ones.
-    """
+    """Return the charge of an option; without a mass, the one of the scenario's sources."""
     masses_kg = sorted({source.tnt_kg for source in scenario.charge})
     x_m, y_m, *own_kg = numbers("--charge", given, CHARGE)
     if not own_kg and len(masses_kg) > 1:
@@ -163,11 +159,7 @@ def _charge(given: str, scenario: Scenario) -> Charge:
 
 
 def _cells(text: str) -> Cells:
-    """Return the cells of a text: a side, m, or the name of growing cells.
-
-    Raises:
-        BlastEnvError: If it is neither.
-    """
+    """Return the cells of a text: a side, m, or the name of growing cells."""
     with suppress(BlastEnvError):
         return plain_number("--cells", text)
     growing = [each for each in CELLS if each != UNIFORM]

@@ -39,16 +39,7 @@ def print_screening(
     engine: Engine | None,
     picture: Path | None,
 ) -> None:
-    """Print the level of protection of each facade, and the stand-off that each level needs.
-
-    Args:
-        scenario: The scenario.
-        layout: The layout.
-        masses: Charges in the place of the site's own, as `NamedMass.parsed` has them.
-        required: Requirements; else the scenario's level, else a low one.
-        engine: Gas dynamics, to compare each worst place with; `None` for no blast.
-        picture: Path of the plan with the stand-offs as rings.
-    """
+    """Print the level of protection of each facade, and the stand-off that each level needs."""
     level = scenario.objective.level or LevelOfProtection.LOW
     required = required or [Requirement.of_level(level)]
     named = [NamedMass.parsed(each) for each in masses]

@@ -31,13 +31,7 @@ def checked_targets(targets: Sequence[Target]) -> Iterator[None]:
     """Refuse unusable targets before the block, and remove new empty folders after it.
 
     So no result is lost because it cannot be written, and a command that fails or is interrupted
-    leaves no empty folders.
-
-    Args:
-        targets: The files and folders, with their options; folders need not exist.
-
-    Raises:
-        BlastEnvError: If a file or folder cannot be written, or two options name one file.
+    leaves no empty folders. Two options may not name one file.
     """
     known: dict[Path, str] = {}
     for option, path, suffixes in targets:

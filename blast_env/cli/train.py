@@ -156,16 +156,7 @@ def _train(
     set_to: Sequence[str],
     envs: int | None,
 ) -> "TrainingResult":
-    """Train in a new run folder.
-
-    Args:
-        run: The folder.
-        algorithm: Name of the algorithm.
-        scenario: The scenario, or the name of a family of sites.
-        given: Settings of the run other than the defaults.
-        set_to: Changes of hyperparameters and settings, `key=value`.
-        envs: Number of environments; `None` for the default.
-    """
+    """Train in a new run folder, with settings and changes other than the defaults."""
     # Here, because torch takes seconds to start, and is an extra.
     with import_extra("agents,render", "training"):
         from blast_agents.training import load_hyperparameters, train

@@ -123,9 +123,7 @@ class Ladder:
     def charge_at(self, severity: float, nearer: bool) -> Charge:
         """Return the charge that is as severe as a multiple of the mass at the same place.
 
-        Args:
-            severity: The multiple.
-            nearer: Whether its distance changes in place of its mass, to the same scaled distance.
+        With `nearer` its distance changes in place of its mass, to the same scaled distance.
         """
         if not nearer:
             return self.charge._replace(tnt_kg=self.charge.tnt_kg * severity)
@@ -138,9 +136,7 @@ class Ladder:
     def edge(self, level: LevelOfProtection, nearer: bool = False) -> Edge:
         """Return the most severe charge on the ladder that keeps a level.
 
-        Args:
-            level: The level.
-            nearer: Whether distances change in place of masses.
+        With `nearer` distances change in place of masses.
         """
 
         def keeps(number: int) -> bool | None:
@@ -174,13 +170,7 @@ class Ladder:
     def curve(
         self, level: LevelOfProtection, uncertainty: Uncertainty, draws: int = CURVE_DRAWS
     ) -> list[tuple[float, float]]:
-        """Return masses and the probability of a level, over all masses with blasts so far.
-
-        Args:
-            level: The level.
-            uncertainty: The uncertain quantities.
-            draws: Draws for each point.
-        """
+        """Return masses and the probability of a level, over all masses with blasts so far."""
         points = []
         for nearer, number in sorted(key for key, each in self._blasts.items() if each is not None):
             for share in () if nearer else _SHARES:

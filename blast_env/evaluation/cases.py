@@ -55,12 +55,7 @@ class LoadCase:
     source: int = field(default=-1, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Convert the values to plain Python numbers, so that they can be hashed and written.
-
-        Raises:
-            BlastEnvError: If the seed is not an integer of at least 0, or the charge is not a
-                pair of coordinates and a mass.
-        """
+        """Convert the values to plain Python numbers, so that they can be hashed and written."""
         object.__setattr__(self, "seed", checked_seed(self.seed, "seed"))
         if isinstance(self.charge, VehicleCharge):
             return
@@ -83,12 +78,8 @@ class LoadCase:
 def draw_threats(scenario: AnyScenario, seeds: Iterable[int]) -> tuple[LoadCase, ...]:
     """Return one threat per seed, its charge drawn from the scenario as in `simulate`.
 
-    If several seeds draw the same vehicle, the first has its charge at the worst place, the next
-    at the second worst, and so on.
-
-    Args:
-        scenario: The scenario, or its bundled name or path.
-        seeds: At least one, without repetition; each is also the seed of its blast.
+    If several seeds draw the same vehicle, the first has its charge at the worst place, the next at
+    the second worst, and so on.
 
     Raises:
         BlastEnvError: If there are no seeds, or one is repeated, negative or no integer.
@@ -121,10 +112,6 @@ def in_turn(scenario: AnyScenario, threats: Sequence[LoadCase]) -> tuple[LoadCas
 
     Their order is drawn by the seed of the first threat. Weights of the sources do not count.
     Threats of a scenario whose charges are not all fixed are returned unchanged.
-
-    Args:
-        scenario: The scenario, or its bundled name or path.
-        threats: Threats drawn from it, at least one.
     """
     charges = fixed_charges(scenario)
     if not charges:
@@ -162,15 +149,7 @@ class SeedRange(Enum):
     """Choice of the best weights of a training."""
 
     def seeds(self, first: int, count: int) -> range:
-        """Return consecutive seeds of the range.
-
-        Args:
-            first: Index of the first one, from the start of the range.
-            count: Number of seeds.
-
-        Raises:
-            BlastEnvError: If `count` is below 1, or they are not all in the range.
-        """
+        """Return consecutive seeds of the range, from an index on; refuse those beyond its ends."""
         if first < 0 or count < 1 or first + count > len(self.value):
             raise BlastEnvError(
                 f"seeds {first} to {first + count - 1} of {self.name.lower()}: must be at least "
@@ -272,9 +251,7 @@ class LoadCaseSet:
     ) -> float:
         """Return the objective value of a layout, which may include its cost.
 
-        Args:
-            loads: The load under each threat, in the unit of the objective, as for `combined`.
-            layout: The layout.
+        The loads are those under each threat, in the unit of the objective, as for `combined`.
         """
         objective, combined = self.scenario.objective, self.combined(loads)
         if objective.target is None:
@@ -302,15 +279,7 @@ def known_search_set(
 ) -> LoadCaseSet:
     """Return the case for the blasts of a search with a known charge.
 
-    Args:
-        scenario: The scenario, or its bundled name or path.
-        charge: The charge.
-        realisations: Number of realisations of fan and air, at least 1.
-        seed: Draws the seeds of the blasts, and seeds the search.
-        risk: Same as for `LoadCaseSet`.
-
-    Raises:
-        BlastEnvError: If `realisations` is below 1.
+    The seed draws the seeds of the blasts, and seeds the search.
     """
     _at_least_one("realisations", realisations)
     drawn = SeedRange.SEARCH.draw_distinct(generator(seed), realisations)
@@ -322,20 +291,9 @@ def hidden_search_set(
 ) -> LoadCaseSet:
     """Return the case for the blasts of a search with a hidden charge.
 
-    Args:
-        scenario: The scenario, or its bundled name or path; it defines the possible charges.
-        charges: Number of charges, at least 1.
-        realisations: Number of realisations of fan and air for each charge, at least 1.
-        seed: Draws the charges and the seeds of the blasts, and seeds the search.
-        risk: Same as for `LoadCaseSet`.
-
-    Returns:
-        A case in which the charges of vehicles come first, by rank. The most central of the other
-        charges follows, then each as far as possible from those before it, so that the first few
-        represent all.
-
-    Raises:
-        BlastEnvError: If `charges` or `realisations` is below 1.
+    The seed draws the charges and the seeds of the blasts, and seeds the search. The charges of
+    vehicles come first, by rank, then the most central of the others, then each as far as possible
+    from those before it, so that the first few represent all.
     """
     _at_least_one("charges", charges)
     _at_least_one("realisations", realisations)

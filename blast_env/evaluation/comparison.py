@@ -228,15 +228,7 @@ def charge_values(charge: Charge) -> dict[str, object]:
 
 
 def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
-    """Refuse a case in which there is nothing to reduce.
-
-    Args:
-        cases: The cases.
-        unprotected: Load on the protected structures without a barrier (cases, threats).
-
-    Raises:
-        BlastEnvError: If it is 0 under every threat of a case, which the message names.
-    """
+    """Refuse a case whose load without a barrier is 0 under every threat (cases, threats)."""
     for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
         if not mean > 0.0:
             raise BlastEnvError(
@@ -394,8 +386,7 @@ class Evaluation:
     def difference(self, other: "Evaluation") -> Estimate:
         """Return the difference in mean reduction from another, with its paired interval.
 
-        Args:
-            other: Other layouts on the same cases.
+        The other one has other layouts on the same cases.
         """
         if self.has_one_case and self._is_mean:
             # The reduction of the load without a barrier if it fell by the difference of loads.
@@ -648,14 +639,7 @@ class Evaluation:
         }
 
     def to_json(self, path: str | Path) -> Path:
-        """Write `to_dict` to a file.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there; nothing is left behind then.
-        """
+        """Write `to_dict` to a file, whole or not at all; return its path."""
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
         with write_atomically(path) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")

@@ -98,11 +98,7 @@ class Verdict(IntEnum):
         return cls.PASSES if passes else cls.PASSES_BARELY if on_cells else cls.FAILS
 
     def word(self, flagged: bool = False) -> str:
-        """Return the word for the verdict, which marks a pass with notes as flagged.
-
-        Args:
-            flagged: Whether there is a note on the loads or walls.
-        """
+        """Return the word for the verdict; a pass with notes on loads or walls is flagged."""
         if self is not Verdict.PASSES:
             return "DOES NOT COMPLY"
         return "COMPLIES (flagged)" if flagged else "COMPLIES"
@@ -382,11 +378,7 @@ class Consequences:
         )
 
     def worst_damage(self, scenario: Scenario) -> float:
-        """Return the worst damage of the protected buildings in the objective, from 0 to 5.
-
-        Args:
-            scenario: Defines the protected structures and the measure of the objective.
-        """
+        """Return the worst damage of the protected buildings in the objective, from 0 to 5."""
         names = {each.building_name for each in scenario.structures if each.protected}
         own = [each.facade for each in self.responses if each.building in names]
         if scenario.objective.measure == "glazing":
@@ -398,11 +390,7 @@ class Consequences:
         return all(self.level_on_cells(building) >= target for building in self.buildings)
 
     def doubt(self, target: LevelOfProtection) -> str:
-        """Explain a failure that is due to sharper peaks alone; empty if there is none.
-
-        Args:
-            target: The required level of the buildings.
-        """
+        """Explain a failure that is due to sharper peaks alone; empty if there is none."""
         return _CLIPPED if self.verdict(target) is Verdict.PASSES_BARELY else ""
 
     @property
@@ -441,11 +429,7 @@ class Consequences:
         return f"level of protection {side} {target.title}"
 
     def with_glazing(self, glazing: Glazing) -> "Consequences":
-        """Return the consequences with other glass in all windows of the same sizes and sills.
-
-        Args:
-            glazing: The component that provides the glass.
-        """
+        """Return the consequences with other glass in all windows of the same sizes and sills."""
         return replace(
             self,
             responses=tuple(
@@ -492,11 +476,7 @@ BAY_CASE_COLUMNS: Final = (*CASE_COLUMNS, *LOADED_BAY_COLUMNS)
 
 
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row per layout, charge and bay; see `BAY_CASE_COLUMNS`.
-
-    Args:
-        found: The consequences by the name of the layout.
-    """
+    """Return one row per layout (by its name), charge and bay; see `BAY_CASE_COLUMNS`."""
     rows = [
         {"layout": name}
         | charge_values(each.charge)
@@ -511,11 +491,7 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
 
 
 def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row per layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`.
-
-    Args:
-        found: The consequences by the name of the layout.
-    """
+    """Return one row per layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`."""
     rows: list[dict[Any, Any]] = [
         {"layout": name, **charge_values(each.charge), **row}
         for name, judged in found.items()
@@ -536,14 +512,8 @@ def consequences(
 ) -> Consequences:
     """Run one blast per charge and return the consequences for the buildings behind a layout.
 
-    Args:
-        scenario: The scenario; some of its structures have facades.
-        layout: A legal layout.
-        charges: The charges, or the vehicles that carry them.
-        engine: An engine that computes overpressures.
-        progress: Called with the finished share of the charges.
-        without_fallen: Whether to remove pieces that overturn before the end of a blast and to
-            repeat the blast until no other piece falls.
+    `without_fallen` removes pieces that overturn before the end of a blast, and repeats the blast
+    until no other piece falls.
 
     Raises:
         BlastEnvError: If no structure has a facade, or the engine computes no overpressure or
@@ -572,11 +542,7 @@ def consequences_of(
 ) -> Consequences:
     """Return the consequences of a finished blast for the buildings and the barrier.
 
-    Args:
-        scenario: The scenario.
-        result: The blast.
-        charge: The charge at its place.
-        taken_away: Pieces that were removed for the blast.
+    `taken_away` are the pieces that were removed for the blast.
     """
     responses: list[BuildingResponse] = []
     if result.bay_loads is not None and result.bay_loads.bays:
@@ -643,12 +609,7 @@ def by_building(
 ) -> list[BuildingResponse]:
     """Return the response of each building with a facade to a blast.
 
-    Args:
-        scenario: Groups the structures into buildings.
-        facade: The response of all bays of the site.
-        site: The site with the charge at its place and the barrier.
-        peak_factor: Factor on peaks that corrects their clipping by cells.
-        known: Whether the loads on the bays are known, by bay; empty if not recorded.
+    `known` has whether the loads on bays are known, by bay; it is empty if that was not recorded.
     """
     names = scenario.building_names
     stepped = stepped_buildings(scenario.structures)
@@ -681,13 +642,7 @@ def side_on_impulse_pa_s(reflected_pa_s: FloatArray) -> FloatArray:
 
 
 def neighbours_of(scenario: Scenario, result: "GasResult", charge: Charge) -> list[Neighbour]:
-    """Return the damage of ordinary houses in place of the buildings without a facade.
-
-    Args:
-        scenario: Groups the structures into buildings, and defines their facades.
-        result: The blast.
-        charge: The charge at its place.
-    """
+    """Return the damage of ordinary houses in place of the buildings without a facade."""
     faces = result.on_walls
     walls = faces[faces["face"].isin(WALLS)]
     found = []

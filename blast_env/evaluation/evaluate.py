@@ -172,9 +172,6 @@ def loads_of_both(
     """Yield the loads with the layout of each case and those without a barrier, one per threat.
 
     Consecutive cases on one scenario run together.
-
-    Raises:
-        BlastEnvError: If a threat is repeated, or `processes` is below 1.
     """
     done = 0
     for _, group in groupby(zip(cases, layouts, strict=True), lambda each: id(each[0].scenario)):

@@ -120,16 +120,7 @@ class BlastEvaluator:
         return self
 
     def loads(self, layout: Sequence[Element], threat: LoadCase) -> BlastLoads:
-        """Return the loads of one blast.
-
-        Args:
-            layout: (row, column) of the build-zone cells that hold a barrier module, in any order.
-            threat: The charge and the seed.
-
-        Raises:
-            LayoutError: If the layout does not fit the build zone.
-            ScenarioError: If the charge is not clear of a structure or the border.
-        """
+        """Return the loads of one blast; see `loads_of_many`."""
         return self.loads_of_many([(layout, threat)])[0]
 
     def loads_of_many(
@@ -240,13 +231,7 @@ def run_together(
 ) -> None:
     """Run blasts of evaluators with one engine in one batch and cache their loads.
 
-    Args:
-        asked: Blasts that will be requested; cached ones are not run.
-        processes: Number of worker processes; it changes only the time.
-
-    Raises:
-        LayoutError: If a layout does not fit its build zone; nothing is simulated then.
-        ScenarioError: If a charge is not clear of a structure or the border.
+    Cached ones are not run. Errors are those of `BlastEvaluator.loads_of_many`.
     """
     missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
     for evaluator, layout, threat in asked:
@@ -299,16 +284,7 @@ class Evaluators:
         return None if engine is None else Evaluators(engine, self._store, self.most, self.counts)
 
     def of(self, scenario: AnyScenario) -> BlastEvaluator:
-        """Return the evaluator of a scenario.
-
-        Args:
-            scenario: The scenario, or its bundled name or path.
-
-        Raises:
-            CalibrationError: If the scenario names no calibration, or one that was made with other
-                parameters or another engine.
-            UnknownNameError: If there is no such engine or calibration.
-        """
+        """Return the evaluator of a scenario; see `BlastEvaluator` for errors."""
         newest = next(reversed(self._kept.values()), None)
         if newest is not None and newest.scenario is scenario:
             return newest  # the usual case, without the time for a content hash

@@ -41,12 +41,7 @@ class Severity:
 
     @classmethod
     def of_loads(cls, loads: BlastLoads, objective: ObjectiveSection) -> "Severity":
-        """Return the severity of a blast by the objective of a site.
-
-        Args:
-            loads: Its loads.
-            objective: The objective of the site.
-        """
+        """Return the severity of a blast by the objective of a site."""
         counted = loads.load(objective)
         if not objective.is_response:
             return cls(load=counted)
@@ -65,12 +60,7 @@ class Severity:
 
 
 def governing(found: Iterable[Found], severity: Callable[[Found], Severity]) -> Found:
-    """Return the worst of several, the first one of equals.
-
-    Args:
-        found: At least one.
-        severity: Returns the severity of each.
-    """
+    """Return the worst of several, at least one; the first one of equals."""
     return max(found, key=severity)
 
 

@@ -76,16 +76,7 @@ def final_engine(
 ) -> Engine:
     """Return the engine of final statements on some sites, or the one with the given cells.
 
-    Args:
-        engine: The name; or an engine, which keeps its cells.
-        scenarios: The sites.
-        cell_m: Side of the cells of gas dynamics.
-        until: Loads that a blast of gas dynamics waits for.
-        cells: Growth of the cells of gas dynamics.
-
-    Raises:
-        UnknownNameError: If there is no engine of that name.
-        BlastEnvError: Same as for `find_engine`.
+    An engine in place of a name keeps its cells. Errors are those of `find_engine`.
     """
     found = find_engine(engine, cell_m, until, cells)
     is_given = isinstance(engine, Engine) or cell_m is not None or cells is not None
@@ -107,9 +98,7 @@ class CellErrors:
     def of_reduction(self, load_of: LoadOf, bare_of: LoadOf | None = None) -> float:
         """Return the error of the reduction of a load, as an absolute share; NaN without one.
 
-        Args:
-            load_of: Selects the load.
-            bare_of: Selects that without a barrier, if it is another.
+        `bare_of` selects the load without a barrier, if it is another.
         """
         fine, coarse = (
             reductions(load_of(protected), (bare_of or load_of)(unprotected)).item()
@@ -200,13 +189,8 @@ def grid_error(
 ) -> GridError | None:
     """Return the error of the cells for a layout under a charge; `None` without coarser cells.
 
-    Args:
-        coarser: `BlastEvaluator.coarser()`, which runs the two blasts with the coarse cells.
-        case: The scenario and the objective.
-        layout: The layout.
-        threat: The charge, by convention the one with the largest load behind the layout.
-        fine: Its loads with the layout and without a barrier on the fine cells.
-        processes: Number of worker processes.
+    `coarser` runs the two blasts with the coarse cells. By convention the charge is the one with
+    the largest load behind the layout; `fine` has its loads with the layout and without a barrier.
     """
     if coarser is None:
         return None
@@ -222,13 +206,7 @@ def grid_error(
 
 
 def with_errors(value: str, cells: str = "", sampled: str = "") -> str:
-    """Return a number in words: `48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)`.
-
-    Args:
-        value: The number with its unit.
-        cells: Its error of the cells; empty for none.
-        sampled: Half the width of its 95 % interval, and what it is over: `2.1 (95 %, charges)`.
-    """
+    """Return a number in words: `48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)`."""
     errors = [f"+- {cells} (cells)"] if cells else []
     errors += [f"+- {sampled}"] if sampled else []
     return " ".join([value, ", ".join(errors)]) if errors else value

@@ -26,12 +26,7 @@ class BayPlaces(NamedTuple):
 
 
 def bay_places(site: BlastSite, bays: Sequence[Bay]) -> BayPlaces:
-    """Return the places of bays relative to the charge of a site.
-
-    Args:
-        site: The site with its charge, structures and barrier.
-        bays: The bays.
-    """
+    """Return the places of bays relative to the charge of a site."""
     points, outward = bay_middles({each.name: each.rectangle_m for each in site.structures}, bays)
     charge_m = np.array([*site.charge.position_m, site.charge.height_m])
     distance_m = np.linalg.norm(points - charge_m, axis=1)
@@ -43,9 +38,7 @@ def bay_middles(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the middles of bays on their walls, m, and their outward normals (bays, 3).
 
-    Args:
-        rectangles_m: The rectangle around each structure, by name.
-        bays: The bays.
+    `rectangles_m` has the rectangle around each structure, by name.
     """
     points = np.array([_middle_m(rectangles_m[each.structure], each) for each in bays])
     outward = np.array([(*_outward(each), 0.0) for each in bays])

@@ -72,12 +72,7 @@ class Uncertainty:
 
     @classmethod
     def of(cls, mass: float, error: GridError | None) -> "Uncertainty":
-        """Return the uncertain quantities with those that a study gives.
-
-        Args:
-            mass: As the attribute.
-            error: The error of the cells, if known; its share of the impulse counts.
-        """
+        """Return the uncertain quantities with the error of the cells of the impulse, if known."""
         share = nan if error is None else error.of_load(lambda loads: loads.protected_impulse_pa_s)
         return cls(mass=mass, cells=0.0 if isnan(share) else share)
 
@@ -140,9 +135,7 @@ class LevelProbability:
 def probability_text(value: float, draws: int) -> str:
     """Return a probability as text; at an end, its bound of 95 % confidence.
 
-    Args:
-        value: Share of the draws.
-        draws: Their number; of none, the bound is three of that number.
+    It is a share of some draws; of none, the bound is three of their number.
     """
     bound = 3.0 / draws
     if value >= 1.0:
@@ -161,12 +154,8 @@ def level_probability(
 ) -> LevelProbability:
     """Return the levels of protection in draws of the uncertain quantities.
 
-    Args:
-        judged: The consequences of the charges.
-        uncertainty: The uncertain quantities.
-        draws: Number of draws.
-        seed: Seed of the draws.
-        deciding: Number of bays of each component by damage, by peak and by impulse.
+    `deciding` is the number of bays of each component that are drawn, by damage, by peak and by
+    impulse.
 
     Raises:
         BlastEnvError: If there are no buildings with a facade.

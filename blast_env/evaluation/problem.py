@@ -112,24 +112,14 @@ class DesignProblem:
         return [each.load(self.scenario.objective) for each in loads]
 
     def loads_with(self, layout: Sequence[Element]) -> list[BlastLoads]:
-        """Return the loads with a layout, one per threat.
-
-        Raises:
-            BudgetError: As for `loads`.
-            LayoutError: If the layout does not fit the build zone.
-        """
+        """Return the loads with a layout, one per threat; errors as for `loads`."""
         cells = layout if isinstance(layout, tuple) else tuple(layout)  # may be a CheckedLayout
         pairs = [(cells, threat) for threat in self.threats]
         self.spend(pairs)
         return self.evaluator.loads_of_many(pairs, self.processes)
 
     def assess(self, layout: Sequence[Element]) -> Assessment:
-        """Return the loads and the objective value of a layout, computed once.
-
-        Raises:
-            BudgetError: As for `loads`.
-            LayoutError: If the layout does not fit the build zone.
-        """
+        """Return the loads and the objective value of a layout, computed once."""
         key = tuple(sorted(layout))
         if key not in self._assessed:
             loads = self.loads_with(layout)
@@ -141,12 +131,7 @@ class DesignProblem:
         return self.scenario.objective.reward_value(self.assess(layout).load)
 
     def load(self, layout: Sequence[Element]) -> float:
-        """Return the load of a layout over all threats, in the unit of the objective.
-
-        Raises:
-            BudgetError: As for `loads`.
-            LayoutError: If the layout does not fit the build zone.
-        """
+        """Return the load of a layout over all threats, in the unit of the objective."""
         pairs = [(tuple(layout), threat) for threat in self.threats]
         return self.case.objective_value(self.loads(pairs), layout)
 

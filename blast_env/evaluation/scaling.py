@@ -57,9 +57,7 @@ def _curve(
 def scaled_to(judged: Consequences, charge: Charge) -> Consequences:
     """Return the consequences of another charge for buildings with a facade, without a blast.
 
-    Args:
-        judged: The consequences of one charge.
-        charge: The other one, of another mass or at another place.
+    It may be of another mass or at another place than the one charge of `judged`.
     """
     return Consequences(
         tuple(_scaled(each, charge) for each in judged.responses),

@@ -244,12 +244,7 @@ class Screening:
             yield f"{kind}: {each.name}{mark}", *cells
 
     def needed_m(self, threat: str, requirement: Requirement) -> float:
-        """Return the stand-off at which all components of the site keep a requirement.
-
-        Args:
-            threat: Name of the threat.
-            requirement: The requirement.
-        """
+        """Return the stand-off at which all components of the site keep a requirement."""
         found = next(each for each in self.threats if each.name == threat)
         own = [
             each.distances_m[requirement.level]
@@ -274,12 +269,9 @@ def screen(
 ) -> Screening:
     """Return the response of a site's facades before any blast, and the stand-offs they need.
 
-    Args:
-        scenario: The scenario; some of its structures have facades.
-        layout: A legal layout: its measures and the vehicles it stops count. Its pieces cut lines
-            of sight, but do not shield.
-        threats: Charges that may go off at every place of the site's charges; the site's own
-            charges without any.
+    Measures of the layout and the vehicles it stops count. Its pieces cut lines of sight, but do
+    not shield. Given threats may go off at every place of the site's charges, in the place of
+    these.
 
     Raises:
         BlastEnvError: If no structure has a facade, or two threats have the same name.
@@ -318,10 +310,7 @@ def stand_offs(
 ) -> tuple[StandOff, ...]:
     """Return the stand-off that each component needs for each level of protection.
 
-    Args:
-        components: The components.
-        charge: The charge, at any place.
-        storey_m: Height of a storey, the span of walls.
+    The charge may be at any place. The height of a storey is the span of walls.
     """
     curves = _Curves(charge)
     found = []
@@ -334,11 +323,6 @@ def stand_offs(
 
 def facades_for(scenario: Scenario, glazing: str | None, wall: str | None) -> Scenario:
     """Return a scenario whose protected structures without a facade have one.
-
-    Args:
-        scenario: The scenario.
-        glazing: Name of the component of their windows.
-        wall: Name of the component of their walls.
 
     Raises:
         ScenarioError: If a structure has no height, or a component does not exist or fit.

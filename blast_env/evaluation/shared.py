@@ -62,14 +62,7 @@ def shared_consequences(
 ) -> Consequences:
     """Return `consequences`, with those of blasts in the store of an evaluator; others are kept.
 
-    Args:
-        evaluator: The evaluator of the scenario, with gas dynamics.
-        layout: A legal layout.
-        charges: The charges, or the vehicles that carry them.
-        progress: Called with the finished share of the charges.
-
-    Raises:
-        BlastEnvError: As for `consequences`.
+    The evaluator is that of the scenario, with gas dynamics.
     """
     scenario, parts = evaluator.scenario, []
     for number, charge in enumerate(charges, start=1):
@@ -89,13 +82,9 @@ def shared_consequences(
 def keep_consequences(
     evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge, found: Consequences
 ) -> None:
-    """Keep the consequences of one charge in the store of an evaluator.
+    """Keep the consequences of one charge in the store of an evaluator, as the blast has them.
 
-    Args:
-        evaluator: The evaluator of the scenario, with gas dynamics.
-        layout: The layout, of which no piece was taken away.
-        charge: The charge, or the vehicle that carries it.
-        found: The consequences, as they come from the blast.
+    No piece of the layout was taken away.
     """
     if evaluator.store.has_file:
         evaluator.store.put(_key(evaluator, layout, charge), _encoded(found))

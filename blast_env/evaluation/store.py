@@ -81,15 +81,7 @@ class BlastStore:
 
     @classmethod
     def of(cls, value: "str | Path | BlastStore | None", size: int = 4096) -> "BlastStore":
-        """Return the store for an argument `cache`.
-
-        Args:
-            value: A folder, a store, which is returned, or `None` for loads in memory.
-            size: As for a new store.
-
-        Raises:
-            BlastEnvError: As for a new store, or if the value is of another kind.
-        """
+        """Return the store for an argument `cache`: a folder, a store, or `None`."""
         if isinstance(value, BlastStore):
             return value
         if value is not None and not isinstance(value, str | Path):
@@ -109,10 +101,8 @@ class BlastStore:
     def get(self, key: BlastKey, scenario: AnyScenario | None = None) -> BlastLoads | None:
         """Return the loads of a blast, or `None` if they are missing or damaged.
 
-        Args:
-            key: The key.
-            scenario: Loads in the file that cannot be those of this scenario count as missing,
-                because anybody may write to it.
+        Loads in the file that cannot be those of `scenario` count as missing: anybody may write to
+        it.
         """
         loads = self._loads.get(key)
         if loads is not None:

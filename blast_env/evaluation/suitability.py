@@ -30,14 +30,7 @@ class Suitability:
 
 
 def suitability(scenario: AnyScenario) -> Suitability:
-    """Return the uses and limits of a scenario, without running a blast.
-
-    Args:
-        scenario: The scenario, or its bundled name or path.
-
-    Raises:
-        ScenarioError: If the scenario is invalid.
-    """
+    """Return the uses and limits of a scenario, without running a blast."""
     found = find_scenario(scenario)
     refusals = {engine: _refusal(found, engine) for engine in CALIBRATED_ENGINES}
     able = [JUDGE, *(engine for engine, refusal in refusals.items() if not refusal)]

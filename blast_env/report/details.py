@@ -56,11 +56,7 @@ DETAILS: Final = tuple(each.name for each in fields(ReportDetails))
 
 
 def read_details(path: Path | None, options: dict[str, str]) -> ReportDetails:
-    """Return details from a TOML file, with those of options in their place.
-
-    Args:
-        path: The file: `client = "..."`; `None` for none.
-        options: Details by name; empty ones are not given.
+    """Return details from a TOML file, if any, with those of options in their place.
 
     Raises:
         BlastEnvError: If the file cannot be read, or has an unknown key or one that is no text.

@@ -303,13 +303,7 @@ def _bars(axes: Axes, outcomes: Sequence[ThreatOutcome], units: UnitSystem) -> N
 def place_figure(
     scenario: Scenario, charges: Sequence[Charge], outcomes: Sequence[ThreatOutcome]
 ) -> bytes:
-    """Return the plan with the reduction for charges at other places.
-
-    Args:
-        scenario: The scenario.
-        charges: The charges at their places with the layout.
-        outcomes: One per charge.
-    """
+    """Return the plan with the reduction for charges at other places, with the layout."""
     figure, axes = _page(_height_in(scenario) + 0.3)
     features = without(_unlabelled(site_features(scenario)), *_ZONE)
     draw_plan(axes, features)

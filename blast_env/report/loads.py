@@ -336,11 +336,7 @@ def measure(
 ) -> MeasuredBlast:
     """Run a blast and return the loads on buildings.
 
-    Args:
-        blast: The blast.
-        targets: The buildings.
-        progress: Called periodically with the elapsed share of the time limit.
-        section: Section of its film in plan and section; without one, no film is recorded.
+    A film in plan and section is recorded if a section is given.
     """
     histories = WallHistories(targets, blast.site)
     from blast_env.gas.probes import GroundMap  # Numba takes half a second to import

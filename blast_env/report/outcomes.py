@@ -33,14 +33,9 @@ class Limit:
 
     @classmethod
     def parsed(cls, text: str, units: UnitSystem) -> "Limit":
-        """Return the limit of a text such as `school=200,40`.
+        """Return the limit of a text such as `school=200,40`: NAME=IMPULSE,PEAK in some units.
 
-        Args:
-            text: NAME=IMPULSE,PEAK; one of the two may be left out.
-            units: The units of both.
-
-        Raises:
-            BlastEnvError: If the text has another form, or a value is not above 0.
+        One of the two may be left out. Other texts, and values not above 0, are refused.
         """
         name, sign, values = text.partition("=")
         parts = values.split(",")
@@ -66,12 +61,7 @@ class Limit:
 
 
 def check_limits(limits: Sequence[Limit], targets: Sequence[ReportedBuilding]) -> None:
-    """Refuse limits of unknown buildings, and two limits of one building.
-
-    Raises:
-        UnknownNameError: If there is no such building.
-        BlastEnvError: If there are two limits of one.
-    """
+    """Refuse limits of unknown buildings, and two limits of one building."""
     names = [each.name for each in targets]
     for index, limit in enumerate(limits):
         if limit.target not in names:

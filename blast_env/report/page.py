@@ -62,13 +62,9 @@ _MOST_BAYS: Final = 40
 def write_report(
     study: Study, html: str | Path, pdf: str | Path | None = None, commands: list[str] | None = None
 ) -> list[Path]:
-    """Write a report.
+    """Write a report as one HTML file with its pictures inside and, if requested, as PDF.
 
-    Args:
-        study: Its content.
-        html: The page: one file, with its pictures inside.
-        pdf: The same as PDF, if requested.
-        commands: The command that made it; by default the command line of this process.
+    `commands` is the command that made it, by default the command line of this process.
 
     Returns:
         The files.
@@ -89,11 +85,7 @@ def write_report(
 
 
 def check_targets(html: str | Path, pdf: str | Path | None) -> None:
-    """Refuse unusable files before any blast is run.
-
-    Raises:
-        BlastEnvError: If a suffix is wrong, or a PDF is requested without WeasyPrint.
-    """
+    """Refuse unusable files before any blast is run: wrong suffixes, a PDF without WeasyPrint."""
     if Path(html).suffix.lower() not in HTML_SUFFIXES:
         raise BlastEnvError(f"{html}: suffix is {Path(html).suffix!r}, must be .html")
     if pdf is not None:

@@ -41,13 +41,7 @@ class CountedPeak:
 
 
 def counted_peak(site: BlastSite, cell_m: float, faces: pd.DataFrame) -> CountedPeak:
-    """Return the largest of the counted peaks on faces of cells.
-
-    Args:
-        site: The site with the barrier.
-        cell_m: Side of the cells.
-        faces: The faces, as in `GasResult.on_walls`; at least one.
-    """
+    """Return the largest of the counted peaks on faces of cells, of `GasResult.on_walls`."""
     charge = site.charge
     points_m = faces[["x_m", "y_m", "z_m"]].to_numpy(dtype=np.float64)
     outward = np.zeros((len(faces), 3))

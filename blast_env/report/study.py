@@ -247,15 +247,9 @@ def run_study(
 ) -> Study:
     """Run all blasts of a report.
 
-    Without given threats, charges at other places come first: the worst of them are the threats.
-    An interruption (`KeyboardInterrupt`) after the threats with the coarser cells gives a report on
-    the parts finished by then.
-
-    Args:
-        scenario: The scenario.
-        layout: The layout.
-        options: The scope and the resolution.
-        progress: Called with the label of the current part, and its completed share, 0 to 1.
+    Without given threats, charges at other places come first: the worst of them are the threats. An
+    interruption (`KeyboardInterrupt`) after the threats with the coarser cells gives a report on
+    the parts finished by then. Progress is the label of the current part, and its completed share.
 
     Raises:
         BlastEnvError: If the layout is not legal, a charge is out of place, a limit names no
@@ -684,11 +678,7 @@ class _FrontRow:
 
 
 def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
-    """Return the layouts of a front that a search wrote.
-
-    Raises:
-        BlastEnvError: If the file is no front, or a layout is not legal in the scenario.
-    """
+    """Return the layouts of a front that a search wrote; refuse other files and illegal layouts."""
     if path is None:
         return ()
     try:

@@ -41,13 +41,7 @@ def place_text(threat: LoadCase, scenario: Scenario, layout: Layout) -> str:
 def chief_threats(
     places: Sequence[LoadCase], severity: Callable[[LoadCase], Severity], most: int
 ) -> tuple[LoadCase, ...]:
-    """Return the most severe charges: of each source, the place that governs.
-
-    Args:
-        places: The candidate places, see `other_places`.
-        severity: Severity of a charge.
-        most: Greatest number of charges; the worst are taken.
-    """
+    """Return the most severe charges: of each source, the place that governs; at most `most`."""
     sources: dict[int, list[LoadCase]] = {}
     for each in places:
         sources.setdefault(each.source, []).append(each)
@@ -60,11 +54,7 @@ def chief_threats(
 
 
 def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[LoadCase, ...]:
-    """Return the charges given by the user.
-
-    Raises:
-        ScenarioError: If one is out of bounds, or not clear of structures and the border.
-    """
+    """Return the charges given by the user; refuse one that is out of bounds or not clear."""
     scenario.with_possible_charges(charges)
     return tuple(
         LoadCase(charge, name=f"T{number}", why="given by the user")
@@ -75,12 +65,9 @@ def asked_threats(scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[L
 def other_places(scenario: Scenario, count: int) -> tuple[LoadCase, ...]:
     """Return charges at even steps along segments, over areas, and at points; each only once.
 
-    The place of each source nearest to a protected structure is added. Those of a vehicle are at
-    its worst place, its second worst, and so on.
-
-    Args:
-        scenario: The scenario.
-        count: Number of places of each segment and vehicle, and along each side of an area.
+    There are `count` places of each segment and vehicle, and along each side of an area. The place
+    of each source nearest to a protected structure is added. Those of a vehicle are at its worst
+    place, its second worst, and so on.
     """
     found: dict[AnyCharge, LoadCase] = {}
     for index, source in enumerate(scenario.charge):

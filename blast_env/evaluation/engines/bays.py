@@ -72,12 +72,7 @@ class BayLoads:
 
     @classmethod
     def begin(cls, run: "GasRun", bays: Sequence[FilledBay]) -> "BayLoads":
-        """Return the loads of a run that has not begun, to be recorded by `GasRun.record`.
-
-        Args:
-            run: The run.
-            bays: The bays of its scenario.
-        """
+        """Return the loads of a run that has not begun, to be recorded by `GasRun.record`."""
         from blast_env.gas.probes import PatchHistories
 
         patch = bay_patches(run.table, [each.name for each in run.site.structures], bays)
@@ -102,9 +97,7 @@ class BayLoads:
     ) -> tuple[BayDamage, ...]:
         """Return the damage of the bays with each of their possible components.
 
-        Args:
-            alternatives: The possible components of the bays of the scenario.
-            peak_factor: Factor on peaks to make them as sharp as in the open.
+        The factor on peaks makes them as sharp as in the open.
         """
         by_name = {each.name: each for each in alternatives}
         own = [by_name[each.bay.name] for each in self.bays]
@@ -205,16 +198,9 @@ def unjudged_walls(
     bays: Sequence[FilledBay],
     area_m2: FloatArray,
 ) -> tuple[UnjudgedWalls, ...]:
-    """Return the walls that no verdict covers, one item per building with any.
+    """Return the walls that no verdict covers, one item per building with a facade and any.
 
-    Only buildings with a facade are examined.
-
-    Args:
-        table: The faces of cells.
-        outlines: The structures of the run, with their counted walls.
-        buildings: The building of each structure of the scenario.
-        bays: The bays of the scenario.
-        area_m2: Area of each face along the normal of its wall, m2 (faces,).
+    `area_m2` is the area of each face along the normal of its wall (faces,).
     """
     structures = [each.name for each in outlines]
     left_out, counts = bay_patches(table, structures, bays) < 0, np.zeros(len(table.face), bool)

@@ -88,14 +88,7 @@ class StructureLoad:
     ) -> Self:
         """Return the load on a structure of a scenario by an engine without particles.
 
-        Args:
-            structure: The structure.
-            impulse_pa_s: Impulse per area, Pa*s.
-            peak_pa: Largest overpressure on its walls, Pa.
-            in_range: Whether the engine was checked for this distance and charge.
-            notes: Reasons if it was not, one sentence each.
-            area_m2: Area of the counted walls.
-            stood: Standing of the load.
+        The other arguments are as the attributes.
         """
         return cls(
             name=structure.name,
@@ -186,10 +179,6 @@ class BlastLoads:
         self, named: Collection[NamedBay], objective: ObjectiveSection
     ) -> "BlastLoads":
         """Return the loads with the response of given facades, without another blast.
-
-        Args:
-            named: The bays with the names of their components.
-            objective: Defines the measure of the response.
 
         Raises:
             BlastEnvError: If the bays were not recorded.
@@ -299,10 +288,8 @@ def structure_response(
 ) -> tuple[float, float]:
     """Return the response of one structure in the objective, and the largest damage of its bays.
 
-    Args:
-        bays: The damage of its bays with each of their possible components.
-        named: The bays of all structures with the names of their components.
-        objective: Defines the measure of the response.
+    `bays` has their damage with each of their possible components, `named` the components of all
+    bays.
     """
     chosen = {each.bay.name: each for each in named}
     is_glazing = objective.measure == "glazing"
@@ -548,11 +535,7 @@ def default_engine(*scenarios: Scenario, particles: str = ENGINE_NAMES[0]) -> st
 
     It is gas dynamics if any site has a feature that particles ignore: a height, a catalogue, a
     raised charge, walls that do not count, a gauge. Otherwise it is the particle model, which was
-    made for sites without such features.
-
-    Args:
-        scenarios: The sites.
-        particles: The engine of the particle model.
+    made for sites without such features; `particles` names its engine.
     """
     return JUDGE if any(each.height_notes for each in scenarios) else particles
 
@@ -563,18 +546,14 @@ def find_engine(
     until: str | float | None = None,
     cells: str | None = None,
 ) -> Engine:
-    """Return an engine by its name, or the engine itself.
+    """Return an engine by its name, or the engine itself, with any given settings.
 
-    Args:
-        engine: The name, or the engine.
-        cell_m: Side of the cells of gas dynamics; that of the engine unless given.
-        until: Loads that a blast of gas dynamics waits for; those of the engine unless given.
-        cells: Growth of the cells of gas dynamics; that of the engine unless given.
+    The settings of gas dynamics are the side of its cells, the loads that a blast waits for, and
+    the growth of the cells.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If `cell_m` does not divide the side of a module, or a setting is given for
-            an engine that does not have it; or an extra is missing.
+        BlastEnvError: If a setting is out of bounds or of another engine, or an extra is missing.
     """
     found = _made(engine) if isinstance(engine, str) else engine
     if not isinstance(found, Engine):

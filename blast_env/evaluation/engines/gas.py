@@ -138,10 +138,8 @@ class GasEngine(GasSettings, Engine):
     ) -> "GasRun":
         """Return a run at time 0, independent of every other run.
 
-        Args:
-            site: The structures, the barrier, the charge and the gauges.
-            recorders: Makes further recorders for the grid: maps, pictures.
-            response_s: Minimum duration of the run after the last load has arrived.
+        `recorders` makes further recorders for the grid: maps, pictures. The run goes on for
+        `response_s` after the last load has arrived.
 
         Raises:
             BlastEnvError: If the grid does not fit into memory, or the charge or a gauge is in a
@@ -437,12 +435,8 @@ class GasResult:
     def impulse(self, structure: str) -> ScaledImpulse:
         """Return the peak specific impulse on a structure, averaged over the counted walls.
 
-        Args:
-            structure: Name of the structure.
-
-        Returns:
-            `.pa_s`, `.psi_s`, and `.in_range` with `.notes`: whether the engine was checked for
-            such a distance, charge and cell, and the load was known at the end of the run.
+        `.in_range` and `.notes` state whether the engine was checked for such a distance, charge
+        and cell, and the load was known at the end of the run.
 
         Raises:
             UnknownNameError: If there is no structure of that name.
@@ -603,14 +597,7 @@ class GasResult:
         }
 
     def to_excel(self, path: str | Path) -> Path:
-        """Write a workbook with structures, modules, gauges and the run record.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there; nothing is left behind then.
-        """
+        """Write a workbook with structures, modules, gauges and the run record; return its path."""
         from blast_env.particles.workbook import SheetTable, write_tables
 
         tables = [
@@ -634,9 +621,6 @@ class GasResult:
 
         Returns:
             The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there; nothing is left behind then.
         """
         from blast_env.particles.parquet import write_table
 

@@ -130,12 +130,7 @@ class EventEngine(ParticleEngine):
 
 
 def find_particle_engine(engine: str | Engine) -> ParticleEngine:
-    """Return a particle engine by its name, or the engine itself.
-
-    Raises:
-        UnknownNameError: If there is no engine of that name.
-        BlastEnvError: If it is not a particle engine.
-    """
+    """Return a particle engine by its name, or the engine itself; refuse any other engine."""
     found = find_engine(engine)
     if not isinstance(found, ParticleEngine):
         raise BlastEnvError(
@@ -169,12 +164,7 @@ class Blast:
 
     @cached_property
     def particle_engine(self) -> ParticleEngine:
-        """The engine itself.
-
-        Raises:
-            UnknownNameError: If there is no such engine.
-            BlastEnvError: If it is not a particle engine.
-        """
+        """The engine itself; see `find_particle_engine`."""
         return find_particle_engine(self.engine)
 
     def start(self) -> BlastRun:
@@ -299,31 +289,18 @@ class BlastResult:
         return by_name[name]
 
     def impulse_sim(self, structure: str) -> float:
-        """Return the sum of m |v| over the collisions with a structure, simulation units.
-
-        Args:
-            structure: Name of the structure.
-
-        Raises:
-            UnknownNameError: If there is no structure of that name.
-        """
+        """Return the sum of m |v| over the collisions with a structure, simulation units."""
         return self.obstacle(structure).impulse
 
     def impulse(self, structure: str, calibration: Calibration | None = None) -> ScaledImpulse:
         """Return the impulse per area on a structure, converted by a calibration.
 
-        Args:
-            structure: Name of the structure.
-            calibration: By default the scenario's.
-
-        Returns:
-            `.psi_s`, `.pa_s`, and `.in_range` with `.notes`: whether this distance and charge lie
-            in the range of the calibration, and the blast ran to its end.
+        `.in_range` and `.notes` state whether this distance and charge lie in the range of the
+        calibration, and the blast ran to its end.
 
         Raises:
             UnknownNameError: If there is no structure or no calibration of that name.
-            CalibrationError: If the scenario names no calibration, or one that was made with
-                other parameters or another engine.
+            CalibrationError: As for `calibration`, which is used unless another one is given.
         """
         obstacle = self.obstacle(structure)
         if obstacle.is_barrier:
@@ -434,27 +411,13 @@ class BlastResult:
         return record
 
     def to_excel(self, path: str | Path) -> Path:
-        """Write a workbook with collisions, modules, structures and the run record.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there; nothing is left behind then.
-        """
+        """Write a workbook with collisions, modules, structures and run record; return its path."""
         from blast_env.particles.workbook import write_workbook
 
         return write_workbook(self, path_of(path))
 
     def to_parquet(self, path: str | Path) -> Path:
-        """Write the collision table as Parquet, the run record in its metadata.
-
-        Returns:
-            The path.
-
-        Raises:
-            BlastEnvError: If it cannot be written there; nothing is left behind then.
-        """
+        """Write the collision table as Parquet, the run record in its metadata; return its path."""
         from blast_env.particles.parquet import write_parquet
 
         return write_parquet(self, path_of(path))

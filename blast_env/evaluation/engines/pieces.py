@@ -98,13 +98,7 @@ class PieceLoads:
     ) -> "PieceLoads | None":
         """Return the loads of a run that has not begun, to be recorded by `GasRun.record`.
 
-        Args:
-            run: The run.
-            scenario: Its scenario.
-            layout: Its layout.
-
-        Returns:
-            `None` where no piece has a height.
+        `None` where no piece has a height.
         """
         from blast_env.gas.probes import PatchHistories
 
