@@ -266,25 +266,6 @@ def described(error: ValidationError) -> str:
     return "; ".join(clauses)
 
 
-def parse_json_lines(text: str, kind: type[T]) -> Iterator[T]:
-    """Yield the content of each line of a text, one JSON document per line.
-
-    A last line without an end is left out: writing it was interrupted.
-
-    Args:
-        text: The text.
-        kind: The type of each line; see `checked_as`.
-
-    Raises:
-        DocumentError: If a line is anything else; its place is the line.
-    """
-    for number, line in enumerate(text.split("\n")[:-1], start=1):
-        try:
-            yield checked_as(kind, parse_json(line))
-        except DocumentError as error:
-            raise DocumentError(f"line {number}", error.message) from error
-
-
 def parse_csv(text: str, kind: type[T]) -> Iterator[T]:
     """Yield the rows of a table, whose first line has the names of its columns.
 

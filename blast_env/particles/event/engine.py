@@ -102,12 +102,10 @@ def run_until(
             return UNTIL
         ball, time_s = _NUMBER(heap[1].ball), heap[1].time_s
         if balls[ball].contact_s > time_s:
-            progress.crossings += 1
             cross(balls, cells, heap, surfaces, rules, ball)
             continue
         partner = _NUMBER(balls[ball].partner)
         if partner >= 0 and balls[partner].collisions != balls[ball].partner_collisions:
-            progress.outdated += 1
             look_ahead(balls, cells, heap, surfaces, rules, ball)
             continue
         progress.collisions += 1
@@ -335,16 +333,6 @@ class EventRun:
         """Pickle the scene and the time, because parts of the state share memory."""
         until_s = self.time_s if self.end_reason is None else np.inf
         return _run_again, (self.scene, self._cell_units, until_s)
-
-    @property
-    def crossings(self) -> int:
-        """Number of moves of balls between cells, which take time as collisions do."""
-        return int(self._world.progress["crossings"])
-
-    @property
-    def outdated(self) -> int:
-        """Number of predicted collisions that did not happen, because a partner was hit before."""
-        return int(self._world.progress["outdated"])
 
     def advance(self, until_s: float) -> None:
         """Continue until the simulated time is `until_s`, or the run has ended."""

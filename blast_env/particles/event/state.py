@@ -145,8 +145,6 @@ PROGRESS: Final = np.dtype(
     [
         ("time_s", np.float64),  # of the last collision
         ("collisions", np.int64),
-        ("crossings", np.int64),  # of balls into other cells
-        ("outdated", np.int64),  # predicted collisions invalidated by a hit of the partner
         ("next_check", np.int64),  # collisions at the next check whether a structure is in reach
         ("records", np.int64),  # rows written
         ("stage", np.int64),  # NEW, RUNNING or CHANGED
