@@ -170,7 +170,7 @@ def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int
     layouts = [by_rule(each) for each in cases]
     shown = [Demonstration(*each, 0.4, observation) for each in zip(cases, layouts, strict=True)]
     rng = np.random.default_rng(0)
-    for updates, learning_rate in ((160, 0.01), (60, 0.001)):
+    for updates, learning_rate in ((120, 0.01), (60, 0.001)):
         loss = imitate(agent.policy, shown, updates, 8, learning_rate, 0.5, 0.5, rng)
     assert loss < 0.8
     for case, layout, each in zip(cases, layouts, shown, strict=True):

@@ -59,7 +59,7 @@ def test_training_and_its_evaluations_use_the_cells(
     assert engine.cell_m == 0.25
 
 
-def test_growing_cells_are_those_of_every_command_that_runs_gas(
+def test_growing_cells_are_those_of_commands_that_run_gas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     site = tmp_path / "glazed.toml"
@@ -72,16 +72,12 @@ def test_growing_cells_are_those_of_every_command_that_runs_gas(
         return start_on(GasEngine(COARSE), *arguments)
 
     monkeypatch.setattr(GasEngine, "start_on", watched)
-    small = ("n_steps=4", "batch_size=4", "n_epochs=1", "evaluation_cases=2")
-    settings = [text for each in small for text in ("--set", each)]
-    trained: tuple[str | Path, ...] = ("--scenario", site, "--engine", "gas", *settings)
     searched = ("--scenario", site, "--engine", "gas", "--method", "random", "--budget", 1)
     commands: tuple[tuple[str | Path | float, ...], ...] = (
         ("simulate", site, "--engine", "gas"),
         ("search", *searched, "--held-out", 1, "--out", tmp_path / "found"),
         ("assess", site),
         ("search", "--method", "package", "--scenario", site, "--verify", "--budget", 2),
-        ("train", *trained, "--run", tmp_path / "run", "--envs", 1, "--steps", 4),
     )
     for arguments in commands:
         used.clear()

@@ -467,7 +467,7 @@ def table_of_guesses(truth: Surrogate, layouts: int) -> pd.DataFrame:
 
 
 def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
-    table = table_of_guesses(by_hand(7, members=1), 80)
+    table = table_of_guesses(by_hand(7, members=1), 60)
     samples = Samples.of(table, {YARD.content_hash: YARD})
     held = folds(samples.case, 4, 0)
     assert sum(each.sum() for each in held) == len(samples)
@@ -590,7 +590,7 @@ def test_a_search_keeps_to_its_blasts_and_finds_what_rules_find() -> None:
     """With blasts for all rules it is at least as good as the best of them."""
     problem = DesignProblem(BlastEvaluator(YARD, FAST), case())
     ruled = {tuple(sorted(each)) for each in layouts_by_rule(YARD, problem.known_charge).values()}
-    budget = 3 * len(ruled)
+    budget = len(ruled) + 2
     method = LearntSearch(by_hand(), digest="digest", guesses=12, drawn=4)
     result = method.propose(problem, budget, 0)
     assert result.blasts <= budget

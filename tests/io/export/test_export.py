@@ -65,19 +65,14 @@ def test_csv_has_every_module_in_metres(tmp_path: Path) -> None:
     table = pd.read_csv(export_layout(plan(), tmp_path / "layout.csv"))
     assert list(table.columns) == [column.name for column in MODULE_COLUMNS]
     assert list(zip(table["row"], table["column"], strict=True)) == list(LAYOUT)
+    barrier = build_scene(COURTYARD, LAYOUT).obstacles()[-1]
+    assert list(table["module_id"]) == [part.module_id for part in barrier.parts]
     for row, (left, bottom, right, top) in zip(
         table.to_dict("records"), squares_m(LAYOUT), strict=True
     ):
         assert (row["corner_x_m"], row["corner_y_m"]) == (left, bottom)
         assert row["corner_x_m"] + row["side_m"] == right
         assert (row["centre_x_m"], row["centre_y_m"]) == ((left + right) / 2, (bottom + top) / 2)
-
-
-def test_modules_have_the_identifiers_of_the_blast_s_tables(tmp_path: Path) -> None:
-    """So that loads on the barrier can be joined to the drawing."""
-    table = pd.read_csv(export_layout(plan(), tmp_path / "layout.csv"))
-    barrier = build_scene(COURTYARD, LAYOUT).obstacles()[-1]
-    assert list(table["module_id"]) == [part.module_id for part in barrier.parts]
 
 
 def test_geojson_has_closed_counterclockwise_polygons_in_site_metres(tmp_path: Path) -> None:

@@ -150,10 +150,6 @@ def test_damaged_geojson_is_an_error_or_a_site_never_a_traceback(
 
 
 def test_wrong_reference_systems_are_named(tmp_path: Path) -> None:
-    far = [(565_000.0 + x, 5_980_000.0 + y) for x, y in rectangle(0, 0, 6, 4)]
-    path = written(tmp_path, outline(far), coordinate_system="")
-    assert "is not on the Earth in EPSG:4326: say with --crs" in error_of(path, protect=("a",))
-    assert "which is for longitudes 6 to 12" in error_of(BLOCK, replace(HALL, crs="EPSG:25832"))
     assert "pyproj does not know" in error_of(BLOCK, replace(HALL, crs="EPSG:1"))
     assert "crs: has no properties.name" in error_of(written(tmp_path, HOUSE, crs=4))
     assert "--crs is not for OpenStreetMap" in error_of(
@@ -308,8 +304,6 @@ def test_heights_that_are_none_are_noted_and_guessed(tmp_path: Path) -> None:
         (entry,) = (each for each in site.ledger.of(Deed.GUESSED) if each.kind == kind)
         assert entry.place == "features[0]"
         assert entry.detail == f"height is {height!r}, which is no length in m or ft"
-    feet = outline(rectangle(0, 0, 6, 4), height="20 ft", protected=True)
-    assert import_site(written(tmp_path, feet, PLACE)).buildings[0].height_m == 6.0
 
 
 def test_streets_of_too_many_bends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

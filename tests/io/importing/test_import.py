@@ -369,19 +369,6 @@ def test_a_curved_museum_is_one_structure(tmp_path: Path) -> None:
     assert site.buildings[0].deviation.outline_m < 0.75 * MODULE_M
 
 
-def test_a_post_office_of_many_wings_is_one_structure(tmp_path: Path) -> None:
-    """A comb askew to the streets takes over a hundred rectangles."""
-    comb = [(0.0, 0.0), (60.0, 0.0)]
-    for x in range(60, 0, -6):
-        comb += [(x, 14.0), (x - 3.0, 14.0), (x - 3.0, 6.0), (x - 6.0, 6.0)]
-    turned = shapely.affinity.rotate(shapely.Polygon(comb), 17.0, origin=(0, 0))
-    ring = [(float(x), float(y)) for x, y in turned.exterior.coords[:-1]]
-    path = written(tmp_path, outline(ring, name="Post", protected=True), charge(-20.0, 30.0))
-    (post,) = imported(path, rotation_deg=0.0, default_height_m=12.0).scenario.structures
-    assert len(post.boxes_m) > 100
-    assert post.modules * 0.25 == pytest.approx(turned.area, rel=0.02)
-
-
 def test_a_courtyard_stays_open(tmp_path: Path) -> None:
     house = outline(rectangle(0, 0, 20, 16), name="Block", protected=True)
     house["geometry"]["coordinates"].append([*rectangle(6, 5, 8, 6), (6, 5)])
@@ -390,24 +377,6 @@ def test_a_courtyard_stays_open(tmp_path: Path) -> None:
     assert isinstance(block, PolygonSection)
     assert len(block.courtyards_m) == 1
     assert block.modules == 4 * (20 * 16 - 8 * 6)
-
-
-def test_a_building_over_another_loses_what_they_share(tmp_path: Path) -> None:
-    """Ruins and houses drawn twice: the higher keeps its ground, one that is lost is named."""
-    path = written(
-        tmp_path,
-        outline(rectangle(0, 0, 10, 8), name="Big", protected=True),
-        outline(rectangle(8, 2, 6, 4), name="Small"),
-        outline(rectangle(2, 2, 3, 3), name="Ruin"),
-        charge(25.0, 4.0),
-    )
-    site = imported(path, rotation_deg=0.0)
-    assert {each.name: each.modules for each in site.scenario.structures} == {
-        "Big": 4 * 80,
-        "Small": 4 * 16,
-    }
-    (merged,) = (each for each in site.ledger.of(Deed.MERGED) if each.name == "Ruin")
-    assert merged.detail == "by features[0]"
 
 
 @pytest.mark.parametrize("gap_m", [-0.03, 0.0, 0.004, 0.04])
