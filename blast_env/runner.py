@@ -61,7 +61,7 @@ def as_completed(
     Arguments and errors are those of `run_all`.
     """
     check_workers("workers", workers)
-    count = _processes(workers, len(items))
+    count = _processes(workers, len(items)) if len(items) > 1 else 1
     if count == 1:
         return enumerate(map(function, items))
     numbered = partial(_numbered, function)

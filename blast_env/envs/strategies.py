@@ -188,11 +188,6 @@ class Transition:
     ended: bool
     problem: DesignProblem
 
-    @property
-    def term(self) -> str:
-        """Name of the reward's term for the load: `impulse`, `peak` or `load`."""
-        return self.problem.case.scenario.objective.term
-
 
 class Reward(Protocol):
     """The reward of an action, in named terms.
@@ -236,7 +231,8 @@ class TerminalReward:
             deposit = DEPOSIT * reward_value(())
         if transition.ended:
             load = -reward_value(transition.after)
-        return {transition.term: load, "deposit": deposit if transition.ended else -deposit}
+        term = transition.problem.scenario.objective.term
+        return {term: load, "deposit": deposit if transition.ended else -deposit}
 
 
 @dataclass(frozen=True)
@@ -257,7 +253,7 @@ class IncrementalReward:
             load += reward_value(transition.before) - reward_value(transition.after)
         if transition.begins:
             load -= reward_value(transition.initial)
-        return {transition.term: load}
+        return {transition.problem.scenario.objective.term: load}
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,9 @@ from blast_env.evaluation.engines.contract import (
 from blast_env.evaluation.grid_error import GridError, LoadOf
 from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
 from blast_env.files import write_atomically
-from blast_env.geometry import Element, Layout
+from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
 from blast_env.provenance import versions
-from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.site.worst_places import stand_off_m
@@ -48,56 +47,6 @@ from blast_env.units import PA_PER_PSI
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
-
-
-@dataclass(frozen=True)
-class Assessment:
-    """The loads on the protected structures with one layout.
-
-    Each load is the mean over the realisations of a charge, combined over the charges by the risk
-    measure.
-
-    Attributes:
-        impulse_pa_s: Weighted sum of the impulses per area of the protected buildings, Pa*s.
-        impulse_sim: Weighted sum of the impulses of the protected structures, simulation units;
-            `None` of an engine without particles.
-        peak_pa: The largest overpressure on the walls of these structures, Pa; NaN for particles.
-        load: The objective value: Pa s for impulses, Pa for peaks, dimensionless for both, for a
-            response and with a target.
-        in_range: Whether all the blasts are in the range of the calibration.
-        level: The lowest level of protection under any threat; `None` unless the objective is a
-            response.
-    """
-
-    impulse_pa_s: float
-    impulse_sim: float | None
-    peak_pa: float
-    load: float
-    in_range: bool
-    level: LevelOfProtection | None = None
-
-    @classmethod
-    def of(cls, case: LoadCaseSet, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
-        """Return the assessment of a layout from its loads, one per threat of the case."""
-        combined, counts = case.combined, case.scenario.objective
-        sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
-        return cls(
-            impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
-            impulse_sim=combined(sums) if len(sums) == len(loads) else None,
-            peak_pa=combined([each.protected_peak_pa for each in loads]),
-            load=case.objective_value([each.load(counts) for each in loads], layout),
-            level=min(each.level for each in loads) if counts.kind == "response" else None,
-            in_range=all(each.in_range for each in loads),
-        )
-
-    @property
-    def impulse_psi_s(self) -> float:
-        """The impulse in the paper's unit, psi*s."""
-        return self.impulse_pa_s / PA_PER_PSI
-
-    def reduction_from(self, unprotected: "Assessment") -> float:
-        """Return the relative reduction of `load` from no barrier; NaN if that load is 0."""
-        return reductions(self.load, unprotected.load).item()
 
 
 CHARGE_COLUMNS: Final = (

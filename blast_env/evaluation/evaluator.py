@@ -151,7 +151,8 @@ class BlastEvaluator:
             layouts.append(tuple(check_layout(self.scenario, layout)))
             keys.append(self.key(layout, threat))
             asked.setdefault(keys[-1], threat.charge)
-        found = {key: loads for key in asked if (loads := self._known(key)) is not None}
+        stored = ((key, self.store.get(key, self.scenario)) for key in asked)
+        found = {key: loads for key, loads in stored if loads is not None}
         missing = {key: (self, charge) for key, charge in asked.items() if key not in found}
         for done, (key, loads) in enumerate(_run(missing, processes), start=1):
             found[key] = loads
@@ -176,7 +177,7 @@ class BlastEvaluator:
 
     def knows(self, layout: Sequence[Element], threat: LoadCase) -> bool:
         """Return whether the loads of a blast are stored."""
-        return self._known(self.key(layout, threat)) is not None
+        return self.store.get(self.key(layout, threat), self.scenario) is not None
 
     def key(self, layout: Sequence[Element], threat: LoadCase) -> BlastKey:
         """Return the key of a blast, with all inputs of its loads."""
@@ -185,10 +186,6 @@ class BlastEvaluator:
         seed = threat.seed if self.engine.has_noise else 0
         charge = threat.charge_against(self.scenario, cells)
         return self._key_of_nothing._replace(layout=cells, charge=charge, seed=seed)
-
-    def _known(self, key: BlastKey) -> BlastLoads | None:
-        """Return stored loads; `None` without any."""
-        return self.store.get(key, self.scenario)
 
     def _keep(self, key: BlastKey, loads: BlastLoads) -> None:
         """Count and store a blast."""
@@ -208,22 +205,14 @@ def _run(
     engine = next(iter(missing.values()))[0].engine
     keys, size = list(missing), engine.at_once
     lots = [keys[first : first + size] for first in range(0, len(keys), size)]
-
-    def asked(key: BlastKey) -> EngineBlast:
-        evaluator, charge = missing[key]
-        return EngineBlast(evaluator.scenario, key.layout, charge, key.seed)
-
-    work = [(engine, [asked(key) for key in lot]) for lot in lots]
-    for index, of_lot in as_completed(_run_lot, work, processes):
+    work = [
+        [EngineBlast(missing[k][0].scenario, k.layout, missing[k][1], k.seed) for k in lot]
+        for lot in lots
+    ]
+    for index, of_lot in as_completed(engine.loads_at_once, work, processes):
         for key, loads in zip(lots[index], of_lot, strict=True):
             missing[key][0]._keep(key, loads)
             yield key, loads
-
-
-def _run_lot(work: tuple[Engine, Sequence[EngineBlast]]) -> list[BlastLoads]:
-    """Run blasts, in this process or a worker."""
-    engine, blasts = work
-    return engine.loads_at_once(blasts)
 
 
 def run_together(
@@ -236,7 +225,7 @@ def run_together(
     missing: dict[BlastKey, tuple[BlastEvaluator, AnyCharge]] = {}
     for evaluator, layout, threat in asked:
         key = evaluator.key(layout, threat)
-        if key not in missing and evaluator._known(key) is None:
+        if key not in missing and evaluator.store.get(key, evaluator.scenario) is None:
             missing[key] = evaluator, threat.charge
     for _ in _run(missing, processes):
         pass

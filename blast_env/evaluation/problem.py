@@ -3,19 +3,73 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_distinct
-from blast_env.evaluation.comparison import Assessment, check_something_arrives
+from blast_env.evaluation.comparison import check_something_arrives
 from blast_env.evaluation.engines import BlastLoads
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError
 from blast_env.geometry import Element, Layout
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
+from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import check_workers
 from blast_env.site import AnyCharge, Scenario
+from blast_env.statistics import reductions
+from blast_env.units import PA_PER_PSI
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """The loads on the protected structures with one layout.
+
+    Each load is the mean over the realisations of a charge, combined over the charges by the risk
+    measure.
+
+    Attributes:
+        impulse_pa_s: Weighted sum of the impulses per area of the protected buildings, Pa*s.
+        impulse_sim: Weighted sum of the impulses of the protected structures, simulation units;
+            `None` of an engine without particles.
+        peak_pa: The largest overpressure on the walls of these structures, Pa; NaN for particles.
+        load: The objective value: Pa s for impulses, Pa for peaks, dimensionless for both, for a
+            response and with a target.
+        in_range: Whether all the blasts are in the range of the calibration.
+        level: The lowest level of protection under any threat; `None` unless the objective is a
+            response.
+    """
+
+    impulse_pa_s: float
+    impulse_sim: float | None
+    peak_pa: float
+    load: float
+    in_range: bool
+    level: LevelOfProtection | None = None
+
+    @classmethod
+    def of(cls, case: LoadCaseSet, layout: Sequence[Element], loads: Sequence[BlastLoads]) -> Self:
+        """Return the assessment of a layout from its loads, one per threat of the case."""
+        combined, counts = case.combined, case.scenario.objective
+        sums = [s for each in loads if (s := each.protected_impulse_sim) is not None]
+        return cls(
+            impulse_pa_s=combined([each.protected_impulse_pa_s for each in loads]),
+            impulse_sim=combined(sums) if len(sums) == len(loads) else None,
+            peak_pa=combined([each.protected_peak_pa for each in loads]),
+            load=case.objective_value([each.load(counts) for each in loads], layout),
+            level=min(each.level for each in loads) if counts.kind == "response" else None,
+            in_range=all(each.in_range for each in loads),
+        )
+
+    @property
+    def impulse_psi_s(self) -> float:
+        """The impulse in the paper's unit, psi*s."""
+        return self.impulse_pa_s / PA_PER_PSI
+
+    def reduction_from(self, unprotected: "Assessment") -> float:
+        """Return the relative reduction of `load` from no barrier; NaN if that load is 0."""
+        return reductions(self.load, unprotected.load).item()
 
 
 @dataclass(eq=False)
@@ -52,7 +106,7 @@ class DesignProblem:
     @property
     def scenario(self) -> Scenario:
         """The scenario."""
-        return self.case.scenario
+        return self.evaluator.scenario
 
     @property
     def threats(self) -> tuple[LoadCase, ...]:

@@ -109,6 +109,8 @@ class BlastStore:
             with suppress(KeyError):  # another thread has displaced it
                 self._loads.move_to_end(key)
             return loads
+        if self._file is None:
+            return None
         loads = self.read(json.dumps(key), _decoded)
         if loads is None or not (scenario is None or loads.are_for(find_scenario(scenario))):
             return None

@@ -127,14 +127,13 @@ def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
     parts: dict[str, list[StructureLoad]] = {}
     for load in loads:
         parts.setdefault(load.building, []).append(load)
-    return tuple(
-        _named(own[0], name) if len(own) == 1 else _on_building(name, own)
-        for name, own in parts.items()
-    )
-
-
-def _named(load: StructureLoad, name: str) -> StructureLoad:
-    return load if load.name == name else replace(load, name=name)
+    found = []
+    for name, own in parts.items():
+        if len(own) > 1:
+            found.append(_on_building(name, own))
+        else:
+            found.append(own[0] if own[0].name == name else replace(own[0], name=name))
+    return tuple(found)
 
 
 def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
