@@ -1,12 +1,11 @@
 """`blast-env assess`: the damage of buildings by charges; stand-offs, and largest charges."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import typer
 
-from blast_env.cli.assessment import draw, print_assessment, write_table
-from blast_env.cli.capacity import print_capacity
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     CacheOption,
@@ -25,20 +24,63 @@ from blast_env.cli.options import (
     resume_words,
     wanted_level,
 )
-from blast_env.cli.output import resumable
-from blast_env.cli.screening import print_screening
+from blast_env.cli.output import (
+    print_answer,
+    print_cost,
+    print_line,
+    print_table,
+    print_written,
+    progress_bar,
+    resumable,
+    save_figures,
+)
 from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import JUDGE
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.answers import charge_text, counted
+from blast_env.evaluation.assessment import Assessed
+from blast_env.evaluation.assessment import assess as assessed_by
+from blast_env.evaluation.capacity import MOST_BLASTS
+from blast_env.evaluation.capacity import capacity as capacity_of
+from blast_env.evaluation.consequences import (
+    BAY_CASE_COLUMNS,
+    CASE_COLUMNS,
+    BuildingResponse,
+    Consequences,
+    bay_table,
+    consequences,
+    piece_table,
+)
+from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
+from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import final_engine
 from blast_env.evaluation.probability import Uncertainty
-from blast_env.evaluation.screening import facades_for
+from blast_env.evaluation.screening import (
+    LEFT_OUT,
+    STAND_OFF_HEADERS,
+    THREAT_HEADERS,
+    Screening,
+    facades_for,
+)
+from blast_env.evaluation.screening import screen as screen_site
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
+from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.requirements import Requirement
-from blast_env.site import load_scenario
-from blast_env.site.presets import CHARGE_PRESETS, TNT_EQUIVALENTS
+from blast_env.site import Scenario, load_scenario
+from blast_env.site.presets import (
+    CHARGE_PRESETS,
+    EQUIVALENTS_SOURCE,
+    PRESETS_SOURCE,
+    TNT_EQUIVALENTS,
+    NamedMass,
+)
+from blast_env.tables import write_csv
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _SCREEN: Final = "With --screen"
 _MASS_HELP: Final = (
@@ -126,34 +168,189 @@ def assess(
     if layout is not None:
         elements = tuple(load_layout(layout, site))
         layouts[layout_counts(elements, "barrier")] = elements
+    engine = final_engine(JUDGE, [site], cell_m, cells=cells)
     if screen:
         refuse_given(context, _OF_DRAWN_CHARGES + _OF_ASSESSMENT, "does not apply to --screen")
         *_, last = layouts.values()
-        engine = final_engine(JUDGE, [site], cell_m, cells=cells) if gas else None
-        print_screening(site, last, mass, required, engine, picture)
+        _screen(site, last, mass, required, engine if gas else None, picture)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
-    engine = final_engine(JUDGE, [site], cell_m, cells=cells)
     drawn = GivenCharge.of(charge, tnt_kg).fixed_charges(site, charges)
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
         refuse_given(context, (*_OF_ASSESSMENT, "require"), "does not apply to --capacity")
-        uncertainty = Uncertainty(mass=mass_error)
+    print_line(engine.describe([site]))
+    if capacity:
+        print_cost([(engine, site, each) for each in drawn for _ in layouts] * MOST_BLASTS)
+        evaluator = BlastEvaluator(site, engine, cache=cache)
+        label = f"{site.name}: masses and stand-offs"
         with resumable(resume_words(cache)):
-            print_capacity(site, layouts, drawn, engine, level, uncertainty, picture, cache)
+            with progress_bar(label) as progress:
+                found = capacity_of(evaluator, layouts, drawn, progress)
+            print_answer(found.answer())
+
+        def curves() -> "Figure":
+            from blast_env.plots.capacity import capacity_figure
+
+            least, shown = found.curves(level, Uncertainty(mass=mass_error))
+            title = f"{site.name}: charge at ({least.place}) m"
+            return capacity_figure(shown, level.label, least.charge.tnt_kg, title)
+
+        print_written(save_figures((picture, curves)))
         return
+    asked = [(engine, each) for each in drawn] + [(engine.coarser, drawn[0])]
+    print_cost((each, site, charge) for each, charge in asked for _ in layouts)
     with resumable(resume_words(cache)):
-        assessed = print_assessment(
-            site,
-            layouts,
-            drawn,
-            engine,
-            level,
-            required,
-            mass_error,
-            without_fallen=without_fallen,
-            cache=cache,
-        )
+        with progress_bar(counted(len(drawn))) as progress:
+            assessed = assessed_by(
+                *(site, layouts, drawn, engine, progress),
+                without_fallen=without_fallen,
+                cache=cache,
+            )
+        print_answer(assessed.answer(level, mass_error, required))
     if table is not None:
-        write_table(assessed, table, engine)
-    draw(assessed, picture, view, diagram)
+        _write_table(assessed, table, engine)
+    _draw(assessed, picture, view, diagram)
+
+
+def _write_table(assessed: Assessed, path: Path, engine: Engine) -> None:
+    """Write the table of the bays; a workbook also holds the barrier's pieces."""
+    bays, pieces = bay_table(assessed.found), piece_table(assessed.found)
+    if path.suffix.lower() == ".csv":
+        print_written([write_csv(bays, path)])
+        return
+    from blast_env.particles.workbook import SheetTable, write_tables
+
+    tables = [SheetTable("Bays", bays, BAY_CASE_COLUMNS)]
+    if len(pieces):
+        tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))
+    record: dict[str, str | int | float] = {
+        "scenario": assessed.scenario.name,
+        "scenario hash": assessed.scenario.content_hash,
+        "engine": engine.words,
+        "engine version": engine.version,
+        "blast-env version": versions(engine.version)["blast_env"],
+    }
+    print_written([write_tables(record, tables, path, f"Bays of {assessed.scenario.name}")])
+
+
+def _draw(
+    assessed: Assessed, picture: Path | None, view: Path | None, diagram: Path | None
+) -> None:
+    """Draw the facades, the site, and the pressure-impulse diagram under the worst charge."""
+    rows = _worst_rows(assessed) if picture or view or diagram else []
+
+    def title() -> str:
+        building = rows[0][1].building
+        return (
+            f"{assessed.scenario.title_of(building)}: {charge_text(rows[0][1].charge)}, the worst"
+        )
+
+    def facades() -> "Figure":
+        from blast_env.plots.facade import facade_picture
+
+        return facade_picture(rows, title())
+
+    def pressure_impulse() -> "Figure":
+        from blast_env.plots.pressure_impulse import pressure_impulse_diagram
+
+        return pressure_impulse_diagram([(name, each.facade) for name, each in rows], title())
+
+    def site() -> "Figure":
+        from blast_env.plots.facade import damage_view
+
+        worst = rows[0][1]
+        number = assessed.found[rows[0][0]].of(worst.building).index(worst)
+        views = [
+            (name, assessed.layouts[name], [each.of(b)[number] for b in each.buildings])
+            for name, each in assessed.found.items()
+        ]
+        words = f"{assessed.scenario.name}: {charge_text(worst.charge)}, the worst"
+        return damage_view(assessed.scenario, views, words)
+
+    print_written(save_figures((picture, facades), (diagram, pressure_impulse), (view, site)))
+
+
+def _worst_rows(assessed: Assessed) -> list[tuple[str, BuildingResponse]]:
+    """Return the governing building and charge of the judged layout, one row per layout."""
+    responses = assessed.judged.responses
+    number = responses.index(governing(responses, lambda each: each.severity))
+    return [(name, each.responses[number]) for name, each in assessed.found.items()]
+
+
+def _screen(
+    scenario: Scenario,
+    layout: Layout,
+    masses: Sequence[str],
+    required: Sequence[Requirement],
+    engine: Engine | None,
+    picture: Path | None,
+) -> None:
+    """Print the level of protection of each facade, and the stand-off that each level needs."""
+    level = scenario.objective.level or LevelOfProtection.LOW
+    required = required or [Requirement.of_level(level)]
+    named = [NamedMass.parsed(each) for each in masses]
+    found = screen_site(scenario, layout, named)
+    beside = {} if engine is None else _by_gas(scenario, layout, found, engine)
+    print_line(f"required: {'; '.join(each.words for each in required)}")
+    title = layout_counts(layout, "barrier") if layout else "no barrier"
+    _print_threats(f"{scenario.name}, {title}: worst place by damage", found, required, beside)
+    for each in found.threats:
+        title = (
+            f"stand-off (m) from which a component allows a level, {each.name},"
+            f" {each.charge.tnt_kg:g} kg TNT (* on this site)"
+        )
+        print_table(title, STAND_OFF_HEADERS, found.stand_off_rows(each))
+    if named:
+        print_line(f"presets: {PRESETS_SOURCE}")
+    if any("," in each for each in masses):
+        print_line(f"TNT equivalents: {EQUIVALENTS_SOURCE}")
+    print_line(LEFT_OUT)
+    if engine is None:
+        print_line("--gas shows by how much that matters at each worst place")
+
+    def rings() -> "Figure":
+        from blast_env.plots.screening import screening_picture
+
+        return screening_picture(scenario, layout, found)
+
+    print_written(save_figures((picture, rings)))
+
+
+def _by_gas(
+    scenario: Scenario, layout: Layout, found: Screening, engine: Engine
+) -> dict[str, Consequences]:
+    """Return the consequences of each worst place by gas dynamics."""
+    print_line(engine.describe([scenario]))
+    print_cost((engine, scenario, each.charge) for each in found.threats)
+    result = {}
+    with progress_bar(f"{len(found.threats)} blasts") as progress:
+        for number, each in enumerate(found.threats, start=1):
+            result[each.name] = consequences(scenario, layout, [each.charge], engine)
+            progress(number / len(found.threats))
+    return result
+
+
+def _print_threats(
+    title: str,
+    found: Screening,
+    required: Sequence[Requirement],
+    beside: Mapping[str, Consequences],
+) -> None:
+    rows = []
+    for each in found.threats:
+        rows.append(found.threat_row(each, required))
+        if each.name in beside:
+            rows.append(("  by gas", *[""] * 4, *_gas_row(beside[each.name])))
+    print_table(title, THREAT_HEADERS, rows, text_columns=2)
+
+
+def _gas_row(found: Consequences) -> tuple[str, ...]:
+    facades = [each.facade for each in found.responses]
+    return (
+        min(each.level_of_protection for each in facades).label,
+        f"{sum(each.broken_panes for each in facades):.1f}",
+        max(each.worst_condition for each in facades).words,
+        max(each.worst_damage for each in facades).name.lower(),
+        "flagged" if found.is_flagged else "",
+    )

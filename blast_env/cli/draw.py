@@ -5,6 +5,7 @@ from pathlib import Path
 import typer
 
 from blast_env.cli.command import writes
+from blast_env.cli.options import LayoutOption
 from blast_env.cli.output import print_line
 from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
@@ -15,7 +16,7 @@ from blast_env.site import find_problems, load_scenario
 
 def draw(
     scenarios: list[str] = typer.Argument(help="Bundled names, or scenario files."),
-    layout: Path | None = typer.Option(None, help="Layout file; without it, the empty site."),
+    layout: LayoutOption = None,
     out: Path | None = writes("Picture to write, else NAME.png of the scenario", *PICTURES),
     view: str = typer.Option("both", help="both, plan or oblique."),
     corner: str | None = typer.Option(

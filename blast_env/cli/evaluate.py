@@ -1,5 +1,6 @@
 """`blast-env evaluate`: a layout, or the agent of a run, against no barrier."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Final
 
@@ -47,6 +48,7 @@ def _note_export(context: typer.Context, value: Path | None) -> Path | None:
 
 
 def evaluate(
+    context: typer.Context,
     layout: Path | None = typer.Option(None, help="JSON file of the (row, column) cells."),
     run: Path | None = typer.Option(
         None, help="Folder of a training run, whose agent proposes the layouts."
@@ -92,20 +94,12 @@ def evaluate(
         drawn = SeedRange.TEST.seeds(0, seeds)
     else:
         drawn = range(first_seed, first_seed + seeds)
+    own = {each.name for each in fields(EvaluateOptions)} & {*context.params}
     options = EvaluateOptions(
+        **{name: context.params[name] for name in own - {"seeds"}},
         given=GivenCharge.of(charge, tnt_kg),
         seeds=drawn,
-        engine=engine,
-        cell_m=cell_m,
-        cells=cells,
-        until=until,
-        cvar_level=cvar_level,
-        processes=processes,
-        cache=cache,
-        export=export,
-        out=out,
         is_json=any_json(as_json, json_all),
-        json_all=json_all,
     )
     with running_on(cluster), resumable(resume_words(cache)):
         if run is not None:

@@ -1,7 +1,7 @@
 """`blast-env simulate`: run one blast; print its loads and write its files."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -20,6 +20,7 @@ from blast_env.cli.options import (
     GivenCharge,
     JsonAllOption,
     JsonOption,
+    LayoutOption,
     ScenarioArgument,
     TntOption,
     any_json,
@@ -69,9 +70,7 @@ _GAUGES: Final = ("gauge", "x (m)", "y (m)", "z (m)", "peak (kPa)", "impulse (Pa
 def simulate(
     context: typer.Context,
     scenario: ScenarioArgument,
-    layout: Path | None = typer.Option(
-        None, help="JSON file with the barrier's [row, column] cells."
-    ),
+    layout: LayoutOption = None,
     seed: int = typer.Option(0, help="Decides charge, fan and air.", min=0),
     engine: str | None = typer.Option(None, help=ENGINE_HELP, show_default=BY_SITE),
     stand_off_m: float | None = typer.Option(
@@ -162,20 +161,7 @@ def simulate(
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")
-    files = BlastFiles(
-        film=film,
-        heat_map=heat_map,
-        history=history,
-        scheme=scheme,
-        velocities=velocities,
-        impulse_map=impulse_map,
-        peak_map=peak_map,
-        risk_map=risk_map,
-        quantity=quantity,
-        gauge=gauge,
-        film_height_m=film_height_m,
-        film_section=film_section,
-    )
+    files = BlastFiles(**{each.name: context.params[each.name] for each in fields(BlastFiles)})
     fixed = given.fixed(site, draw_threat(site, seed))
     blast: Any = used.blast(site, elements, seed, fixed)
     files.check(blast)

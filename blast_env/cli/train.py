@@ -43,6 +43,8 @@ _POLICIES: Final = {"features": "MlpPolicy", "image": "CnnPolicy"}
 """Policies of the observations other than planes, for which the YAML files hold policies."""
 _DEFAULT_SCENARIO: Final = "courtyard"
 _ENGINE_HELP: Final = f"{ENGINE_HELP} surrogate guesses them."
+_SETTINGS: Final = ("steps", "seed", "threat", "engine", "observation", "cell_m", "cells")
+"""Options that are settings of a run."""
 _WITH_RESUME: Final = ("resume", "scenario", "cluster")
 """Options allowed with `--resume`; the run folder fixes the others."""
 
@@ -105,17 +107,9 @@ def train(
             refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")
             result = _go_on(resume, scenario)
         else:
-            given = {
-                "steps": steps,
-                "seed": seed,
-                "threat": threat,
-                "engine": engine,
-                "observation": observation,
-                "cell_m": cell_m,
-                "cells": cells,
-            }
+            values = {name: context.params[name] for name in _SETTINGS}
             known: dict[str, Any] = {
-                name: value for name, value in given.items() if value is not None
+                name: value for name, value in values.items() if value is not None
             }
             known["start_from"] = None if start_from is None else str(start_from)
             result = _train(
