@@ -127,6 +127,7 @@ def report_html(study: Study, commands: list[str]) -> str:
         "word": lambda passes, flagged: Verdict.of(passes).word(flagged).lower(),
         "percent": _percent,
         "gone": _gone,
+        "span": _span,
         "noun_of": counted,
         "css": _css,
         "impulse_error": lambda pa_s: _error(units.impulse_of(pa_s)),
@@ -195,7 +196,7 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "uncertainty": study.uncertainty,
         "references": REFERENCES,
         "spread": _spread(study),
-        "noun": study.scenario.objective.noun,
+        "final_notes": [each for each in study.notes if f", {options.words[1]}: " in each],
         "bay_tables": _bay_tables(study),
         "two_sizes": coarse != fine,
         "cells": " and ".join(dict.fromkeys(options.words)),
@@ -281,7 +282,7 @@ def _sureness(study: Study) -> Sureness | None:
         kg, is_found = mass_near(study.protected.under(number), target)
         kept = study.protected.under(number).passes(target)
         bound = "" if is_found else ("at least " if kept else "less than ")
-        masses.append(f"{bound}{kg:.3g} kg ({threat.name})")
+        masses.append(f"{threat.name} {bound}{kg:.3g} kg TNT")
     bare_text = probability_text(unprotected.of(target), len(unprotected.levels))
     return Sureness(protected.words(target), bare_text, tuple(masses))
 
@@ -408,7 +409,7 @@ def _sources(
             peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
             found.append((f"{titled(line.worst.target.name)}, {words}: impulse", impulse, where))
             found.append((f"{titled(line.worst.target.name)}, {words}: peak", peak, where))
-        span = f"{_gone(line.least)} to {_gone(line.most)}"
+        span = _span(line)
         span += _of_cells(_error(100.0 * line.error, 1))
         found.append(
             (
@@ -501,6 +502,12 @@ def _css(text: str) -> Markup:
 def _gone(share: float) -> str:
     """Return a reduction; a negative one in words."""
     return _percent(share) + worse(share)
+
+
+def _span(line: SummaryLine) -> str:
+    """Return the reductions of a building under all threats; one if they do not differ."""
+    least, most = _gone(line.least), _gone(line.most)
+    return least if least == most else f"{least} to {most}"
 
 
 def _points(share: float) -> str:

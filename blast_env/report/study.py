@@ -55,7 +55,7 @@ from blast_env.report.threats import (
 )
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import Tell, as_completed
-from blast_env.site import AnyCharge, Scenario
+from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.statistics import reductions
 
 MOST_THREATS: Final = 6
@@ -614,9 +614,11 @@ class Runs:
     def _outcomes(self, label: str, charges: Sequence[LoadCase]) -> tuple[ThreatOutcome, ...]:
         loads = self._blasts(label, self._layouts, charges)
         unprotected, protected = loads[: len(charges)], loads[len(charges) :]
+        # The page has impulses there, whatever counts in the objective of the scenario.
+        site = self.scenario.model_copy(update={"objective": ObjectiveSection()})
         return tuple(
             map(
-                partial(ThreatOutcome.of, self.scenario, self.layout),
+                partial(ThreatOutcome.of, site, self.layout),
                 charges,
                 protected,
                 unprotected,
@@ -656,9 +658,9 @@ class Runs:
     def _loads(
         self, label: str, layouts: Sequence[Layout], threats: Sequence[LoadCase]
     ) -> FloatArray:
-        """Return the counted loads on the protected structures (layouts, threats)."""
-        objective = self.scenario.objective
-        counted = [each.load(objective) for each in self._blasts(label, layouts, threats)]
+        """Return the impulses on the protected structures, Pa s (layouts, threats)."""
+        blasts = self._blasts(label, layouts, threats)
+        counted = [each.protected_impulse_pa_s for each in blasts]
         return np.asarray(np.reshape(counted, (len(layouts), len(threats))))
 
     def _blasts(

@@ -2,6 +2,7 @@
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCase
+from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, StructureLoad
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.grid_error import convergence_index
@@ -139,6 +140,37 @@ def test_more_mass_is_more_impulse_and_places_are_those_of_the_scenario(study: S
     assert point.layout == ((2, 0), (3, 0))
     assert point.cost == 2.0
     assert 0.0 < point.reduction < outcomes[1].reduction  # two modules of four
+
+
+def test_impulses_stay_impulses_where_damage_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page gives them in Pa s: not the shortfall of a level that an objective counts."""
+    scenario = glazed_yard(target="medium")
+    own = {each.name: each for each in scenario.structures}
+    bare, walled = (
+        BlastLoads(tuple(StructureLoad.on(each, pa_s) for each in own.values()), np.zeros(0))
+        for pa_s in (200.0, 150.0)
+    )
+    threat = LoadCase(Charge((2.0, 6.0), 1.0), name="T1")
+    runs = Runs(
+        scenario, (TAKEN,), StudyOptions(), targets_of(scenario), (threat,), lambda *_: None
+    )
+
+    def blasts(_: str, layouts: Sequence[Layout], cases: Sequence[LoadCase]) -> list[BlastLoads]:
+        return [walled if layout else bare for layout in layouts for _ in cases]
+
+    monkeypatch.setattr(runs, "_blasts", blasts)
+    for each in runs.other_masses()[0]["T1"]:
+        assert (each.unprotected_load, each.load) == (200.0, 150.0)
+        assert each.reduction == pytest.approx(0.25)
+
+
+def test_page_one_counts_the_notes_on_the_cells_that_decide(study: Study) -> None:
+    fine, coarse = (f"T1 with the layout, cells of {m} m: far" for m in ("0.25", "0.5"))
+    of_both = report_html(replace(study, notes=(coarse, fine)), [])
+    assert "1 note on loads outside the validated range" in of_both
+    assert "2 notes, under validity; 1 with the finer cells, which decide" in of_both
+    of_one = report_html(replace(study, notes=(coarse,)), [])
+    assert "on loads outside the validated range of the engine" not in of_one
 
 
 def test_pieces_of_a_catalogue_are_the_items() -> None:
@@ -297,7 +329,8 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     assert '<td class="l">4, for 4 modules</td>' in first
     assert f"level {study.target.label!r}".replace("'", "&#39;") in first
     assert "driven by" in first
-    assert "keeps the level at the place of the threat" in first
+    assert "with it the level is kept at the same place" in first
+    assert "falls by" in first
     assert all(f"all windows: {each.title}" in page for each in verdict.glazing)
     assert page.count("no price given in the site file") == len(verdict.glazing) - 1
     assert "installed already" in page  # of the windows as they are
