@@ -309,6 +309,27 @@ def test_charges_stand_at_the_kerb(tmp_path: Path) -> None:
     assert any("lies over 1 parts of streets" in note for note in wide.notes)
 
 
+def test_widths_of_streets_are_those_of_their_lanes_or_guessed(tmp_path: Path) -> None:
+    tags: dict[str, dict[str, str]] = {"way 3": {"lanes": "4"}, "way 4": {}}
+    extract = town()
+    for y, (place, more) in zip((-30.0, -50.0), tags.items(), strict=True):
+        ends = [extract.node(x, y) for x in (-20.0, 30.0)]
+        extract.way_of(int(place[-1]), ends, highway="residential", **more)
+    site = imported(extract.write(tmp_path), rotation_deg=0.0, margin_m=60.0, **HOUSE_1)
+    (guess,) = entries(site, Deed.GUESSED, "widths of streets")
+    assert (guess.place, guess.detail) == ("way 4", "6 m as residential")
+    south = site.buildings[0].outline.bounds[1]
+    near = sorted(south - y for y in kerbs_m(site))
+    assert near == pytest.approx([9.0, 15.0, 25.0, 35.0, 48.0, 52.0], rel=0.01)
+
+
+def test_a_lane_too_near_to_a_building_is_named(tmp_path: Path) -> None:
+    lane = street(-0.1, width="2")
+    lane["geometry"]["coordinates"] = [[1, -0.1], [5, -0.1]]
+    site = imported(written(tmp_path, HOUSE, lane, PLACE))
+    assert places(entries(site, Deed.LEFT_OUT, "too near to a building")) == ["features[1]"]
+
+
 def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
     assert "--charge-at X,Y" in error_of(written(tmp_path, HOUSE))
     assert "--margin" in error_of(written(tmp_path, HOUSE))
