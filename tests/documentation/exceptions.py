@@ -152,7 +152,7 @@ SMALLER: Final[dict[str, str]] = {
         "--random-layouts 1 --charges 1 --seeds 1"
     ),
     "python -m studies.gas definition": "--scenario control_room --until 0.05",
-    "python -m studies.gas ending --generated 5": "--generated 0 --times 1.1",
+    "python -m studies.gas ending": "--generated 0 --times 1.1",
     "python -m studies.gas oblique": "--angles 20 --until 0.02",
     "python -m studies.gas cells --scenario visitor_entrance --random-layouts 0 --finest 0.125": (
         "--sizes 0.5 --finest 0.5"
@@ -210,15 +210,10 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.check_sites --family item_sites --sites 12 --random-layouts 3 --threats 1"
     " --no-rejected --picture docs/pictures/item_sites.png": "--sites 2 --random-layouts 2",
     # docs/studies
-    "python -m studies.bench --engine gas --no-environment --repeats 3"
-    " --scenario visitor_entrance --scenario control_room --scenario school_and_clinic"
-    " --scenario hotel_forecourt --scenario shopping_street --scenario courtyard"
-    " --scenario street_front": "--repeats 1 --no-memory --scenario visitor_entrance",
     "python -m studies.engines": "--seeds 3 --scene courtyard",
     "python -m studies.bench --repeats 3": (
         "--engine event --repeats 1 --no-memory --no-environment"
     ),
-    "python -m studies.bench --site large": "--length 20",
     "python -m studies.bench --engine surrogate --scenario control_room": (
         "--repeats 1 --no-memory --environments 2"
     ),
@@ -232,6 +227,11 @@ SMALLER: Final[dict[str, str]] = {
 """Options that are appended to studies and trainings of minutes to hours."""
 
 NOT_RUN: Final[dict[str, str]] = {
+    "python -m studies.bench --site visitor_entrance --site control_room --site school_and_clinic"
+    " --site hotel_forecourt --site shopping_street --site courtyard --site street_front"
+    " --site large --cells uniform --cells coarse": (
+        "a minute of one core; tests/studies/test_bench.py"
+    ),
     "blast-env --install-completion": "changes the shell of whoever runs it",
     "blast-env import FILE --out site.toml": "FILE is a placeholder; the page's next commands run",
     "blast-env draw --check-only FILE...": "FILE is a placeholder; docs/start.md has a file",
