@@ -152,7 +152,7 @@ _FACADES: Final = ("clinic_front", "guard_post", "school_wing", "ministry_kerb")
 def _definitions() -> tuple[Definition, ...]:
     return (
         *(Definition(site, "known", place) for site in _STREETS for place in (1, 2, 3)),
-        *(Definition(site, "known") for site in _OPEN),
+        *(Definition(site, "known") for site in (*_OPEN, "hotel_forecourt")),
         *(Definition(site, "hidden") for site in _STREETS),
         *(Definition(site, "vehicle") for site in ("hotel_forecourt", "shopping_street")),
         *(Definition(f"{_GENERATED}{seed}", "vehicle") for seed in _PUBLIC_VEHICLES),
@@ -166,12 +166,17 @@ DEFINITIONS: Final[Mapping[str, Definition]] = MappingProxyType(
 )
 """All public problems by name."""
 
-SMALL: Final = (
-    "visitor_entrance-known_2-v2",
+LITE: Final = (
     "control_room-known-v2",
     "school_and_clinic-known-v2",
+    "school_and_clinic-known_3-v2",
+    "hotel_forecourt-known-v2",
+    "hotel_forecourt-vehicle-v2",
+    "site_6103-unseen-v2",
+    "guard_post-response-v2",
 )
-"""A few problems with one blast per layout, for a first look and for methods with many seeds."""
+"""The Lite track: problems whose best known layout takes off at least 5 points more of the load
+than the best rule, by the judge's cells."""
 
 
 def find_definition(name: str) -> Definition:

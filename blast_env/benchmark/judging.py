@@ -10,8 +10,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from blast_env.arrays import FloatArray
-from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
+from blast_env.benchmark.definitions import DEFINITIONS, Definition
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import (
     ScoreReference,
@@ -109,10 +108,7 @@ class JudgedSubmission:
     @property
     def submission(self) -> Submission:
         """The submission without its shares, for another judgement."""
-        runs = (
-            Run(each.problem, each.budget, each.seed, each.blasts, each.layout)
-            for each in self.runs
-        )
+        runs = (Run(*each.key, each.blasts, each.layout, curve=each.curve) for each in self.runs)
         return Submission(self.method, tuple(runs), self.note)
 
     @property
@@ -123,68 +119,40 @@ class JudgedSubmission:
     def score(self, budget: int) -> Estimate:
         """Return the mean score with a budget over the problems of the submission.
 
-        Each problem uses its largest submitted budget up to this one, and scores 0 if there is
-        none. The 95 % interval covers the variation of the mean over the seeds of the runs.
+        A problem without a run scores 0. The 95 % interval covers the variation of the mean over
+        the seeds of the runs.
         """
-        return self._mean({budget: 1.0})
+        scores = self._by_problem(budget, lambda run: run.score, 0.0)
+        return stratified_estimate([(1.0 / len(scores), each) for each in scores])
 
-    def area(self) -> Estimate:
-        """Return the area under the score over the logarithm of the blasts."""
-        return self._mean(BUDGET_WEIGHTS)
+    def score_over_problems(self, budget: int) -> Estimate:
+        """Return the same with its interval over the problems."""
+        return self._mean(budget, lambda run: run.score, 0.0)
 
     def reduction(self, budget: int) -> Estimate:
         """Return the mean share of the load taken off, with its interval over the problems.
 
-        Args:
-            budget: As for `score`; problems without a run count 0.
+        A problem without a run counts 0.
         """
-        return mean_estimate(1.0 - self._shares(budget)[0])
+        return self._mean(budget, lambda run: 1.0 - run.share, 0.0)
 
     def lead(self, budget: int) -> Estimate:
         """Return `reduction` less that of the best rule of each problem, paired by problem."""
-        return mean_estimate(np.subtract(*self._shares(budget)[::-1]))
+        return self._mean(budget, lambda run: run.rule - run.share, -1.0)
 
-    def _shares(self, budget: int) -> FloatArray:
-        """Return the mean shares that remain, and those of the best rules (2, problems)."""
-        pairs = []
-        for name in self.problems:
-            of_problem = [run for run in self.runs if run.problem == name]
-            spent = self._spent(name, budget)
-            own = [run.share for run in of_problem if run.budget == spent] or [1.0]
-            pairs.append((float(np.mean(own)), of_problem[0].rule))
-        return np.array(pairs).T
+    def _by_problem(
+        self, budget: int, value: Callable[[JudgedRun], float], missing: float
+    ) -> list[list[float]]:
+        """Return a value of the runs with a budget, by problem."""
+        found: dict[str, list[float]] = {name: [] for name in self.problems}
+        for run in self.runs:
+            if run.budget == budget:
+                found[run.problem].append(value(run))
+        return [each or [missing] for each in found.values()]
 
-    def _mean(self, of_budgets: Mapping[int, float]) -> Estimate:
-        """Return the mean score over budgets with weights."""
-        groups = []
-        for name in self.problems:
-            weights: dict[int, float] = defaultdict(float)
-            for budget, weight in of_budgets.items():
-                weights[self._spent(name, budget)] += weight
-            for budget, weight in weights.items():
-                groups.append((weight / len(self.problems), self._scores(name, budget) or [0.0]))
-        return stratified_estimate(groups)
-
-    def _spent(self, problem: str, budget: int) -> int:
-        """Return the largest submitted budget up to this one; -1 if there is none."""
-        entered = {run.budget for run in self.runs if run.problem == problem}
-        return max((each for each in entered if each <= budget), default=-1)
-
-    def _scores(self, problem: str, budget: int) -> list[float]:
-        spent = self._spent(problem, budget)
-        return [run.score for run in self.runs if run.problem == problem and run.budget == spent]
-
-
-def _budget_weights() -> dict[int, float]:
-    """Return the weight of each budget: trapezoids over the logarithm of 1 + blasts."""
-    places = np.log1p(np.array(BUDGETS, dtype=np.float64))
-    widths = np.diff(places)
-    weights = 0.5 * (np.append(widths, 0.0) + np.append(0.0, widths)) / places[-1]
-    return {budget: float(weight) for budget, weight in zip(BUDGETS, weights, strict=True)}
-
-
-BUDGET_WEIGHTS: Final[Mapping[int, float]] = _budget_weights()
-"""Weights of the budgets in the area; their sum is 1."""
+    def _mean(self, budget: int, value: Callable[[JudgedRun], float], missing: float) -> Estimate:
+        of_problems = self._by_problem(budget, value, missing)
+        return mean_estimate(np.array([np.mean(each) for each in of_problems]))
 
 
 def judge(

@@ -39,6 +39,8 @@ def _proposed(proposer: Proposer, problem: BenchmarkProblem, seed: int) -> Layou
     result = proposer.propose(problem, problem.most_blasts, seed)
     if result.interrupted:
         raise KeyboardInterrupt
+    for each in result.history:
+        problem.enter(each)
     return result.layout
 
 

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from blast_env.benchmark.definitions import BUDGETS, SEEDS, Definition, find_definition
 from blast_env.benchmark.references import ScoreReference, stored_references
 from blast_env.benchmark.space import LayoutSpace
-from blast_env.design.search import DesignProblem
+from blast_env.design.search import Candidate, DesignProblem
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
@@ -23,6 +24,9 @@ from blast_env.evaluation.engines import JUDGE, Engine, find_engine
 from blast_env.geometry import Element, Layout
 from blast_env.layout import check_layout
 from blast_env.values import whole_number
+
+_MOST_REPEATS: Final = 200
+"""Successive evaluations without a new blast after which a problem ends a method."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,7 @@ class BenchmarkProblem(DesignProblem):
 
     definition: Definition
     history: list[Evaluated] = field(default_factory=list, init=False)
+    _repeats: int = field(default=0, init=False, repr=False)
 
     @property
     def most_blasts(self) -> int:
@@ -102,6 +107,25 @@ class BenchmarkProblem(DesignProblem):
         """The best of the layouts evaluated with most threats; `None` before the first."""
         return min(self.history, key=lambda each: (-each.threats, each.share), default=None)
 
+    @property
+    def curve(self) -> tuple[tuple[int, float], ...]:
+        """Blasts spent and share of the best layout so far, each time it changed."""
+        found: list[tuple[int, float]] = []
+        best = (0, 0.0)
+        for each in self.history:
+            rank = (-each.threats, each.share)
+            if rank < best:
+                best = rank
+                found.append((each.blasts, round(each.share, 5)))
+        return tuple(found)
+
+    def enter(self, found: Candidate) -> None:
+        """Enter a layout of a search that counted its blasts in the history."""
+        met = replace(self.case, threats=self.case.threats[: found.threats])
+        unprotected = met.objective_value(self.unprotected[: found.threats], ())
+        share = found.load / unprotected
+        self.history.append(Evaluated(found.layout, share, found.threats, found.blasts))
+
     def check(self, layout: Sequence[Element]) -> tuple[str, ...]:
         """Return the reasons why a layout is illegal, one sentence each; none if it is legal.
 
@@ -126,7 +150,8 @@ class BenchmarkProblem(DesignProblem):
             The objective, to be minimised; 1 without a barrier.
 
         Raises:
-            BudgetError: If the blasts exceed the budget.
+            BudgetError: If the blasts exceed the budget, or after many evaluations in a row without
+                a new blast. A method may let it end its search (`play`).
             LayoutError: If the layout is not legal; no blast is counted then.
             BlastEnvError: If `threats` is not 1 to the number of threats.
         """
@@ -138,6 +163,7 @@ class BenchmarkProblem(DesignProblem):
         pairs: list[tuple[Layout, LoadCase]] = [
             (checked, threat) for threat in self.case.threats[:count]
         ]
+        before = self.blasts
         try:
             self.spend(pairs)
         except BudgetError:
@@ -145,6 +171,9 @@ class BenchmarkProblem(DesignProblem):
                 f"{self.name}: {count} blasts asked for, {self.blasts_left} of the budget of "
                 f"{self.budget} are left"
             ) from None
+        self._repeats = self._repeats + 1 if self.blasts == before else 0
+        if self._repeats > _MOST_REPEATS:
+            raise BudgetError(f"{self.name}: {_MOST_REPEATS} evaluations without a new blast")
         met = replace(self.case, threats=self.case.threats[:count])
         (share,) = shares_of(met, [checked], self.evaluator)
         self.history.append(Evaluated(checked, share, count, self.blasts))

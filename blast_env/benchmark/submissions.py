@@ -10,8 +10,10 @@ from pydantic import ConfigDict, Field, TypeAdapter
 
 from blast_env.benchmark.definitions import BUDGETS, DEFINITIONS, Definition
 from blast_env.benchmark.problem import BenchmarkProblem
+from blast_env.benchmark.references import Share
 from blast_env.documents import MAX_BYTES, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, value_text
+from blast_env.evaluation import BudgetError
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
@@ -36,6 +38,7 @@ Runs = TypeVar("Runs")
 """A dataclass with runs."""
 
 Blasts = Annotated[int, Field(ge=0, le=MOST_BLASTS)]
+Curve = Annotated[tuple[tuple[Blasts, Share], ...], Field(max_length=MOST_BLASTS)]
 MethodName = Annotated[str, Field(min_length=1, max_length=60)]
 Note = Annotated[str, Field(max_length=500)]
 
@@ -50,6 +53,8 @@ class Run:
         seed: Seed of the run.
         blasts: Blasts spent.
         layout: The layout found.
+        curve: Blasts and share of the load that remains with the best layout by then, as the
+            method saw it, each time it changed.
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
@@ -59,6 +64,7 @@ class Run:
     seed: Annotated[int, Field(ge=0, le=MOST_SEED)]
     blasts: Blasts
     layout: Layout
+    curve: Curve = field(default=(), kw_only=True)
 
     @property
     def key(self) -> tuple[str, int, int]:
@@ -222,6 +228,8 @@ def play(
 ) -> tuple[Run, ...]:
     """Run a method on problems.
 
+    A method that asks for more blasts than are left ends with the best layout that it evaluated.
+
     Args:
         method: The method.
         asked: Triples (function that makes the problem, budget, seed); see `Asked`.
@@ -229,7 +237,7 @@ def play(
         progress: Called with each run.
 
     Raises:
-        BudgetError: If the method exceeds its budget.
+        BudgetError: If the budget does not pay for one evaluation.
         LayoutError: If its layout is illegal.
     """
     kept = None if store is None else Store(store)
@@ -239,11 +247,21 @@ def play(
         key = json.dumps((problem.name, budget, seed))
         run = None if kept is None else kept.read(key, _RUN.validate_json)
         if run is None:
-            layout = check_layout(problem.scenario, method(problem, seed))
-            run = Run(problem.name, budget, seed, problem.blasts, tuple(sorted(layout)))
+            layout = tuple(sorted(check_layout(problem.scenario, _found(method, problem, seed))))
+            spent, curve = problem.blasts, problem.curve
+            run = Run(problem.name, budget, seed, spent, layout, curve=curve)
             if kept is not None:
                 kept.put(key, _RUN.dump_json(run))
         runs.append(run)
         if progress is not None:
             progress(run)
     return tuple(runs)
+
+
+def _found(method: Method, problem: BenchmarkProblem, seed: int) -> Layout:
+    try:
+        return method(problem, seed)
+    except BudgetError:
+        if problem.best is None:
+            raise
+        return problem.best.layout

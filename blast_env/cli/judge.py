@@ -14,7 +14,7 @@ from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
     JUDGE_CELL_M,
-    SMALL,
+    LITE,
     Asked,
     BenchmarkProblem,
     Definition,
@@ -58,7 +58,7 @@ def judge(
         [], help="Run folder of a trained agent, as a further method; may be given again."
     ),
     problem: list[str] = typer.Option(
-        [], help="Problem for the methods; may be given again; else the small set, `all` for all."
+        [], help="Problem for the methods; may be given again; else the Lite track, `all` for all."
     ),
     scenario: list[str] = typer.Option(
         [],
@@ -150,7 +150,7 @@ def _definitions(
         check_names("threat", [threat], ["visible", "hidden"])
         own = [site_problems(each, cases, is_hidden=threat == "hidden") for each in scenarios]
         return {each.name: each for of_site in own for each in of_site}
-    names = DEFINITIONS if problems == ["all"] else problems or SMALL
+    names = DEFINITIONS if problems == ["all"] else problems or LITE
     return {name: make(name).definition for name in names}
 
 
@@ -213,7 +213,7 @@ class _Judging:
         with progress_bar(f"{len(asked)} runs of {name}") as progress:
             done = count(1)
             runs = play(method, asked, store, lambda _: progress(next(done) / len(asked)))
-        submission = Submission(name[-60:], runs, f"blast-env judge: {name}")
+        submission = Submission(name.rpartition(":")[2][-60:], runs, f"blast-env judge: {name}")
         if self.out is not None:
             print_written([submission.save(self.out / f"{_file_name(name)}.json")])
         return submission

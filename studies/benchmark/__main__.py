@@ -4,38 +4,41 @@ from pathlib import Path
 from time import monotonic
 from typing import Annotated
 
+import numpy as np
 import typer
+from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 
 from blast_env.benchmark import (
+    BUDGETS,
     DEFINITIONS,
-    SMALL,
-    Asked,
-    Run,
+    JUDGE_CELL_M,
+    LITE,
     ScoreReference,
     Submission,
-    make,
-    play,
+    shipped_standings,
 )
-from blast_env.benchmark.methods import find_method, reference_of
+from blast_env.benchmark.methods import reference_of
 from blast_env.benchmark.references import cell_key, engine_key, stored_references
 from blast_env.cli.output import print_line, user_errors
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines import JUDGE, find_engine
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import write_atomically
+from blast_env.plots.figures import save_figure
 from blast_env.tables import markdown_table
-from studies.benchmark.methods import OUTSIDE
 from studies.benchmark.references import (
     known_layouts,
+    mean_curve,
     published_blasts,
+    seen_references,
     submitted_layouts,
+    with_fine_shares,
     with_published,
 )
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
 _STORED = Path("blast_env/benchmark/data/references.json")
-_CELL = cell_key(0.5)
+_CELL, _FINE = cell_key(0.5), cell_key(JUDGE_CELL_M)
 _REFERENCES = TypeAdapter(dict[str, ScoreReference])
 
 
@@ -76,57 +79,68 @@ def references(
                 f"{name}: {rule.method} {rule.shares[_CELL]:.3f}, {best.method} "
                 f"{best.shares[_CELL]:.3f}, {evaluator.counts.blasts} blasts"
             )
-            with write_atomically(out) as temporary:
-                temporary.write_bytes(_REFERENCES.dump_json(dict(sorted(known.items()))) + b"\n")
+            _write(known, out)
+        fine = find_engine(JUDGE, JUDGE_CELL_M)
+        for name in LITE:
+            if _FINE in known[name].best.shares or monotonic() - began > most_s:
+                continue
+            evaluator = BlastEvaluator(DEFINITIONS[name].scenario, fine, cache=store)
+            known[name] = with_fine_shares(DEFINITIONS[name], known[name], evaluator)
+            print_line(f"{name}, {_FINE} m: {evaluator.counts.blasts} blasts")
+            _write(known, out)
+
+
+def _write(known: dict[str, ScoreReference], out: Path) -> None:
+    with write_atomically(out) as temporary:
+        temporary.write_bytes(_REFERENCES.dump_json(dict(sorted(known.items()))) + b"\n")
 
 
 @app.command()
-def headroom() -> None:
+def headroom(
+    lite: Annotated[
+        bool, typer.Option("--lite", help="Of the Lite track alone, by the judge's cells too.")
+    ] = False,
+) -> None:
     """Print the lead of the best known layout over the best of all rules, by problem.
 
     It is a lower bound of the possible gain over the rules.
     """
+    known, cells = stored_references(), (_CELL, _FINE) if lite else (_CELL,)
     rows = []
-    for name, each in stored_references().items():
-        rule, best = (100.0 * (1.0 - of.shares[_CELL]) for of in (each.rule, each.best))
-        shown = each.rule.method, f"{rule:.1f}", f"{best:.1f}", f"{best - rule:.1f}"
-        rows.append((f"`{name}`", *shown))
-    headers = ("problem", "best rule", "takes off (%)", "best known (%)", "points more")
+    for name in LITE if lite else known:
+        ends = known[name].rule, known[name].best
+        row = [f"`{name}`", ends[0].method]
+        for cell in cells:
+            rule, best = (100.0 * (1.0 - each.shares[cell]) for each in ends)
+            row += [f"{rule:.1f}", f"{best:.1f}", f"{best - rule:.1f}"]
+        rows.append(row)
+    of_cell = "takes off ({} m, %)", "best known", "points more"
+    headers = "problem", "best rule", *(each.format(cell) for cell in cells for each in of_cell)
     print_line(markdown_table(headers, rows))
 
 
-@app.command("play")
-def play_methods(
-    out: Annotated[Path, typer.Option(help="Folder for submissions; goes on with what it has.")],
+@app.command()
+def picture(
+    out: Annotated[Path, typer.Argument(help="The file.")] = Path("docs/pictures/lite.png"),
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
-    method: Annotated[list[str] | None, typer.Option(help="Method, again and again.")] = None,
-    problem: Annotated[list[str] | None, typer.Option(help="Problem, again and again.")] = None,
-    budget: Annotated[list[int] | None, typer.Option(help="Blasts.")] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of each.")] = 10,
-    first_seed: Annotated[int, typer.Option(min=0)] = 0,
-    cell: Annotated[float, typer.Option(help="Side of the cells, m.")] = 0.5,
-    most_s: Annotated[float, typer.Option(help="Stop before a run after so many s.")] = 1e9,
 ) -> None:
-    """Run methods on problems, one seed of all before the next, and write their submissions."""
+    """Draw the mean score over the blasts spent, on the cells and charges of the search."""
     with user_errors():
-        make_folder(out)
-        began = monotonic()
-        names = method or list(OUTSIDE)
-        found = {each: OUTSIDE.get(each) or find_method(each) for each in names}
-        made = [
-            lambda budget, name=name: make(name, budget, cell, cache=cache)
-            for name in problem or SMALL
-        ]
-        runs: dict[str, list[Run]] = {each: [] for each in names}
-        for seed in range(first_seed, first_seed + seeds):
-            for each in names:
-                if monotonic() - began > most_s:
-                    raise BlastEnvError("the time is over; the same command goes on")
-                asked = Asked(made, budget or (50,), (seed,))
-                runs[each] += play(found[each], asked, out / f"{each}.sqlite")
-                print_line(f"seed {seed}, {each}: {monotonic() - began:.0f} s")
-        for each, own in runs.items():
-            Submission(each, tuple(own)).save(out / f"{each}.json")
+        methods = [each for each in shipped_standings() if set(each.problems) == set(LITE)]
+        ends = {name: seen_references(name, cache) for name in LITE}
+        figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+        axes = figure.add_subplot(xlabel="blasts", ylabel="score as the search sees it")
+        budget, curves = BUDGETS[1], {}
+        blasts = np.arange(budget + 1)
+        for each in methods:
+            runs = [run for run in each.runs if run.budget == budget]
+            curves[each.method] = mean_curve(runs, ends, blasts)
+        for name in sorted(curves, key=lambda each: -curves[each][-1]):
+            axes.step(blasts, curves[name], where="post", label=name)
+        axes.set_ylim(bottom=0.0)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="small")
+        save_figure(figure, out)
 
 
 if __name__ == "__main__":

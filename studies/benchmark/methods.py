@@ -1,60 +1,57 @@
-"""Methods of other libraries on the benchmark: each proposes a layout and receives its share.
+"""Methods of the standings that are not of the package: other libraries, and trained agents.
 
-The libraries are not dependencies: install them with `pip install optuna nevergrad botorch smac`.
-MCBO needs a separate environment, with its folder from huawei-noah/HEBO on the path and `pip
-install "gpytorch<1.9" "pandas<3" disjoint_set`.
+`blast-env judge --method studies.benchmark.methods:NAME` plays one. Optuna and BoTorch are not
+dependencies: `pip install optuna botorch`. The agents train on guesses of the packaged surrogate
+alone, for the site and charges of the problem; the budget pays for layouts of the trained policy.
 """
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+import torch
+from sb3_contrib import MaskablePPO
+from stable_baselines3 import PPO
 
 from blast_env.arrays import FloatArray
-from blast_env.benchmark import BenchmarkProblem, Method
-from blast_env.benchmark.adapters import mcbo_task
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BudgetError
+from blast_env.benchmark import BenchmarkProblem
+from blast_env.design.search.registry import rule_layouts
+from blast_env.design.surrogate import SurrogateEngine
+from blast_env.design.surrogate.network import packaged_surrogate
+from blast_env.design.surrogate.search import Guesses, improved
+from blast_env.envs.barrier_env import BlastBarrierEnv
+from blast_env.evaluation import LoadCaseSet
 from blast_env.geometry import Layout
-
-_REPEATS: Final = 200
-"""Evaluations in a row without a new blast after which a method ends."""
+from blast_env.site import AnyCharge, AnySource, Scenario
+from blast_env.site.vehicles import source_of
+from blast_env.values import generator
 
 _FIT_EVERY: Final = 5
 """Evaluations between fits of the model's length scales: a fit takes as long as a blast."""
 
-Value = Callable[[FloatArray], float]
+_STEPS: Final = 4096
+"""Steps of the environment in a training."""
+
+_DRAWS: Final = 200
+"""Layouts drawn from a trained policy."""
+
+_GUESSED: Final = 1000
+"""Layouts of the search by guesses whose best ones are imitated."""
+
+_IMITATED: Final = 32
+_ORDERS: Final = 4
+"""Random orders in which each of them is placed."""
+
+_EPOCHS: Final = 30
+_BATCH: Final = 64
 
 
-def by_keys(search: Callable[[BenchmarkProblem, int, Value], None]) -> Method:
-    """Return a method in which a library chooses random keys until the budget is spent."""
-
-    def method(problem: BenchmarkProblem, seed: int) -> Layout:
-        repeats = 0
-
-        def value(keys: FloatArray) -> float:
-            nonlocal repeats
-            before = problem.blasts
-            share = problem.evaluate(problem.space.from_keys(keys))
-            repeats = repeats + 1 if problem.blasts == before else 0
-            if repeats > _REPEATS:
-                raise BudgetError("nothing new")
-            return share
-
-        with suppress(BudgetError):
-            search(problem, seed, value)
-        if problem.best is None:
-            raise BlastEnvError(f"{problem.name}: the method asked for nothing")
-        return problem.best.layout
-
-    return method
+def _share(problem: BenchmarkProblem, keys: FloatArray) -> float:
+    return problem.evaluate(problem.space.from_keys(keys))
 
 
-def optuna_tpe(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+def optuna_tpe(problem: BenchmarkProblem, seed: int) -> Layout:
     """Optuna's tree-structured Parzen estimator, all keys together."""
     import optuna
 
@@ -64,51 +61,10 @@ def optuna_tpe(problem: BenchmarkProblem, seed: int, value: Value) -> None:
     while True:
         trial = study.ask()
         keys = [trial.suggest_float(name, 0.0, 1.0) for name in names]
-        study.tell(trial, value(np.array(keys)))
+        study.tell(trial, _share(problem, np.array(keys)))
 
 
-def nevergrad_ngopt(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """Nevergrad's NGOpt, which chooses a method by dimension and budget."""
-    import nevergrad as ng
-
-    keys = ng.p.Array(shape=(problem.space.keys,), lower=0.0, upper=1.0)
-    keys.random_state.seed(seed)
-    optimizer = ng.optimizers.NGOpt(parametrization=keys, budget=problem.budget)
-    while True:
-        asked = optimizer.ask()
-        optimizer.tell(asked, value(np.asarray(asked.value)))
-
-
-def _never_run(config: object, seed: int = 0) -> float:
-    """Serve as the target function that SMAC requires; its ask-and-tell interface needs none."""
-    raise BlastEnvError(f"{config}, {seed}: nothing is run by SMAC itself")
-
-
-def smac_forest(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """SMAC's Bayesian optimisation with a random forest, at its default settings."""
-    from ConfigSpace import ConfigurationSpace, Float
-    from smac import HyperparameterOptimizationFacade, Scenario
-    from smac.runhistory.dataclasses import TrialValue
-
-    names = [f"key_{index:03}" for index in range(problem.space.keys)]
-    space = ConfigurationSpace(seed=seed)
-    space.add([Float(name, (0.0, 1.0)) for name in names])
-    with TemporaryDirectory() as folder:
-        settings = Scenario(
-            space,
-            n_trials=problem.budget,
-            deterministic=True,
-            seed=seed,
-            output_directory=Path(folder),
-        )
-        smac = HyperparameterOptimizationFacade(settings, _never_run, logging_level=False)
-        while True:
-            trial = smac.ask()
-            keys = np.array([trial.config[name] for name in names])
-            smac.tell(trial, TrialValue(cost=value(keys)))
-
-
-def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
+def botorch_turbo(problem: BenchmarkProblem, seed: int) -> Layout:
     """Trust-region Bayesian optimisation (TuRBO) with BoTorch: GP, Thompson sampling."""
     import torch
     from botorch.fit import fit_gpytorch_mll
@@ -119,7 +75,7 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
     sobol: Any = torch.quasirandom.SobolEngine(problem.space.keys, scramble=True, seed=seed)  # type: ignore[no-untyped-call]
     first = max(problem.most_blasts // 5, 4)
     places = sobol.draw(first, dtype=torch.float64)
-    values = torch.tensor([[value(each.numpy())] for each in places], dtype=torch.float64)
+    values = torch.tensor([[_share(problem, each.numpy())] for each in places], dtype=torch.float64)
     side, won, lost = 0.8, 0, 0
     fitted: dict[str, Any] = {}
     while True:
@@ -140,7 +96,7 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
         with torch.no_grad():
             sample = model.posterior(drawn).sample().reshape(-1)
         chosen = drawn[sample.argmax()]
-        found = value(chosen.numpy())
+        found = _share(problem, chosen.numpy())
         better = found < float(values.min()) - 1e-3 * abs(float(values.min()))
         won, lost = (won + 1, 0) if better else (0, lost + 1)
         if won == 3:
@@ -153,31 +109,124 @@ def botorch_turbo(problem: BenchmarkProblem, seed: int, value: Value) -> None:
         values = torch.cat([values, torch.tensor([[found]], dtype=torch.float64)])
 
 
-def mcbo_casmopolitan(problem: BenchmarkProblem, seed: int, value: Value) -> None:
-    """MCBO's Casmopolitan, in a trust region: items are nominal, places are integers."""
-    from mcbo.optimizers.bo_builder import BO_ALGOS
-    from mcbo.utils.general_utils import set_random_seed
-
-    set_random_seed(seed)
-    task = mcbo_task(problem)
-    first = max(problem.most_blasts // 5, 4)
-    bo = BO_ALGOS["Casmopolitan"].build_bo(task.get_search_space(), n_init=first)
-    while True:
-        asked = bo.suggest(1)
-        bo.observe(asked, np.array([[value(task.keys(asked.iloc[0]))]]))
+def ppo(problem: BenchmarkProblem, seed: int) -> Layout:
+    """PPO of Stable-Baselines3; its action is a row across the line of sight."""
+    env = _environment(problem, "row")
+    model = PPO("MlpPolicy", env, seed=seed, **_SETTINGS).learn(_STEPS)
+    return _best_drawn(problem, env, lambda seen, steady: model.predict(seen, None, None, steady))
 
 
-_SEARCHES: Final[Mapping[str, Any]] = MappingProxyType(
-    {
-        "optuna_tpe": optuna_tpe,
-        "nevergrad_ngopt": nevergrad_ngopt,
-        "smac_forest": smac_forest,
-        "botorch_turbo": botorch_turbo,
-        "mcbo_casmopolitan": mcbo_casmopolitan,
-    }
-)
+def maskable_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
+    """MaskablePPO of sb3-contrib, with the same actions."""
+    env = _environment(problem, "row")
+    return _of_masked(problem, env, MaskablePPO("MlpPolicy", env, seed=seed, **_SETTINGS), _STEPS)
 
-OUTSIDE: Final[Mapping[str, Method]] = MappingProxyType(
-    {name: by_keys(search) for name, search in _SEARCHES.items()}
-)
-"""Methods of other libraries, by name."""
+
+def imitation(problem: BenchmarkProblem, seed: int) -> Layout:
+    """A policy that learns to place the best layouts of a search by guesses, piece by piece."""
+    torch.manual_seed(seed)
+    env, rng = _environment(problem, "place"), generator(seed)
+    guesses = Guesses.of(packaged_surrogate(), problem.case)
+    best = improved(guesses, [(), *rule_layouts(problem)], _GUESSED, rng)[:_IMITATED]
+    model = MaskablePPO("MlpPolicy", env, seed=seed, **_SETTINGS)
+    seen, masks, actions = _demonstrated(env, best * _ORDERS, rng)
+    optimiser = torch.optim.Adam(model.policy.parameters(), 1e-3)
+    for _ in range(_EPOCHS * len(seen) // _BATCH):
+        batch = rng.integers(len(seen), size=_BATCH)
+        given, taken = torch.as_tensor(seen[batch]), torch.as_tensor(actions[batch])
+        _, log_likelihood, _ = model.policy.evaluate_actions(given, taken, masks[batch])
+        optimiser.zero_grad()
+        loss: torch.Tensor = -log_likelihood.mean()
+        loss.backward()  # type: ignore[no-untyped-call]
+        optimiser.step()
+    return _of_masked(problem, env, model, 0)
+
+
+_SETTINGS: Final[dict[str, Any]] = {
+    "learning_rate": 1e-3,
+    "n_steps": 512,
+    "gamma": 1.0,
+    "ent_coef": 0.01,
+    "device": "cpu",
+}
+
+Predict = Callable[[Any, bool], tuple[Any, Any]]
+
+
+@dataclass(frozen=True)
+class _OfCase:
+    """The charges of a case; a `ThreatModel`."""
+
+    case: LoadCaseSet
+
+    def draw(self, scenario: Scenario, rng: np.random.Generator) -> tuple[AnyCharge, ...]:  # noqa: ARG002
+        return tuple(self.case.charges)
+
+    def shown(self, scenario: Scenario, charges: tuple[AnyCharge, ...]) -> tuple[AnySource, ...]:
+        return (source_of(charges[0]),) if len(charges) == 1 else scenario.charge
+
+
+def _environment(problem: BenchmarkProblem, action: str) -> BlastBarrierEnv:
+    """Return the environment of a problem, on the safe ends of the surrogate's guesses."""
+    torch.set_num_threads(1)
+    return BlastBarrierEnv(
+        problem.scenario,
+        reward="relative",
+        observation="features",
+        action=action,
+        threat=_OfCase(problem.case),
+        realisations=1,
+        engine=SurrogateEngine(safe=True),
+    )
+
+
+def _of_masked(
+    problem: BenchmarkProblem, env: BlastBarrierEnv, model: MaskablePPO, steps: int
+) -> Layout:
+    if steps:
+        model.learn(steps)
+    return _best_drawn(
+        problem,
+        env,
+        lambda seen, steady: model.predict(
+            seen, deterministic=steady, action_masks=env.action_masks()
+        ),
+    )
+
+
+def _best_drawn(problem: BenchmarkProblem, env: BlastBarrierEnv, predict: Predict) -> Layout:
+    """Blast the policy's proposal, then its draws, the best guess first; return the best."""
+
+    def drawn(*, steady: bool) -> tuple[Layout, float]:
+        seen, _ = env.reset(seed=0)
+        ended = False
+        while not ended:
+            action, _ = predict(seen, steady)
+            seen, _, ended, _, info = env.step(np.int64(action))
+        return tuple(sorted(info["layout"])), info["reduction"]
+
+    proposal, _ = drawn(steady=True)
+    guessed = dict(drawn(steady=False) for _ in range(_DRAWS))
+    for layout in (proposal, *sorted(guessed, key=lambda each: -guessed[each])):
+        problem.evaluate(layout)
+    assert problem.best is not None
+    return problem.best.layout
+
+
+def _demonstrated(
+    env: BlastBarrierEnv, layouts: Sequence[Layout], rng: np.random.Generator
+) -> tuple[Any, Any, Any]:
+    """Return observations, masks and actions of the placement of layouts in random order."""
+    steps = []
+    for layout in layouts:
+        seen, _ = env.reset(seed=0)
+        ended = False
+        for index in (*rng.permutation(len(layout)).tolist(), None):
+            if ended:
+                break
+            catalogue = env.placement.catalogue
+            action = catalogue.finish if index is None else catalogue.action(layout[index])
+            steps.append((seen, env.action_masks(), action))
+            seen, _, ended, _, _ = env.step(np.int64(action))
+    seen_all, masks, actions = map(np.array, zip(*steps, strict=True))
+    return seen_all, masks, actions

@@ -1,19 +1,37 @@
 """Reference layouts for the score of each problem: the rules', and the best one known."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from blast_env.benchmark import Definition, Submission, make
+import numpy as np
+
+from blast_env.arrays import FloatArray, IntArray
+from blast_env.benchmark import (
+    JUDGE_CELL_M,
+    Definition,
+    KnownLayout,
+    Run,
+    ScoreReference,
+    Submission,
+    make,
+    stored_references,
+)
 from blast_env.benchmark.data import remember_published
 from blast_env.benchmark.methods import find_method
-from blast_env.evaluation import BlastStore
+from blast_env.benchmark.problem import shares_of
+from blast_env.benchmark.references import cell_key
+from blast_env.design.search import layouts_by_rule
+from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import load_layout
 from blast_env.site import Charge, VehicleCharge
 
 DATA = Path("docs/data")
 _MOST = 50_000  # blasts in memory
+_CLOSE = 0.03
+"""Share of the load within which a rule may become the best one with finer cells."""
 
 
 def published_layouts(definition: Definition, published: BlastStore) -> Iterator[Layout]:
@@ -72,3 +90,65 @@ def with_published(folder: Path, published: BlastStore) -> BlastStore:
     for key, loads in published.items():
         store.remember(key, loads)
     return store
+
+
+def with_fine_shares(
+    definition: Definition, known: ScoreReference, evaluator: BlastEvaluator
+) -> ScoreReference:
+    """Return the references with their shares by the judge's cells, and the best rule by these.
+
+    Args:
+        definition: The problem.
+        known: Its references with cells of 0.5 m.
+        evaluator: Runs the blasts with the cells of the judge.
+    """
+    coarse, fine = cell_key(0.5), cell_key(JUDGE_CELL_M)
+    layouts = layouts_by_rule(definition.scenario, definition.case.charge)
+    least = min(known.rules.values())
+    close = [name for name, share in known.rules.items() if share < least + _CLOSE]
+    rules = [
+        KnownLayout(name, tuple(sorted(layouts[name])), {coarse: known.rules[name]})
+        for name in close
+    ]
+    found = [*rules, known.best]
+    shares = shares_of(definition.case, [each.layout for each in found], evaluator)
+    *rules, best = (
+        replace(each, shares={**each.shares, fine: share})
+        for each, share in zip(found, shares, strict=True)
+    )
+    return replace(known, rule=min(rules, key=lambda each: each.shares[fine]), best=best)
+
+
+def seen_references(name: str, cache: Path | None) -> tuple[float, float]:
+    """Return the shares of the best rule and the best known layout as a search sees them.
+
+    A problem whose judge has other charges takes the blasts of both layouts.
+    """
+    problem, known = make(name, 0, cache=cache), stored_references()[name]
+    ends = (known.rule, known.best)
+    judged = problem.definition.case
+    if {each.charge for each in judged.threats} == {each.charge for each in problem.threats}:
+        rule, best = (each.shares[cell_key(0.5)] for each in ends)
+    else:
+        rule, best = shares_of(problem.case, [each.layout for each in ends], problem.evaluator)
+    return rule, best
+
+
+def mean_curve(
+    runs: Sequence[Run], ends: Mapping[str, tuple[float, float]], blasts: IntArray
+) -> FloatArray:
+    """Return the mean score of runs after numbers of blasts, 0 before their first layout.
+
+    Args:
+        runs: The runs.
+        ends: Shares of the load of score 0 and 1, by problem.
+        blasts: The numbers (blasts,).
+    """
+    scores = []
+    for run in runs:
+        rule, best = ends[run.problem]
+        spent, shares = np.array([(0, rule), *run.curve]).T
+        by_then = shares[np.searchsorted(spent, blasts, side="right") - 1]
+        scores.append(np.maximum((rule - by_then) / (rule - best), 0.0))
+    mean: FloatArray = np.mean(scores, axis=0)
+    return mean

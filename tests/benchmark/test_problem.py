@@ -1,5 +1,6 @@
 """Blasts are counted in the problem, versions say what they said, any optimiser can enter."""
 
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -75,13 +76,37 @@ def test_searches_of_the_package_stay_within_the_budget(name: str) -> None:
     assert layout == find_method(name)(problem(12), 1)
 
 
-def test_a_method_that_asks_for_more_is_refused() -> None:
-    def greedy(own: BenchmarkProblem, seed: int) -> Layout:
-        layouts = [(Piece(row, 0, "low_wall", True),) for row in range(20)]
-        return min(layouts, key=lambda layout: own.evaluate(layout))
+def test_the_budget_ends_a_method_with_its_best_layout() -> None:
+    """The row engine's best wall is in row 12, the search comes nearer to it by the blast."""
 
+    def endless(own: BenchmarkProblem, seed: int) -> Layout:
+        for row in count():
+            own.evaluate([Piece(row, 0, "low_wall", True)])
+        return ()
+
+    (run,) = play(endless, Asked([problem], (5,)))
+    assert run.layout == (Piece(4, 0, "low_wall", True),)
+    assert [blasts for blasts, _ in run.curve] == [1, 2, 3, 4, 5]
     with pytest.raises(BudgetError):
-        play(greedy, Asked([lambda budget: problem(budget)], (5,)))
+        play(endless, Asked([problem], (0,)))
+
+
+def test_a_method_without_new_questions_ends() -> None:
+    def stubborn(own: BenchmarkProblem, seed: int) -> Layout:
+        while True:
+            own.evaluate(WALL)
+
+    (run,) = play(stubborn, Asked([problem], (5,)))
+    assert (run.blasts, run.layout) == (1, tuple(WALL))
+
+
+@pytest.mark.parametrize("name", ["control_room-known-v2", "control_room-hidden-v2"])
+def test_the_curve_of_a_search_ends_at_its_layout(name: str) -> None:
+    (run,) = play(find_method("genetic"), Asked([lambda budget: problem(budget, name)], (12,)))
+    blasts, shares = zip(*run.curve, strict=True)
+    assert blasts[-1] <= run.blasts
+    assert shares[-1] == pytest.approx(problem(0, name).judged(run.layout), abs=1e-5)
+    assert blasts == tuple(sorted(blasts))
 
 
 def test_where_facades_count_measures_take_no_blast() -> None:

@@ -65,6 +65,7 @@ GIVEN: Final = (
         "wall/layout.json",
         _WALL,
     ),
+    Given(("docs/researchers/benchmark.md",), "own_optimiser.py", "examples/own_optimiser.py"),
     Given(("docs/howto/report.md",), "site.toml", "site.toml", _SITE),
     Given(("docs/howto/report.md",), "layout.json", "wall/layout.json", _SITE),
     Given(("docs/engineers/gas.md",), "my_site.toml", "scenarios/courtyard.toml"),
@@ -172,12 +173,15 @@ SMALLER: Final[dict[str, str]] = {
         "--charges 1 --changes 1"
     ),
     # docs/researchers/benchmark.md
-    "blast-env judge --method genetic --budget 50 --seeds 10 --out entry": (
+    "blast-env judge --method genetic --seeds 5 --cache blasts --out entry": (
+        "--problem visitor_entrance-known_2-v2 --budget 2 --seeds 1 --cell 0.5"
+    ),
+    "blast-env judge --method own_optimiser:climb --seeds 5 --cache blasts --out entry": (
         "--problem visitor_entrance-known_2-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge --scenario courtyard --cases 8 --method rules --method best_rule"
     " --run runs/courtyard --out out/entry": "--cases 1 --budget 2 --cell 0.5",
-    "blast-env judge entry/genetic.json --out entry": "--cell 0.5",
+    "blast-env judge entry/genetic.json --cache blasts --out entry": "--cell 0.5",
     # docs/paper
     # docs/researchers
     "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
@@ -250,9 +254,6 @@ NOT_RUN: Final[dict[str, str]] = {
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
     "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
     " --stochastic": "needs RL Zoo",
-    "python -m studies.benchmark play": "needs Optuna, Nevergrad and BoTorch",
-    "blast-env judge --method my_module:climb --secret 'a text that the judge keeps' --sites 8"
-    " --out entry": "my_module is a placeholder; tests/benchmark runs such a method",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
     "python ppo.py --env-id blast_env:BlastBarrier-v0 --total-timesteps 4096": "needs CleanRL",
 }

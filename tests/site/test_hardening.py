@@ -104,7 +104,7 @@ def test_a_rule_takes_the_dearest_glass_and_then_what_cuts_lines_of_sight() -> N
     assert {each[2:3] for each in alone} == {("better",), ("panels",)}
     assert both[: len(alone)] == alone
     assert len(both) > len(alone)
-    assert LayoutState.of(scenario, both).budget_left >= 0.0
+    assert LayoutState.of(scenario, both).cost <= scenario.zone.cost_limit
     needing = set(proposers(ProposerKind.RULE)) - set(
         proposers(ProposerKind.RULE, suiting=[Scenario.from_document(yard_document(), "yard")])
     )

@@ -1,9 +1,14 @@
-"""`python -m studies.benchmark`: its table of the problems that come with the package."""
+"""`python -m studies.benchmark`: its tables of the problems that come with the package."""
 
+import numpy as np
+import pytest
 from typer.testing import CliRunner
 
-from blast_env.benchmark import DEFINITIONS
+from blast_env.benchmark import DEFINITIONS, LITE, Run, make, play
+from studies.benchmark import methods
 from studies.benchmark.__main__ import app
+from studies.benchmark.references import mean_curve
+from tests.benchmark.row import RowEngine
 
 
 def test_no_best_layout_is_behind_a_rule_and_every_problem_is_there() -> None:
@@ -12,3 +17,30 @@ def test_no_best_layout_is_behind_a_rule_and_every_problem_is_there() -> None:
     rows = [line.strip("| ").split(" | ") for line in result.stdout.splitlines()[2:]]
     assert {row[0].strip("`") for row in rows} == {*DEFINITIONS}
     assert all(float(row[4]) >= 0.0 for row in rows)
+
+
+def test_in_the_lite_track_the_best_known_layout_is_five_points_ahead() -> None:
+    result = CliRunner().invoke(app, ["headroom", "--lite"])
+    assert result.exit_code == 0, result.output
+    rows = [line.strip("| ").split(" | ") for line in result.stdout.splitlines()[2:]]
+    assert [row[0].strip("`") for row in rows] == [*LITE]
+    assert all(float(row[-1]) >= 5.0 for row in rows)
+
+
+def test_a_curve_has_the_score_of_the_best_layout_by_then() -> None:
+    """Halfway from rule to best after two blasts; the rule counts until then."""
+    runs = [Run("a", 4, 0, 4, (), curve=((1, 0.7), (2, 0.5))), Run("a", 4, 1, 3, ())]
+    curve = mean_curve(runs, {"a": (0.6, 0.4)}, np.arange(5))
+    assert curve == pytest.approx([0.0, 0.0, 0.25, 0.25, 0.25])
+
+
+def test_a_trained_agent_spends_the_budget_on_its_layouts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its proposal and draws are complete layouts, and it trains without a blast."""
+    small = {"_DRAWS": 4, "_GUESSED": 8, "_IMITATED": 2, "_ORDERS": 1, "_EPOCHS": 1, "_BATCH": 4}
+    for key, value in small.items():
+        monkeypatch.setattr(methods, key, value)
+    problem = make("visitor_entrance-known_2-v2", 3, engine=RowEngine())
+    (run,) = play(methods.imitation, [(lambda _: problem, 3, 0)])
+    assert 1 <= run.blasts <= 3
+    assert run.layout == min(problem.history, key=lambda each: each.share).layout
+    assert all(each.layout for each in problem.history)

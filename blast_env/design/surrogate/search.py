@@ -374,12 +374,12 @@ class _Estimates:
         if not layouts:
             return []
         wrong_by = np.exp(self._errors(layouts))
-        order = np.argsort(wrong_by * self.everywhere.loads(layouts), kind="stable")
+        order = np.argsort(wrong_by * _floored(self.everywhere, layouts), kind="stable")
         return [layouts[index] for index in order.tolist()]
 
     def likeliest(self, layouts: Sequence[Layout]) -> Layout:
         """Return the layout with the least lower confidence bound of the corrected prediction."""
-        scores = np.log(self.everywhere.loads(layouts))
+        scores = np.log(_floored(self.everywhere, layouts))
         met = self.session.ranked(self.session.plan.threats)[:_LEARNT_FROM]
         if met:
             barrier = self.everywhere.site.barrier
@@ -390,6 +390,15 @@ class _Estimates:
 
     def _errors(self, layouts: Sequence[Layout]) -> FloatArray:
         """Return the logarithms of simulated over predicted loads, first threats (layouts,)."""
-        shares = self.session.assess(layouts) / self.met.loads(layouts)
+        shares = self.session.assess(layouts) / _floored(self.met, layouts)
         errors: FloatArray = np.log(np.maximum(shares, _LEAST_SHARE))
         return errors
+
+
+def _floored(guesses: Guesses, layouts: Sequence[Layout]) -> FloatArray:
+    """Return predictions above 0: a response may be predicted to be none, which has no logarithm.
+
+    The floor is a share of the prediction without a barrier.
+    """
+    least = max(_LEAST_SHARE * guesses.loads([()]).item(), _LEAST_SHARE**2)
+    return np.maximum(guesses.loads(layouts), least)
