@@ -173,28 +173,3 @@ def test_a_layout_passes_with_the_probability_that_is_wanted(
         "nothing that was tried reaches 'low' with a probability of 0.95; the best has 0.90."
         in failed
     )
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--target", "good"), "no level of protection 'good'"),
-        (("--budget-cost", "-3"), "build_zone.budget: is -3.0: Input should be greater than 0"),
-        (("--budget", "0"), "greater than or equal to 1"),
-    ],
-)
-def test_bad_input_gets_the_usual_errors(
-    options: tuple[str, ...], message: str, tmp_path: Path
-) -> None:
-    site = tmp_path / "yard.toml"
-    blast_env.save_scenario(glazed_yard(charges="mean"), site)
-    assert message in run(site, *options)
-
-
-def test_a_target_needs_a_facade() -> None:
-    assert "no protected structure has a facade" in run("visitor_entrance", "--budget", "3")
-
-
-@pytest.mark.parametrize("option", ["--cells", "--judge-cells"])
-def test_cells_that_grow_are_for_the_search_and_for_the_judge(option: str) -> None:
-    assert "cells is 'huge', must be one of 'uniform'" in run("guard_post", option, "huge")

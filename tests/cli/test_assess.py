@@ -86,10 +86,6 @@ def test_a_site_s_own_target_counts_unless_another_one_is_asked_for(
     assert wanted_level(asked, scenario, LevelOfProtection.LOW) is level
 
 
-def test_a_level_that_does_not_exist(site: Path) -> None:
-    assert "did you mean 'medium'" in run(site, "--target", "meduim")
-
-
 def test_the_worst_charge_gives_the_error_of_the_cells(tmp_path: Path) -> None:
     """Beside impulses, reduction and panes; not with the largest cells, which have no coarser."""
     site = tmp_path / "glazed.toml"

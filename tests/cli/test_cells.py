@@ -84,11 +84,3 @@ def test_growing_cells_are_those_of_commands_that_run_gas(
         result = run(*arguments, "--cells", "coarse")
         assert result.exit_code == 0, result.output
         assert used == {"coarse"}, arguments[0]
-
-
-def test_cells_are_for_gas_alone(site: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "a"
-    result = run("train", "--run", folder, "--scenario", site, "--engine", "event", "--cell", 0.25)
-    assert result.exit_code == 2
-    assert "engine 'event' has no cells" in " ".join(result.stderr.split())
-    assert not folder.exists()

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import blast_env
-from blast_env import save_scenario, simulate
+from blast_env import load_scenario, save_scenario, simulate, write_layout
 from blast_env.cli import app
 from blast_env.particles.calibration.model import load_calibration
 from blast_env.particles.pymunk.engine import PymunkRun
@@ -98,23 +98,14 @@ def test_simulate_takes_charge_and_preset() -> None:
     assert "at (8.00, 15.00) m" in result.stdout
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("cortyard",), "did you mean 'courtyard'"),
-        (("courtyard", "--charge", "29,15"), "building"),
-        (("courtyard", "--stand-off", "20"), "needs one point charge"),
-    ],
-)
-def test_bad_input_is_one_clear_message(
-    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = run("simulate", *arguments)
-    assert result.exit_code == 2
-    assert words in result.stderr
-    assert "Traceback" not in result.output
-    assert list(tmp_path.iterdir()) == []
+def test_a_layout_is_for_its_site_also_with_another_preset(tmp_path: Path) -> None:
+    """What `simulate` itself changes of a scenario does not make it another site."""
+    layout = write_layout(tmp_path / "layout.json", load_scenario("courtyard"), [(9, 0)])
+    for preset in ("ballistic", "collisional"):
+        options = ("--preset", preset, "--engine", "event")
+        result = run("simulate", "courtyard", "--layout", layout, *options)
+        assert result.exit_code == 0, result.output
+        assert "1 barrier module" in result.stdout
 
 
 def test_an_interruption_leaves_nothing_half_written(
@@ -174,20 +165,3 @@ def test_calibrate_writes_a_calibration_its_table_and_its_figure(tmp_path: Path)
     again = calibrate(*arguments, out=tmp_path)
     assert again.exit_code == 0
     assert list(Store(tmp_path / "mine.event.runs.sqlite").items()) == finished
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--reference", "paper_ufc", "--distances", "15,20"), "no value at 20 m"),
-        (("--reference", "paper_ufc", "--distances", "30,15"), "15 m follows 30 m"),
-        (("--reference", "paper_ufc", "--scenario", "courtyard"), "one point charge"),
-    ],
-)
-def test_bad_calibrations_are_one_clear_message(
-    arguments: tuple[str, ...], words: str, tmp_path: Path
-) -> None:
-    result = calibrate(*arguments, out=tmp_path)
-    assert result.exit_code == 2
-    assert words in result.stderr
-    assert list(tmp_path.iterdir()) == []

@@ -22,7 +22,6 @@ from blast_env.evaluation.engines import ENGINE_NAMES, find_engine
 from blast_env.gas.engine import GasRun
 from blast_env.layout import LayoutFile
 from blast_env.particles.event.engine import EventRun
-from blast_env.particles.pymunk.engine import PymunkRun
 from tests.agents.training_runs import scenario_file
 from tests.design.search_cases import small_scenario
 from tests.gas_sites import hut
@@ -177,14 +176,6 @@ def test_all_commands_take_a_charge_in_one_form() -> None:
     assert {*forms.values()} == {"X,Y[,KG]"}
 
 
-def test_the_mass_of_a_charge_is_given_once(site: Path) -> None:
-    result = run("simulate", site, "--charge", "5,19,60", "--tnt-kg", 50, columns=150)
-    assert result.exit_code == 2
-    assert "--charge has the mass 60 kg, and --tnt-kg is 50: give one of them" in result.stderr
-    result = run("simulate", site, "--charge", "5,1_9", columns=150)
-    assert "--charge is '5,1_9', must be two or three numbers as X,Y[,KG]" in result.stderr
-
-
 def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
     given = ("--scenario", site)
     for arguments in (
@@ -216,59 +207,6 @@ def test_json_is_short_unless_all_is_asked_for(site: Path, layout: Path) -> None
         assert {name: full[name] for name in short if name != "run"} == {
             name: value for name, value in short.items() if name != "run"
         }
-    both = run("simulate", site, "--json", "--json-all")
-    assert both.exit_code == 2
-    assert "exclude each other" in both.stderr
-
-
-# Where a command writes.
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("simulate", "SITE", "--film", "a.avi"), "--film a.avi: suffix is '.avi', must be one of"),
-        (
-            ("simulate", "SITE", "--excel", "a.xls"),
-            "--excel a.xls: suffix is '.xls', must be .xlsx",
-        ),
-        (("simulate", "SITE", "--heat-map", "no/a.png"), "--heat-map no/a.png: there is no folder"),
-        (("simulate", "SITE", "--history", "folder.png"), "folder.png: is a folder"),
-        (("simulate", "SITE", "--history", "a.png", "--heat-map", "a.png"), "are the same file"),
-        (("evaluate", "--layout", "LAYOUT", "--out", "file/a"), "--out file/a: cannot be a folder"),
-        (("evaluate", "--layout", "LAYOUT", "--cache", "file"), "--cache file: cannot be a folder"),
-        (("evaluate", "--layout", "LAYOUT", "--export", "no/a.dxf"), "there is no folder"),
-        (("search", "--out", "file/a"), "--out file/a: cannot be a folder"),
-        (("train", "--run", "file/a"), "--run file/a: cannot be a folder"),
-        (
-            ("calibrate", "--name", "a", "--reference", "paper_ufc", "--out", "file"),
-            "--out file: cannot be a folder",
-        ),
-        (("report", "SITE", "--layout", "LAYOUT", "--out", "no/a.html"), "there is no folder"),
-    ],
-)
-def test_places_to_write_are_looked_at_before_the_work(
-    arguments: tuple[str, ...],
-    words: str,
-    site: Path,
-    layout: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "file").touch()
-    (tmp_path / "folder.png").mkdir()
-
-    def no_work(*_: object) -> None:
-        raise AssertionError("the work has begun")
-
-    for engine in (EventRun, PymunkRun):
-        monkeypatch.setattr(engine, "advance", no_work)
-    names = {"SITE": str(site), "LAYOUT": str(layout)}
-    result = run(*(names.get(each, each) for each in arguments))
-    assert result.exit_code == 2, result.output
-    assert words in " ".join(result.stderr.split())
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["file", "folder.png"]
 
 
 @pytest.fixture
@@ -320,26 +258,6 @@ def test_an_interruption_says_how_to_go_on_and_leaves_no_empty_folder(
     left = [*tmp_path.rglob("*")]
     assert all(any(each.iterdir()) for each in left if each.is_dir())
     assert all(each.suffix.startswith(".sqlite") for each in left if each.is_file())
-
-
-def test_a_command_that_fails_leaves_no_empty_folder(
-    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "there").mkdir()
-    options = (
-        "--method",
-        "random",
-        "--start-from",
-        "nowhere.json",
-        "--cache",
-        "there/c",
-        "--out",
-        "there/a/b",
-    )
-    assert run("search", "--scenario", site, *options).exit_code == 2
-    assert [each.name for each in tmp_path.iterdir()] == ["there"]
-    assert list((tmp_path / "there").iterdir()) == []
 
 
 # Runs that were interrupted.

@@ -92,29 +92,6 @@ def test_the_next_run_finds_the_blasts_that_the_first_one_kept(
     assert json.loads(fresh.stdout)["result"] == content["result"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--layout", "nowhere.json"), "nowhere.json"),
-        (("--cvar-level", "1"), "cvar_level is 1, must be at least 0 and below 1"),
-        (("--scenario", "free_field"), "(9, 0) is not usable"),
-    ],
-)
-def test_bad_input_is_one_clear_message(
-    arguments: tuple[str, ...],
-    words: str,
-    layout: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = evaluate("--layout", layout, "--out", "folder", *arguments)
-    assert result.exit_code == 2
-    assert words in result.stderr
-    assert "Traceback" not in result.output
-    assert list(tmp_path.iterdir()) == [layout]
-
-
 def test_sigterm_ends_a_command_as_an_interruption_with_its_blasts_kept(
     layout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

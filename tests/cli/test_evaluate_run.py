@@ -150,25 +150,3 @@ def test_generated_sites_get_a_layout_and_a_scenario_each(tmp_path: Path) -> Non
         assert load_layout(export / f"layout_{number}.json", site)
         assert site.name in result.stdout
     assert len(hashes) == 2
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((), "--layout or --run is missing"),
-        (("--run", "run", "--layout", "layout.json"), "--layout and --run exclude each other"),
-        (("--run", "run", "--scenario", "courtyard"), "--scenario cannot be used with --run"),
-        (("--run", "."), "is no run folder"),
-        (("--layout", "layout.json", "--export", "a.dwg"), "suffix is '.dwg'"),
-    ],
-)
-def test_bad_input_is_one_clear_message(
-    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "layout.json").write_text("[]")
-    result = evaluate(*arguments)
-    assert result.exit_code == 2
-    assert words in " ".join(result.stderr.split())
-    assert "Traceback" not in result.output
-    assert [path.name for path in tmp_path.iterdir()] == ["layout.json"]

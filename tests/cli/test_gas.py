@@ -70,45 +70,6 @@ def test_a_layout_is_evaluated_by_gas_unless_told_otherwise(site: Path, tmp_path
     assert "(cells)" not in coarse
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--scheme", "a.png"), "--scheme is for particles: engine is 'gas'"),
-        (("--velocities", "a.png"), "--velocities is for particles: engine is 'gas'"),
-        (("--preset", "ballistic"), "--preset is for particles"),
-        (("--gauge", "front"), "--gauge is for --history: no history is to be drawn"),
-        (("--gauge", "frnt", "--history", "a.png"), "did you mean 'front'"),
-        (("--film-height", "1"), "--film-height is for --film"),
-        (("--film", "a.mp4", "--film-section", "z=1"), "must be x=M or y=M, e.g. x=12.5"),
-        (("--film", "a.mp4", "--film-height", "99"), "z = 99.0 m is outside"),
-        (("--heat-map", "a.png", "--quantity", "paek"), "did you mean 'peak'"),
-        (("--impulse-map", "a.png", "--side-by-side"), "--layout is missing"),
-        (("--cell", "0.2"), "cell_m is 0.2, must be 0.5 m"),
-    ],
-)
-def test_what_gas_has_not_is_said(
-    site: Path,
-    arguments: tuple[str, ...],
-    words: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = run("simulate", site, "--engine", "gas", *arguments)
-    assert result.exit_code == 2
-    assert list(tmp_path.iterdir()) == [site]
-    assert words in " ".join(result.stderr.split())
-
-
-@pytest.mark.parametrize(
-    "option", ["--impulse-map=a.png", "--peak-map=a.png", "--gauge=front", "--film-height=2"]
-)
-def test_what_only_gas_has_is_said(site: Path, option: str) -> None:
-    result = run("simulate", site, "--engine", "event", option)
-    assert result.exit_code == 2
-    assert f"{option.split('=')[0]} is for gas dynamics" in " ".join(result.stderr.split())
-
-
 @pytest.mark.usefixtures("drawn")
 def test_a_layout_and_the_empty_site_are_shown_in_every_picture(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import pytest
 from typer.testing import CliRunner
 
 from blast_env.cli import app
@@ -64,10 +63,3 @@ def test_protected_buildings_have_the_windows_and_walls_that_are_asked_for(tmp_p
     assert hall is not None
     assert (hall.glazing, hall.wall) == ("window_annealed_6", "brick_215")
     assert set(facades.values()) == {None}
-
-
-@pytest.mark.parametrize("text", ["7.5", "a,b", "1,2,3"])
-def test_place_of_a_charge_that_is_none(text: str, tmp_path: Path) -> None:
-    code, _, error = run(BLOCK, "--charge-at", text, "--out", tmp_path / "a.toml")
-    assert code == 2
-    assert f"--charge-at is '{text}', must be two numbers as X,Y" in error

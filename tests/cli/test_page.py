@@ -52,13 +52,6 @@ def test_the_address_that_is_printed_has_a_token_that_is_new_each_time(
     assert len(tokens) == 2
 
 
-def test_a_name_to_allow_that_is_none_is_a_message(tmp_path: Path) -> None:
-    code, text = run("--allow-host", "http://desk/", "--folder", str(tmp_path / "designs"))
-    assert code == 2
-    assert "--allow-host is 'http://desk/', must be a name" in text
-    assert not (tmp_path / "designs").exists()
-
-
 def test_a_folder_that_is_open_elsewhere_is_a_message(tmp_path: Path) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

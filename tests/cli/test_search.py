@@ -117,36 +117,6 @@ def test_it_begins_with_given_layouts_and_keeps_blasts(site: Path, tmp_path: Pat
     assert first.stdout.split("modules;")[0] == second.stdout.split("modules;")[0]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--risk", "men"), "did you mean 'mean'"),
-        (("--start-from", "nowhere.json"), "nowhere.json"),
-        (("--threats", "4"), "threats is 4, must be 1 unless threat is 'hidden'"),
-        (("--threat", "hidden", "--charge", "5,9"), "a hidden one is drawn"),
-        (("--scenario", "free_field"), "has no build zone"),
-        (("--surrogate", "own.json"), "--surrogate is for --method surrogate, not genetic"),
-        (("--method", "surrogate", "--surrogate", "own.json"), "own.json: there is no such file"),
-        (
-            (
-                *("--method", "surrogate", "--scenario", "control_room", "--engine", "gas"),
-                *("--start-from", "layout.json"),
-            ),
-            "surrogate begins with no layouts",
-        ),
-    ],
-)
-def test_bad_input_is_one_clear_message(
-    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "layout.json").write_text("[]")
-    result = search("--budget", 4, *arguments)
-    assert result.exit_code == 2
-    assert words in " ".join(result.stderr.split())
-    assert "Traceback" not in result.output
-
-
 def test_an_interruption_keeps_the_best_so_far(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import pytest
 from typer.testing import CliRunner, Result
 
 from blast_env.cli import app
@@ -33,27 +32,3 @@ def test_a_run_says_what_it_came_to_and_can_be_taken_up_again(tmp_path: Path) ->
     again = run("--resume", folder)
     assert again.exit_code == 0, again.output
     assert "32 steps, 8 episodes" in again.stdout
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--run", "run", "--algo", "maskable_pp"), "did you mean 'maskable_ppo'"),
-        (("--run", "run", "--set", "ent_coeff=1"), "did you mean 'ent_coef'"),
-        (("--run", "run", "--set", "evaluation_case=1"), "did you mean 'evaluation_cases'"),
-        (("--run", "run", "--set", "torch_threads=0"), "torch_threads is 0: Input should be"),
-        (("--run", "run", "--scenario", "free_field"), "no build zone"),
-        (("--steps", "5"), "--run is missing"),
-        (("--resume", "nowhere"), "is no run folder"),
-        (("--resume", "run", "--seed", "5"), "--seed cannot be changed with --resume"),
-    ],
-)
-def test_bad_input_is_one_clear_message(
-    arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = run(*arguments)
-    assert result.exit_code == 2
-    assert words in " ".join(result.output.split())
-    assert "Traceback" not in result.output
-    assert not (tmp_path / "run").exists()
