@@ -12,7 +12,7 @@ from blast_env.app.page.uploads import complain
 from blast_env.app.session import Session
 from blast_env.app.work import Answer, Question
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import AnswerPart, AnswerTable
+from blast_env.evaluation.answers import AnswerTable
 from blast_env.response.buildings import LevelOfProtection
 
 _HEADINGS = {
@@ -37,13 +37,15 @@ class VerdictView:
         with ui.row().classes("be-choices w-full items-center gap-2"):
             self._target = ui.select(_LEVELS, value=int(level), label="required level")
             self._target.props("dense outlined options-dense").classes("w-36")
-            self._mass = NumberField("error of the masses (share)", 0.1, least=0.0)
+            self._mass = NumberField("mass error (share)", 0.1, least=0.0)
             self._budget = NumberField("blasts of a search", 60, whole=True, least=1)
             for element in (self._mass, self._budget):
-                element.classes("w-36")
+                element.classes("w-28")
             for question in Question:
                 button = ui.button(question.value, on_click=partial(self._ask, question))
-                button.props("dense no-caps").mark(question.value).tooltip(_HEADINGS[question])
+                button.props("dense no-caps").classes("shrink-0").mark(question.value).tooltip(
+                    _HEADINGS[question]
+                )
         with ui.element("div").classes("be-results"):
             self._cost = ui.label().classes("be-quiet")
             self._answers = ui.column().classes("w-full gap-1").props('aria-live="polite"')
@@ -84,13 +86,9 @@ def _show(answer: Answer, is_present: bool) -> None:
         ui.label("The site, the layout or the threats have changed since: ask again.").classes(
             "be-refused"
         )
-    for part in answer.parts:
-        _show_part(part)
-
-
-def _show_part(part: AnswerPart) -> None:
-    if isinstance(part, AnswerTable):
-        ui.label(part.title).classes("be-quiet")
-        text_table(part.headers, part.text_columns).rows = cells(part.rows)
-    else:
-        ui.label(part)
+    for number, part in enumerate(answer.parts):
+        if isinstance(part, AnswerTable):
+            ui.label(part.title).classes("be-quiet")
+            text_table(part.headers, part.text_columns).rows = cells(part.rows)
+        else:
+            ui.label(part).classes("" if number else "text-bold")

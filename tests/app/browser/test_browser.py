@@ -516,19 +516,26 @@ def large_site() -> Scenario:
 
 
 def on_a_phone(page: Page, name: str) -> None:
-    """Leave pictures of the plan, the results and the work on the screen of a phone."""
+    """Leave pictures of the views and the work on the screen of a phone; none is wider."""
     for width, height in ((390, 844), (WIDTH, HEIGHT)):
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < WIDTH}
         page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         sleep(2.0)
         if width < WIDTH:
-            for view in ("Plan", "Results"):
+            for view in ("Plan", "Screening", "Verdict", "Results"):
                 page.button(view).click()
                 sleep(2.0)
                 page.shoot(f"{name}_{view.lower()}")
+                wide = "return document.documentElement.scrollWidth"
+                assert page.driver.execute_script(wide) <= width, view
             page.driver.execute_script("window.scrollTo(0, document.body.scrollHeight)")
             sleep(1.0)
             page.shoot(f"{name}_work")
+
+
+def test_no_view_is_wider_than_the_screen_of_a_phone(page: Page) -> None:
+    page.begin("guard_post")
+    on_a_phone(page, "narrow")
 
 
 def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) -> None:
