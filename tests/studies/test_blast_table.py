@@ -67,7 +67,7 @@ def test_the_sites_that_a_run_learnt_from_are_named(tmp_path: Path) -> None:
         blast_table.scenario_of(site).content_hash
     }
     other = tmp_path / "other"
-    train(settings(scenario_file(tmp_path)), hyperparameters(), other)
+    train(settings(scenario_file(tmp_path), steps=16), hyperparameters(), other)
     code, words = run(agent / "blasts", "--run", other)
     assert code != 0
     assert "is no run by self-labelling on item_sites" in words
@@ -115,9 +115,8 @@ def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:
     assert "is no folder of blasts" in run(tmp_path / "none")[1]
 
 
-@pytest.mark.parametrize("layout", [(), PIECES, ((1, 2), (3, 4))])
-def test_keys_come_back_as_they_were(tmp_path: Path, layout: tuple) -> None:
-    cache, asked = BlastStore(tmp_path), key(3)._replace(layout=layout)
+def test_keys_come_back_as_they_were(tmp_path: Path) -> None:
+    cache, asked = BlastStore(tmp_path), key(3)._replace(layout=PIECES)
     cache.add(asked, loads(3))
     ((found, kept),) = cache.items()
     assert found == asked
