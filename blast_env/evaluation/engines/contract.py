@@ -305,19 +305,6 @@ SIM_NAMES: Final = ("impulse_sim", "transferred_impulse_sim")
 """The sums of a `ParticleLoad` in simulation units."""
 
 
-@dataclass(frozen=True)
-class EngineOption:
-    """A setting that is specific to one engine.
-
-    Attributes:
-        name: Name of the field and, with dashes, of the command-line option.
-        help: Description for users, one sentence.
-    """
-
-    name: str
-    help: str
-
-
 class BlastOutcome(Protocol):
     """The outcome of a blast on any engine."""
 
@@ -367,7 +354,7 @@ class Engine(ABC):
         title: Its kind, for display.
         caveat: Warning with every result, one sentence; empty for none.
         validated_range: The range in which it was validated, for "outside ...".
-        options: Settings that only this engine has.
+        options: Names of the settings that only this engine has.
         medium: What carries its blasts, which decides how they are shown; empty where there is no
             blast to show.
     """
@@ -380,7 +367,7 @@ class Engine(ABC):
     title: ClassVar[str] = "Own engine"
     caveat: ClassVar[str] = ""
     validated_range: ClassVar[str] = "the validated range of the engine"
-    options: ClassVar[tuple[EngineOption, ...]] = ()
+    options: ClassVar[tuple[str, ...]] = ()
     medium: ClassVar[Literal["", "gas", "particles"]] = ""
 
     name: str
@@ -480,9 +467,8 @@ class Engine(ABC):
             BlastEnvError: If the engine has no such setting, or the value is out of bounds.
         """
         given = {name: value for name, value in settings.items() if value is not None}
-        own = {option.name for option in self.options}
         for name, value in given.items():
-            if name not in own:
+            if name not in self.options:
                 noun = "cells" if name == "cell_m" else f"setting {name}"
                 raise BlastEnvError(
                     f"{name} is {value_text(value)}, but engine {self.name!r} has no {noun}"

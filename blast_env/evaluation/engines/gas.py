@@ -26,7 +26,6 @@ from blast_env.evaluation.engines.bays import (
 from blast_env.evaluation.engines.contract import (
     BlastLoads,
     Engine,
-    EngineOption,
     StructureLoad,
 )
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
@@ -123,11 +122,7 @@ class GasEngine(GasSettings, Engine):
     has_peaks: ClassVar[bool] = True
     title: ClassVar[str] = "Gas dynamics"
     validated_range: ClassVar[str] = "the validated range of gas dynamics"
-    options: ClassVar[tuple[EngineOption, ...]] = (
-        EngineOption("cell_m", "Side of the cells of gas dynamics, m."),
-        EngineOption("cells", "Whether cells of gas dynamics grow with the blast."),
-        EngineOption("until", "Loads that a blast of gas dynamics waits for."),
-    )
+    options: ClassVar[tuple[str, ...]] = ("cell_m", "cells", "until")
     medium: ClassVar[Literal["", "gas", "particles"]] = "gas"
 
     name: str = "gas"

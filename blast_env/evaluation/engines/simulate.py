@@ -48,21 +48,9 @@ def simulate(
 @overload
 def simulate(
     scenario: AnyScenario,
-    layout: Sequence[Element],
-    seed: int,
-    engine: str | Engine,
-    charge: AnyCharge | None = ...,
-    progress: Callable[[float], None] | None = ...,
-) -> BlastResult: ...
-
-
-@overload
-def simulate(
-    scenario: AnyScenario,
     layout: Sequence[Element] = ...,
     seed: int = ...,
-    *,
-    engine: str | Engine,
+    engine: str | Engine = ...,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
 ) -> BlastResult: ...
