@@ -220,23 +220,12 @@ def _progress_lines(console: Console, label: str) -> Callable[..., None]:
 
 
 @dataclass(frozen=True)
-class ResultTable:
+class ResultTable(AnswerTable):
     """A table whose columns get narrower by wrapping between words, never inside a word.
 
     Rich's table cuts words if columns do not fit. This one then splits the columns into several
     tables one below the other, each with the first column, so that rows keep their names.
-
-    Attributes:
-        title: Its title.
-        headers: The headers.
-        rows: The rows.
-        text_columns: Number of leading text columns; the others are aligned to the right.
     """
-
-    title: str
-    headers: Sequence[str]
-    rows: Iterable[Sequence[str]]
-    text_columns: int = 1
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         yield Text(printable_line(self.title), style="bold")
@@ -287,7 +276,7 @@ def print_table(
     title: str, headers: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int = 1
 ) -> None:
     """Print a table to standard output; see `ResultTable`."""
-    result_console().print(ResultTable(title, headers, rows, text_columns))
+    result_console().print(ResultTable.of(title, headers, rows, text_columns))
 
 
 def print_written(paths: Iterable[Path]) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -27,7 +27,7 @@ class AnswerTable:
     @classmethod
     def of(
         cls, title: str, headers: Sequence[str], rows: Iterable[Sequence[str]], texts: int = 1
-    ) -> "AnswerTable":
+    ) -> Self:
         """Return the table of some rows, of which `texts` columns are text."""
         return cls(title, (*headers,), tuple(map(tuple, rows)), texts)
 

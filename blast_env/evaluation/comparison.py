@@ -136,10 +136,13 @@ def _structure_row(
     error: GridError | None,
     impulse_of: LoadOf,
 ) -> dict[str, object]:
-    first = loads[0]
-    pa_s, bare_pa_s = (np.array([load.impulse_pa_s for load in each]) for each in (loads, without))
-    reduction = reduction_estimate(pa_s, bare_pa_s)
-    stood = worst_standing(load.stood for load in loads)
+    first, stood = loads[0], worst_standing(load.stood for load in loads)
+    impulses = [np.array([load.impulse_pa_s for load in each]) for each in (loads, without)]
+    reduction = reduction_estimate(*impulses)
+    errors, of_reduction = (np.nan, np.nan), np.nan
+    if error is not None:
+        errors = error.of_load(impulse_of), error.of_unprotected(impulse_of)
+        of_reduction = error.of_reduction(impulse_of)
     row: dict[str, object] = {
         "structure": first.name,
         "protected": first.protected,
@@ -147,26 +150,21 @@ def _structure_row(
         "reduction": reduction.value,
         "reduction_low": reduction.low,
         "reduction_high": reduction.high,
+        "reduction_error": of_reduction,
         "threats_in_range": sum(load.in_range for load in loads),
         "standing": stood.standing.label,
         "reason": stood.reason,
     }
     sums = SIM_NAMES if isinstance(first, ParticleLoad) else ()
-    for name in ("impulse_pa_s", *sums):
-        for column, each in ((name, loads), (f"unprotected_{name}", without)):
-            row[column] = float(np.mean([getattr(load, name) for load in each]))
-    off, walled_off, bare_off = np.nan, np.nan, np.nan
-    if error is not None:
-        off = error.of_reduction(impulse_of)
-        walled_off, bare_off = error.of_load(impulse_of), error.of_unprotected(impulse_of)
-    row["reduction_error"] = off
-    row["impulse_error_pa_s"] = walled_off * float(pa_s.mean())
-    row["unprotected_impulse_error_pa_s"] = bare_off * float(bare_pa_s.mean())
-    row["impulse_psi_s"] = float(pa_s.mean()) / PA_PER_PSI
-    row["unprotected_impulse_psi_s"] = float(bare_pa_s.mean()) / PA_PER_PSI
-    for column, each in (("peak_pa", loads), ("unprotected_peak_pa", without)):
+    sides = zip(("", "unprotected_"), (loads, without), impulses, errors, strict=True)
+    for side, each, impulse, off in sides:
+        mean_pa_s = float(impulse.mean())
         peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
-        row[column] = float(np.mean(peaks))
+        row |= {f"{side}{name}": np.mean([getattr(x, name) for x in each]) for name in sums}
+        row[f"{side}impulse_pa_s"] = mean_pa_s
+        row[f"{side}impulse_error_pa_s"] = off * mean_pa_s
+        row[f"{side}impulse_psi_s"] = mean_pa_s / PA_PER_PSI
+        row[f"{side}peak_pa"] = float(np.mean(peaks))
     return row
 
 
@@ -604,22 +602,23 @@ SCHEMA_VERSION: Final = 1
 
 
 def _result(evaluation: "Evaluation") -> dict[str, Any]:
+    impulses: dict[str, Any] = {}
+    for side, impulse, cvar in (
+        ("", evaluation.impulse_pa_s, evaluation.cvar_pa_s),
+        ("unprotected_", evaluation.unprotected_impulse_pa_s, evaluation.unprotected_cvar_pa_s),
+    ):
+        impulses[f"{side}impulse_pa_s"] = estimate_record(impulse)
+        impulses[f"{side}impulse_psi_s"] = estimate_record(impulse.scaled(1.0 / PA_PER_PSI))
+        impulses[f"{side}cvar_pa_s"] = cvar
+        impulses[f"{side}cvar_psi_s"] = cvar / PA_PER_PSI
+    objective = evaluation.scenario.objective
     return {
         "reduction": estimate_record(evaluation.reduction),
-        "impulse_pa_s": estimate_record(evaluation.impulse_pa_s),
-        "impulse_psi_s": estimate_record(evaluation.impulse_pa_s.scaled(1.0 / PA_PER_PSI)),
-        "unprotected_impulse_pa_s": estimate_record(evaluation.unprotected_impulse_pa_s),
-        "unprotected_impulse_psi_s": estimate_record(
-            evaluation.unprotected_impulse_pa_s.scaled(1.0 / PA_PER_PSI)
-        ),
+        **impulses,
         "cvar_level": evaluation.cvar_level,
-        "cvar_pa_s": evaluation.cvar_pa_s,
-        "cvar_psi_s": evaluation.cvar_pa_s / PA_PER_PSI,
-        "unprotected_cvar_pa_s": evaluation.unprotected_cvar_pa_s,
-        "unprotected_cvar_psi_s": evaluation.unprotected_cvar_pa_s / PA_PER_PSI,
         "objective": {
-            **evaluation.scenario.objective.model_dump(mode="json", exclude_none=True),
-            "unit": evaluation.scenario.objective.unit,
+            **objective.model_dump(mode="json", exclude_none=True),
+            "unit": objective.unit,
             "load": evaluation.load,
             "unprotected_load": evaluation.unprotected_load,
         },

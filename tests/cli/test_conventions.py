@@ -92,7 +92,7 @@ def test_help_names_every_engine_and_what_each_can_be_told(name: str) -> None:
 )
 def test_no_word_of_a_table_is_cut(headers: list[list[str]], width: int, text_columns: int) -> None:
     rows = [[" ".join(words[number:]) or "1,234.5" for words in headers] for number in range(3)]
-    table = ResultTable("title", [" ".join(words) for words in headers], rows, text_columns)
+    table = ResultTable.of("title", [" ".join(words) for words in headers], rows, text_columns)
     console = Console(width=width, file=StringIO(), color_system=None)
     console.print(table)
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
@@ -103,7 +103,7 @@ def test_no_word_of_a_table_is_cut(headers: list[list[str]], width: int, text_co
 
 def test_a_table_that_is_too_wide_goes_on_below_with_the_names_of_its_rows() -> None:
     headers = ["name", *(f"column_{number:02}" for number in range(20))]
-    table = ResultTable("title", headers, [["this", *map(str, range(20))]])
+    table = ResultTable.of("title", headers, [["this", *map(str, range(20))]])
     console = Console(width=NARROW, file=StringIO(), color_system=None)
     console.print(table)
     shown = console.file.getvalue()  # type: ignore[attr-defined]
