@@ -179,16 +179,7 @@ def _methods(
 
 @dataclass(frozen=True)
 class _Judging:
-    """Runs methods, and judges their submissions.
-
-    Attributes:
-        cell_m: Side of the judge's cells, m.
-        search_cell_m: Side of the cells for the methods, m.
-        seeds: Seeds of the runs.
-        processes: Number of worker processes.
-        cache: Folder of blasts.
-        out: Folder of the submissions, and of the judged ones.
-    """
+    """Runs methods and judges their submissions, with the options of the command."""
 
     cell_m: float
     search_cell_m: float

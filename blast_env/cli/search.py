@@ -1,9 +1,10 @@
 """`blast-env search`: the layout with the least load, for a budget of blasts, or for none."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle, islice
+from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -12,6 +13,7 @@ import numpy as np
 import typer
 
 from blast_env.cli.command import writes
+from blast_env.cli.evaluation_report import load_text, share_text
 from blast_env.cli.options import (
     SCENARIO_HELP,
     CacheOption,
@@ -41,13 +43,15 @@ from blast_env.cli.output import (
     resumable,
     save_pictures,
 )
-from blast_env.cli.proposal import PACKAGE, package_proposal, verify_proposal
+from blast_env.design.proposal import PackageProposer, chosen_proposer, problem_of
+from blast_env.design.rules import expected_charge
 from blast_env.design.search import (
     DesignProblem,
     Progress,
     Proposer,
     SearchResult,
     find_proposer,
+    layouts_by_rule,
     proposers,
 )
 from blast_env.design.search.registry import DEFAULT_BUDGET, check_suits, proposer_row
@@ -57,21 +61,34 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
     Evaluation,
+    Evaluators,
     LoadCase,
+    LoadCaseSet,
     SeedRange,
+    compare,
     draw_threats,
     evaluate_against,
 )
 from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, find_engine
-from blast_env.evaluation.grid_error import percent
+from blast_env.evaluation.grid_error import final_engine, percent
 from blast_env.files import make_folder
-from blast_env.geometry import layout_counts
-from blast_env.layout import load_layout, write_layout
+from blast_env.geometry import Layout, layout_counts
+from blast_env.layout import LayoutState, load_layout, write_layout
 from blast_env.provenance import command, versions
+from blast_env.runner import share_of
 from blast_env.site import Scenario, load_scenario
-from blast_env.statistics import CVAR_LEVEL, ConditionalValueAtRisk, WorstRisk, reductions
+from blast_env.site.scene import Charge
+from blast_env.site.zone import source_bounds_m
+from blast_env.statistics import (
+    CVAR_LEVEL,
+    ConditionalValueAtRisk,
+    Estimate,
+    WorstRisk,
+    reductions,
+)
 from blast_env.tables import write_csv
+from blast_env.units import MS_PER_S
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,6 +96,9 @@ if TYPE_CHECKING:
 ThreatName = Literal["visible", "hidden"]
 
 _METHOD_HELP: Final = f"{', '.join(proposers())}. package runs no blast."
+PACKAGE: Final = PackageProposer().name
+_PROPOSAL: Final = "this proposal"
+_NOTHING: Final = "no barrier"
 _SURROGATE: Final = "surrogate"
 _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
@@ -155,9 +175,9 @@ def search(
         refuse_given(context, _WITH_BLASTS, f"does not apply to --method {PACKAGE}")
         if budget is not None and not verify:
             raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast")
-        found = package_proposal(load_scenario(scenario), given, cells, processes, out)
+        found = _package_proposal(load_scenario(scenario), given, cells, processes, out)
         if verify:
-            verify_proposal(*found, budget, cells)
+            _verify(*found, budget, cells)
         return
     if verify:
         raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
@@ -386,3 +406,131 @@ def _risk_text(problem: DesignProblem) -> str:
     if isinstance(risk, ConditionalValueAtRisk):
         return f"{words}, mean of the worst {100.0 * (1.0 - risk.level):.3g} %"
     return f"mean {words}"
+
+
+def _package_proposal(
+    scenario: Scenario, given: GivenCharge, cells: str | None, processes: int, out: Path | None
+) -> tuple[DesignProblem, Layout]:
+    """Propose a layout without a blast, print it, and write it; return it with its problem."""
+    scenario.zone  # noqa: B018  # refuses a scenario without one
+    engine = find_engine(JUDGE, cells=cells)
+    problem = problem_of(scenario, _given_charge(scenario, given), processes, engine)
+    chosen, began_s = chosen_proposer(), perf_counter()
+    with progress_bar(f"proposal for {scenario.name}") as progress:
+
+        def report(state: Progress) -> None:
+            progress(state.share)
+
+        result = chosen.propose(problem, report=report)
+    ms = MS_PER_S * (perf_counter() - began_s)
+    print_line(
+        f"{scenario.name}: {_proposal_words(scenario, result)}, by {result.by}, in {ms:,.0f} ms"
+    )
+    if out is not None:
+        _write_proposal(scenario, result.layout, chosen.source, out)
+    return problem, result.layout
+
+
+def _given_charge(scenario: Scenario, given: GivenCharge) -> Charge | None:
+    """Return the charge at the user's place; `None` without one."""
+    if given.place_m is None:
+        if given.mass_kg is not None:
+            raise BlastEnvError("--tnt-kg is given without --charge, the place of the charge")
+        return None
+    middle = expected_charge(scenario.charge)
+    tnt_kg = middle.tnt_kg if given.mass_kg is None else given.mass_kg
+    (x_m, y_m), charge = given.place_m, Charge(given.place_m, tnt_kg, middle.height_m)
+    scenario.with_possible_charges((charge,))  # refuses one that is not clear, or out of bounds
+    bounds = [source_bounds_m(source) for source in scenario.charge]
+    if not any(
+        each.left <= x_m <= each.right and each.bottom <= y_m <= each.top for each in bounds
+    ):
+        print_line(
+            f"note: {scenario.name} never has a charge at ({x_m:g}, {y_m:g}) m: --verify the "
+            "proposal"
+        )
+    return charge
+
+
+def _proposal_words(scenario: Scenario, result: SearchResult) -> str:
+    """Return the proposal in words, with its cost and its expected gain."""
+    if not result.layout:
+        return "nothing is proposed"
+    placement = LayoutState.of(scenario, result.layout)
+    cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"
+    gain = result.expectation
+    return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
+
+
+def _write_proposal(
+    scenario: Scenario, layout: Layout, source: Mapping[str, str], out: Path
+) -> None:
+    make_folder(out)
+    provenance = {**source, "command": command(), "versions": versions()}
+    written = [write_layout(out / LAYOUT_NAME, scenario, layout, provenance)]
+    picture = partial(layout_picture, scenario, layout)
+    print_written(written + save_pictures((out / LAYOUT_PICTURE, picture)))
+
+
+def _verify(problem: DesignProblem, layout: Layout, budget: int | None, cells: str | None) -> None:
+    """Compare a proposal by gas dynamics with no barrier and the rules, within the budget."""
+    if budget is not None and budget < 2:
+        raise BlastEnvError(f"--budget is {budget}, must be at least 2 with --verify")
+    case, rules = problem.case, layouts_by_rule(problem.scenario, problem.known_charge)
+    layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
+    if budget is not None:
+        case = replace(case, threats=case.threats[: budget // 2])
+        most = budget // len(case.threats)
+        distinct = list(dict.fromkeys(layouts.values()))[:most]
+        layouts = {name: each for name, each in layouts.items() if each in distinct}
+    engine = final_engine(JUDGE, [problem.scenario], cells=cells)
+    _print_verdict(_compared(Evaluators(engine), case, layouts, problem.processes), case)
+    left_out = [name for name in rules if name not in layouts]
+    if left_out:
+        print_line(f"note: not compared, for lack of blasts: {', '.join(left_out)}")
+    if len(case.threats) < len(problem.threats):
+        print_line(f"note: {len(case.threats)} of {len(problem.threats)} charges were used")
+
+
+def _compared(
+    evaluators: Evaluators, case: LoadCaseSet, layouts: Mapping[str, Layout], processes: int
+) -> dict[str, Evaluation]:
+    """Return each layout compared with no barrier, with its error of the cells."""
+    engine, distinct = evaluators.engine, list(dict.fromkeys(layouts.values()))
+    print_line(engine.describe())
+    asked = [(engine, each) for each in case.threats] + [(engine.coarser, case.threats[0])]
+    print_cost((each, case.scenario, threat.charge) for each, threat in asked for _ in distinct)
+    found = {}
+    with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
+        for number, each in enumerate(distinct):
+            found[each] = compare(
+                evaluators,
+                [case],
+                [each],
+                processes,
+                with_error=True,
+                progress=share_of(progress, number, len(distinct)),
+            )
+    return {name: found[each] for name, each in layouts.items()}
+
+
+def _print_verdict(found: Mapping[str, Evaluation], case: LoadCaseSet) -> None:
+    """Print one row per layout: no barrier, the rules with the best last, and the proposal."""
+    charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
+    objective = case.scenario.objective
+    loads = {
+        name: case.objective_value(each.loads[0], each.layouts[0]) for name, each in found.items()
+    }
+    rules = sorted(loads.keys() - {_NOTHING, _PROPOSAL}, key=lambda name: -loads[name])
+    rows = []
+    for name in (_NOTHING, *rules, _PROPOSAL):
+        each, load = found[name], Estimate(loads[name], nan, nan)
+        share = share_text(each.reduction, each.reduction_error) if name != _NOTHING else "-"
+        rows.append((name, load_text(objective, load, each.objective_error), share))
+    title = f"{case.scenario.name}: judged by gas dynamics on {charges}"
+    print_table(title, ("layout", "load", "reduction"), rows)
+    error = found[_PROPOSAL].grid_error
+    if error is not None:
+        print_line(error.words)
+    if rules and loads[rules[-1]] < loads[_PROPOSAL]:
+        print_line(f"note: {rules[-1]} does better here than the proposal")
