@@ -95,10 +95,7 @@ AREAS: Final[Mapping[str, list[Part]]] = MappingProxyType(
             Part("blast_env/statistics.py", _COMPARISON),
             *_parts("evaluation", _COMPARISON, "comparison"),
         ],
-        "placement": [
-            *_parts("layout", _PLACES, "placement"),
-            *_parts("site", _PLACES, "zone"),
-        ],
+        "placement": [*_parts("layout", _PLACES, "placement"), *_parts("site", _PLACES, "zone")],
         "physics rules": _parts("particles/event", _RULES, "contacts"),
     }
 )

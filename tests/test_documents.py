@@ -130,8 +130,7 @@ class _Numbers:
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [{"count": 1.0}, {"count": True}, {"count": "1"}, {"share": "0.5"}, {"share": True}],
+    "wrong", [{"count": 1.0}, {"count": True}, {"count": "1"}, {"share": "0.5"}, {"share": True}]
 )
 def test_no_value_of_a_file_is_converted_into_a_number(wrong: dict[str, object]) -> None:
     with pytest.raises(DocumentError):

@@ -25,12 +25,7 @@ def test_the_package_imports_nothing_heavy() -> None:
     modules = modules_after("import blast_env")
     assert modules.isdisjoint(HEAVY)
     own = {name for name in modules if name.split(".")[0] == "blast_env"}
-    assert own == {
-        "blast_env",
-        "blast_env.bundled",
-        "blast_env.envs",
-        "blast_env.provenance",
-    }
+    assert own == {"blast_env", "blast_env.bundled", "blast_env.envs", "blast_env.provenance"}
 
 
 def test_engines_import_neither_pandas_nor_numba_before_a_blast() -> None:

@@ -115,8 +115,7 @@ def test_the_tables_agree_with_each_other() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "engine", "share"),
-    [(COURTYARD, "event", 0.3), ("courtyard", "event", 0.4)],
+    ("scenario", "engine", "share"), [(COURTYARD, "event", 0.3), ("courtyard", "event", 0.4)]
 )
 def test_a_wall_in_front_takes_load_off_the_building(
     scenario: Scenario | str, engine: str, share: float

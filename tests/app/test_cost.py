@@ -80,7 +80,7 @@ def test_words() -> None:
     assert "50 blasts of gas: about 83 min" in cost_words([cost] * 50)
     assert "nothing to run" in cost_words([])
     assert [time_words(each) for each in (0.2, 7.1, 44.0, 600.0, 7200.0)] == [
-        *("1 s", "8 s", "45 s", "10 min", "2.0 h"),
+        *("1 s", "8 s", "45 s", "10 min", "2.0 h")
     ]
 
 

@@ -283,13 +283,7 @@ def test_solids_have_the_heights_of_the_site() -> None:
     assert open_air["building"].opacity < 1.0
 
 
-CATALOGUE = {
-    "name": "t_wall",
-    "length_modules": 4,
-    "height_m": 2.5,
-    "cost": 10.0,
-    "stock": 2,
-}
+CATALOGUE = {"name": "t_wall", "length_modules": 4, "height_m": 2.5, "cost": 10.0, "stock": 2}
 
 
 def test_pieces_of_a_catalogue_are_placed_turned_moved_and_kept(tmp_path: Path) -> None:

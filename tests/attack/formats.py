@@ -80,9 +80,7 @@ def _scenario(folder: Path) -> Format:
 def _layout(folder: Path) -> Format:
     path = folder / "a.json"
     write_layout(path, small_scenario(), [(0, 0), (1, 0), (1, 1)], {"method": "mine", "seed": 1})
-    pieces = {
-        "pieces": [{"item": "t_wall", "row": 3, "column": 4, "turned": True}] * 2,
-    }
+    pieces = {"pieces": [{"item": "t_wall", "row": 3, "column": 4, "turned": True}] * 2}
     samples = (path.read_bytes(), b"[[0, 0], [0, 1]]", json.dumps(pieces, indent=1).encode())
 
     scenario = small_scenario()

@@ -149,13 +149,7 @@ def site_document() -> Document:
 
 
 def _run() -> Document:
-    return {
-        "problem": "control_room-known-v2",
-        "budget": 0,
-        "seed": 0,
-        "blasts": 0,
-        "layout": [],
-    }
+    return {"problem": "control_room-known-v2", "budget": 0, "seed": 0, "blasts": 0, "layout": []}
 
 
 def submission_document() -> Document:

@@ -30,12 +30,7 @@ from blast_env.layout import write_layout
 from blast_env.particles.calibration.free_field import FreeFieldStudy
 from blast_env.site import load_scenario, save_scenario
 from blast_env.store import Store
-from tests.agents.training_runs import (
-    hyperparameters,
-    scenario_file,
-    settings,
-    small_scenario,
-)
+from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 from tests.app.here import Here
 from tests.report.sites import LAYOUT, small_hut
 

@@ -17,10 +17,7 @@ from tests.gas_sites import WALL, glazed_hut
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     document = blast_env.load_scenario("control_room").model_dump(mode="json")
-    document["structures"][0]["facade"] = {
-        "glazing": "window_annealed_6",
-        "wall": "concrete_200",
-    }
+    document["structures"][0]["facade"] = {"glazing": "window_annealed_6", "wall": "concrete_200"}
     document["charge"] = document["charge"][:1]
     document["name"] = "glazed_room"
     path = tmp_path_factory.mktemp("assess") / "glazed.toml"

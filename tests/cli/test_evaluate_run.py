@@ -135,11 +135,7 @@ def test_a_layout_s_file_is_exported_with_where_it_came_from(tmp_path: Path) -> 
 
 def test_generated_sites_get_a_layout_and_a_scenario_each(tmp_path: Path) -> None:
     run = tmp_path / "run"
-    train(
-        settings(Path("sites"), steps=16, evaluation_cases=2),
-        hyperparameters(),
-        run,
-    )
+    train(settings(Path("sites"), steps=16, evaluation_cases=2), hyperparameters(), run)
     export = tmp_path / "layouts"
     result = evaluate("--run", run, "--seeds", 2, "--export", export)
     assert result.exit_code == 0, result.output

@@ -36,15 +36,10 @@ from tests.gas_sites import hut
 
 OWN = {
     "corner": ProposerRow(
-        "tests.design.corner:fill_from_the_corner",
-        "from the corner",
-        ProposerKind.RULE,
-        budget=0,
+        "tests.design.corner:fill_from_the_corner", "from the corner", ProposerKind.RULE, budget=0
     ),
     "one_after_another": ProposerRow(
-        "tests.design.one_after_another:OneAfterAnother",
-        "one after another",
-        budget=6,
+        "tests.design.one_after_another:OneAfterAnother", "one after another", budget=6
     ),
 }
 
@@ -164,11 +159,7 @@ class Own:
         self.layouts, self.illegal = layouts, illegal
 
     def propose(
-        self,
-        problem: DesignProblem,
-        budget: int,
-        seed: int = 0,
-        report: Report | None = None,
+        self, problem: DesignProblem, budget: int, seed: int = 0, report: Report | None = None
     ) -> SearchResult:
         rng = generator(seed)
         count = self.layouts * budget // len(problem.threats)

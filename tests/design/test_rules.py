@@ -120,11 +120,7 @@ def test_a_wall_on_open_ground_has_no_hole_and_is_centred(
 )
 @settings(max_examples=20, deadline=None, derandomize=True)
 def test_a_wall_keeps_every_condition(
-    charge_y_m: float,
-    share: float,
-    blocked: tuple[int, int, int, int],
-    budget: float,
-    way_m: float,
+    charge_y_m: float, share: float, blocked: tuple[int, int, int, int], budget: float, way_m: float
 ) -> None:
     row, column, rows, columns = blocked
     scenario = site(

@@ -43,19 +43,8 @@ from blast_env.design.surrogate.network import (
     packaged_surrogate,
 )
 from blast_env.design.surrogate.relations import relations
-from blast_env.design.surrogate.search import (
-    Guesses,
-    LearntSearch,
-    _floored,
-    improved,
-)
-from blast_env.design.surrogate.walls import (
-    FEATURES,
-    INPUTS,
-    MOST_POINTS,
-    WallPoints,
-    site_of,
-)
+from blast_env.design.surrogate.search import Guesses, LearntSearch, _floored, improved
+from blast_env.design.surrogate.walls import FEATURES, INPUTS, MOST_POINTS, WallPoints, site_of
 from blast_env.design.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
@@ -77,14 +66,7 @@ FAST = GasEngine(border_m=0.0, until=0.02)
 YARD = wide_yard()
 PEAKS = Scenario.from_document(YARD.model_dump() | {"objective": {"quantity": "peak"}}, "peaks")
 CHECK = Check(rms=0.2, rank=0.8, lost=0.03, spreads=10.0)
-ABOUT = Fit(
-    command="by hand",
-    versions={},
-    engine="made up",
-    blasts=1,
-    sites=1,
-    impulse=CHECK,
-)
+ABOUT = Fit(command="by hand", versions={}, engine="made up", blasts=1, sites=1, impulse=CHECK)
 
 
 BOXES = st.lists(
@@ -147,10 +129,7 @@ def test_long_detours_count_for_more_where_the_weight_falls_slowly() -> None:
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
-@given(
-    boxes=BOXES,
-    more=st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)),
-)
+@given(boxes=BOXES, more=st.tuples(st.floats(2.0, 16.0), st.floats(-6.0, 6.0), st.floats(0.5, 6.0)))
 def test_more_barrier_never_opens_a_way_and_mirrors_change_nothing(
     boxes: list[tuple[float, float, float]], more: tuple[float, float, float]
 ) -> None:

@@ -70,10 +70,7 @@ GIVEN: Final = (
     Given(("docs/howto/report.md",), "layout.json", "wall/layout.json", _SITE),
     Given(("docs/engineers/gas.md",), "my_site.toml", "scenarios/courtyard.toml"),
     Given(
-        ("docs/howto/app.md", "docs/researchers/benchmark.md"),
-        "runs/courtyard",
-        "agent",
-        _AGENT,
+        ("docs/howto/app.md", "docs/researchers/benchmark.md"), "runs/courtyard", "agent", _AGENT
     ),
 )
 
@@ -87,7 +84,7 @@ BACKGROUND: Final = {
     "docs/howto/cluster.md": (
         "dask scheduler --host 127.0.0.1 --scheduler-file dask.json --no-dashboard",
         "dask worker --scheduler-file dask.json --nworkers 1 --nthreads 1 --no-dashboard",
-    ),
+    )
 }
 """What runs beside all commands of a page, in the place of what a reader has elsewhere."""
 

@@ -52,9 +52,7 @@ class SightEngine(ShadeEngine):
 def environment() -> BlastBarrierEnv:
     """Return an environment with a building, a shed beside it, and a charge on 2 m of road."""
     document = small_document(stock=4)
-    document["charge"] = [
-        {**document["charge"][0], "start_m": (3.0, 8.0), "end_m": (3.0, 10.0)},
-    ]
+    document["charge"] = [{**document["charge"][0], "start_m": (3.0, 8.0), "end_m": (3.0, 10.0)}]
     document["structures"] = document["structures"][:2]
     scenario = Scenario.model_validate(document)
     return BlastBarrierEnv(

@@ -55,9 +55,7 @@ def test_an_episode_adds_up_to_the_blast(episode: tuple[list[Any], list[float], 
     assert last["time_s"] == [result.time_s]
 
 
-def test_what_is_seen_spreads_from_the_charge(
-    episode: tuple[list[Any], list[float], dict],
-) -> None:
+def test_what_is_seen_spreads_from_the_charge(episode: tuple[list[Any], list[float], dict]) -> None:
     """On the site alone: 10 m x 8 m are 16 x 20 cells. The wall is in columns 8 and 9."""
     observations, rewards, _ = episode
     planes = [observation["overpressure"] for observation in observations]

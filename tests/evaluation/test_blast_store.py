@@ -130,8 +130,7 @@ def test_a_file_that_is_damaged_later_costs_warnings_and_no_result(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("cache", "words"),
-    [(3, "cache is 3, must be a folder or a BlastStore"), ("file", "cannot be")],
+    ("cache", "words"), [(3, "cache is 3, must be a folder or a BlastStore"), ("file", "cannot be")]
 )
 def test_what_is_no_cache_is_refused(
     cache: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -10,12 +10,7 @@ from blast_env import Charge
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads
 from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine, PymunkEngine
-from blast_env.evaluation.store import (
-    BlastKey,
-    BlastStore,
-    calibration_digest,
-    engine_text,
-)
+from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
 from blast_env.particles.calibration.model import scenario_calibration
 from blast_env.particles.run import BlastRun
 from blast_env.site.scene import Scene

@@ -18,15 +18,7 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.engines.particles import PARTICLES_OVERRATE
 from blast_env.site import Scenario
-from tests.evaluation.cases import (
-    BEHIND_SHADOW,
-    COURTYARD,
-    FEW,
-    SEEDS,
-    SHADOW,
-    THREATS,
-    WALL,
-)
+from tests.evaluation.cases import BEHIND_SHADOW, COURTYARD, FEW, SEEDS, SHADOW, THREATS, WALL
 from tests.scenarios import BALLISTIC_COURTYARD
 
 

@@ -52,9 +52,7 @@ def test_each_threat_is_at_its_own_worst_place_with_the_posts_and_without(
     assert evaluation.to_dict()["result"]["worst"]["charge_position_m"][0] < 4.0
 
 
-def test_the_mechanism_is_the_same_for_all_that_judge_layouts(
-    evaluation: Evaluation,
-) -> None:
+def test_the_mechanism_is_the_same_for_all_that_judge_layouts(evaluation: Evaluation) -> None:
     case = LoadCaseSet(SITE, evaluation.threats)
     together = compare(Evaluators(GAS), [case, case], [POSTS, ()])
     assert together.case_reductions.tolist() == [evaluation.mean_reduction, 0.0]

@@ -101,11 +101,7 @@ def sedov_energy(dimensions: int) -> float:
 
     def slopes(x: float, values: Floats) -> Floats:
         u, g, p = values
-        rows = [
-            [g, u - x, 0.0],
-            [u - x, 0.0, 1.0 / g],
-            [0.0, -GAMMA * (u - x) / g, (u - x) / p],
-        ]
+        rows = [[g, u - x, 0.0], [u - x, 0.0, 1.0 / g], [0.0, -GAMMA * (u - x) / g, (u - x) / p]]
         rest = [-(n - 1) * g * u / x, -decay * u, -2.0 * decay]
         return np.asarray(np.linalg.solve(rows, rest))
 

@@ -87,8 +87,7 @@ def test_front_of_an_explosion(dimensions: int, cells: int) -> None:
     source = distance < 2.0
     energy = 1e6 * 2**dimensions  # with the mirror images
     solver.set_state(
-        density_kg_m3=1.0,
-        pressure_pa=np.where(source, (GAMMA - 1.0) * 1e6 / source.sum(), 1e-5),
+        density_kg_m3=1.0, pressure_pa=np.where(source, (GAMMA - 1.0) * 1e6 / source.sum(), 1e-5)
     )
     radius = 0.7 * cells
     time = sqrt(sedov_energy(dimensions) / energy * radius ** (dimensions + 2))

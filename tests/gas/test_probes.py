@@ -57,10 +57,7 @@ def test_a_later_pulse_counts_only_above_the_largest_value_so_far() -> None:
     assert table.net_impulse_pa_s[0] == pytest.approx(0.8)
 
 
-@given(
-    arrays(np.float64, st.integers(1, 40), elements=st.floats(-1e5, 1e6)),
-    st.floats(1e-5, 1e-2),
-)
+@given(arrays(np.float64, st.integers(1, 40), elements=st.floats(-1e5, 1e6)), st.floats(1e-5, 1e-2))
 def test_impulses_of_whole_histories_are_those_of_the_recorder(
     history_pa: NDArray[np.float64], step_s: float
 ) -> None:

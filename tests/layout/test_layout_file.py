@@ -102,7 +102,7 @@ def test_a_scenario_that_was_changed_since_is_another_one(tmp_path: Path) -> Non
     renamed = Scenario.from_document(full_document(), "test")
     assert load_layout(path, renamed) == (cell,)
     of_other_questions = document | {
-        "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 7.0}],
+        "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 7.0}]
     }
     asked = Scenario.from_document(of_other_questions, "test")
     assert asked.content_hash != original.content_hash

@@ -59,8 +59,7 @@ def ring(cavity_modules: int, thickness: int, shift_m: float = 0.0) -> Scenario:
 
 @pytest.mark.parametrize("engine", ["pymunk", "event"])
 @pytest.mark.parametrize(
-    ("cavity_modules", "thickness", "shift_m", "seed"),
-    [(4, 1, 0.0, 0), (5, 1, 0.25, 0)],
+    ("cavity_modules", "thickness", "shift_m", "seed"), [(4, 1, 0.0, 0), (5, 1, 0.25, 0)]
 )
 def test_a_closed_ring_is_closed(
     engine: str, cavity_modules: int, thickness: int, shift_m: float, seed: int

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from blast_env.evaluation.engines.particles import EventEngine
-from tests.particles.blast_front import (
-    FrontCase,
-    elastic_front,
-    inelastic_front,
-    radial_momentum,
-)
+from tests.particles.blast_front import FrontCase, elastic_front, inelastic_front, radial_momentum
 
 
 def test_an_elastic_blast_is_sedov_s() -> None:

@@ -32,12 +32,7 @@ def touching_air() -> Scene:
         "simulation": {
             "preset": "ballistic",
             "overrides": {
-                "air": {
-                    "spacing_units": 2.0,
-                    "radius_units": 1.0,
-                    "elasticity": 1.0,
-                    "jitter": 0.0,
-                }
+                "air": {"spacing_units": 2.0, "radius_units": 1.0, "elasticity": 1.0, "jitter": 0.0}
             },
         },
     }

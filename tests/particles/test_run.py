@@ -12,13 +12,7 @@ from blast_env.evaluation.engines.particles import PymunkEngine, find_particle_e
 from blast_env.geometry import Rectangle
 from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.particles.run import BlastRun, EndReason
-from blast_env.site.balls import (
-    Balls,
-    CollisionType,
-    air_lattice,
-    explosion_fan,
-    lattice_capacity,
-)
+from blast_env.site.balls import Balls, CollisionType, air_lattice, explosion_fan, lattice_capacity
 from blast_env.site.scene import Scene
 from tests.particles.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, wall
 

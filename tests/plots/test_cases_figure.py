@@ -24,9 +24,7 @@ COURTYARD = load_scenario("courtyard")
 
 
 def comparison(
-    *reductions: float,
-    scenarios: Sequence[Scenario] = (COURTYARD,),
-    in_range: Sequence[bool] = (),
+    *reductions: float, scenarios: Sequence[Scenario] = (COURTYARD,), in_range: Sequence[bool] = ()
 ) -> Evaluation:
     """Return a comparison: case k has k + 1 modules, its charge on the road of the courtyard."""
     cases = []

@@ -93,9 +93,7 @@ def test_facades_are_told_by_the_normal(result: BlastResult) -> None:
 
 def test_a_blast_without_hits_can_be_drawn(result: BlastResult) -> None:
     empty = replace(
-        result,
-        collision_array=result.collision_array[:0],
-        obstacles=result.blast.scene.obstacles(),
+        result, collision_array=result.collision_array[:0], obstacles=result.blast.scene.obstacles()
     )
     assert "no hits" in texts_of(impulse_over_time(empty))
     heat_map(empty).draw_without_rendering()

@@ -22,12 +22,7 @@ from blast_env.gas.probes import GroundMap
 from blast_env.particles.calibration.references import kingery_bulmash
 from blast_env.plots.film import plan_until
 from blast_env.plots.gas import facades, full_load, gauge_history
-from blast_env.plots.ground_map import (
-    ground_map,
-    ground_recorders,
-    ground_values,
-    map_levels,
-)
+from blast_env.plots.ground_map import ground_map, ground_recorders, ground_values, map_levels
 from blast_env.plots.plan import STRUCTURE, barrier_features
 from blast_env.plots.pressure_film import record_planes, write_pressure_film
 from blast_env.plots.pressure_frames import (
@@ -115,10 +110,7 @@ def test_the_ground_has_what_gauges_have(unprotected: GasResult) -> None:
 @pytest.mark.usefixtures("laid_out")
 @pytest.mark.parametrize(
     ("quantity", "factor", "label"),
-    [
-        ("peak", 1e-3, "peak overpressure (kPa)"),
-        ("impulse", 1.0, "peak specific impulse (Pa·s)"),
-    ],
+    [("peak", 1e-3, "peak overpressure (kPa)"), ("impulse", 1.0, "peak specific impulse (Pa·s)")],
 )
 def test_maps_show_the_ground_of_the_site_on_one_scale(
     unprotected: GasResult, protected: GasResult, quantity: Any, factor: float, label: str

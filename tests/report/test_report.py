@@ -265,8 +265,7 @@ def test_pdf_has_the_same_pages_of_text_and_pictures(study: Study, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("html", "pdf", "words"),
-    [("a.txt", None, "must be .html"), ("a.html", "a.ps", "must be .pdf")],
+    ("html", "pdf", "words"), [("a.txt", None, "must be .html"), ("a.html", "a.ps", "must be .pdf")]
 )
 def test_suffixes(study: Study, html: str, pdf: str | None, words: str, tmp_path: Path) -> None:
     with pytest.raises(BlastEnvError, match=words):

@@ -15,13 +15,7 @@ from blast_env.evaluation.engines import simulate
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutFile, LayoutState, load_layout, write_layout
 from blast_env.layout.build_scene import build_scene, build_site
-from blast_env.site import (
-    Scenario,
-    ScenarioError,
-    load_scenario,
-    save_scenario,
-    stock_barriers,
-)
+from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario, stock_barriers
 from tests.catalogue_sites import ITEMS, WALL, item, yard, yard_document
 from tests.site.documents import Document
 from tests.site.zones import buildable, catalogue_documents, pieces_may_stand

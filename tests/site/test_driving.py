@@ -84,12 +84,7 @@ def test_a_corner_lets_through_what_grip_allows_on_the_widest_arc(
     """The widest arc touches both outer edges of the way of the centre and the inner corner."""
     roads = [(0.0, 20.0, 40.0 + road_m, 20.0 + road_m), (40.0, 20.0, 40.0 + road_m, 60.0)]
     corner = ground(
-        60.0,
-        60.0,
-        (20.0, 20.0 + road_m),
-        roads,
-        entry_speed_km_h=90.0,
-        acceleration_m_s2=0.1,
+        60.0, 60.0, (20.0, 20.0 + road_m), roads, entry_speed_km_h=90.0, acceleration_m_s2=0.1
     )
     beyond = float(np.nanmax(speeds_of(corner).places_km_h[round(58.0 / STEP_M)]))
     exact = KM_H_PER_M_S * sqrt(0.7 * 9.81 * (road_m - 2.0) * (2.0 + sqrt(2.0)))

@@ -16,13 +16,7 @@ from blast_env.site import (
 )
 from blast_env.site.parameters import preset
 from blast_env.site.scene import Charge
-from tests.site.documents import (
-    Document,
-    KeyPath,
-    changed,
-    full_document,
-    minimal_document,
-)
+from tests.site.documents import Document, KeyPath, changed, full_document, minimal_document
 
 
 def scenario_from(document: Document) -> Scenario:

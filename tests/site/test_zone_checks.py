@@ -42,10 +42,7 @@ def only_line(*structures: Document, **zone: Any) -> str:
             {"budget": 0.9},
             "budget: is 0.9, must be at least 1, the cost of a module on the cheapest usable cell",
         ),
-        (
-            {"stock": 65},
-            "stock: is 65, must be at most 64, the number of usable cells",
-        ),
+        ({"stock": 65}, "stock: is 65, must be at most 64, the number of usable cells"),
     ],
 )
 def test_zone_that_cannot_be_used_is_named_with_its_bound(zone: Document, line: str) -> None:

@@ -12,13 +12,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.layout.build_scene import draw_charge
 from studies import bench
-from studies.bench import (
-    SiteCost,
-    blast_cost,
-    environment_cost,
-    site_cost,
-    street,
-)
+from studies.bench import SiteCost, blast_cost, environment_cost, site_cost, street
 from tests.envs.small import ThinEngine, small_document
 from tests.gas_sites import hut
 

@@ -29,11 +29,7 @@ class ShadeEngine(Engine):
     validated_range: ClassVar[str] = "the validated range of a shade"
 
     def loads(
-        self,
-        scenario: Scenario,
-        layout: Sequence[Element],
-        charge: AnyCharge,
-        seed: int,
+        self, scenario: Scenario, layout: Sequence[Element], charge: AnyCharge, seed: int
     ) -> BlastLoads:
         """Return a load of 1,000 Pa s at 1 m, which falls with the distance of the centre."""
         x_m, y_m = charge_against(scenario, layout, charge).position_m

@@ -9,11 +9,7 @@ from scipy import stats
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.particles.calibration import free_field as study_module
-from blast_env.particles.calibration.free_field import (
-    FreeFieldStudy,
-    impulse_by_seed,
-    summarise,
-)
+from blast_env.particles.calibration.free_field import FreeFieldStudy, impulse_by_seed, summarise
 from blast_env.store import Store
 
 SMALL = load_scenario("free_field").with_simulation(

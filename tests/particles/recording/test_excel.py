@@ -25,11 +25,7 @@ from tests.design.search_cases import small_scenario
 from tests.particles.recording import workbooks
 from tests.particles.recording.conftest import SEED
 
-TABLES = (
-    ("Structures", "structures"),
-    ("Modules", "modules"),
-    ("Collisions", "collisions"),
-)
+TABLES = (("Structures", "structures"), ("Modules", "modules"), ("Collisions", "collisions"))
 
 
 @pytest.fixture(scope="module")
