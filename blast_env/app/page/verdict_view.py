@@ -43,9 +43,8 @@ class VerdictView:
                 element.classes("w-28")
             for question in Question:
                 button = ui.button(question.value, on_click=partial(self._ask, question))
-                button.props("dense no-caps").classes("shrink-0").mark(question.value).tooltip(
-                    _HEADINGS[question]
-                )
+                button.props("dense no-caps").classes("shrink-0").mark(question.value)
+                button.tooltip(_HEADINGS[question])
         with ui.element("div").classes("be-results"):
             self._cost = ui.label().classes("be-quiet")
             self._answers = ui.column().classes("w-full gap-1").props('aria-live="polite"')
