@@ -100,6 +100,18 @@ def texts_in(item: ui.element) -> list[Any]:
     return [each for each in item.descendants() if hasattr(each, "text")]
 
 
+async def upload(user: User, name: str, content: bytes, times: int = 1) -> None:
+    (element,) = user.find(kind=ui.upload).elements
+    with user:
+        file = SmallFileUpload(name=name, content_type="", _data=content)
+        await element.handle_uploads([file] * times)
+
+
+async def replace_site(user: User, path: Path) -> None:
+    choose(user, "replace the site from a file")
+    await upload(user, path.name, path.read_bytes())
+
+
 def test_a_site_is_chosen_a_module_placed_and_taken_back(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         await user.open("/")
@@ -259,10 +271,7 @@ def test_a_number_is_read_as_it_is_meant_or_refused(tmp_path: Path) -> None:
 def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        chooser = next(
-            each for each in user.find(kind=ui.select).elements if each.props["label"] == "selected"
-        )
-        chooser.value = "structure 0"
+        choose_thing(user, "structure 0")
         height = field_of(user, "height (m)")
         height.value = "3.5"
         user.find("height (m)").trigger("blur")
@@ -293,12 +302,7 @@ def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
 
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        choose(user, "replace the site from a file")
-        (element,) = user.find(kind=ui.upload).elements
-        with user:
-            await element.handle_uploads(
-                [SmallFileUpload(name=path.name, content_type="", _data=path.read_bytes())]
-            )
+        await replace_site(user, path)
         await user.should_see("podium", retries=200)
         assert session.scenario == site
         fields = {each.label: each for each in fields_of(site, SiteThing(ThingKind.STRUCTURE))}
@@ -352,12 +356,7 @@ def test_a_broken_file_is_a_message_and_the_design_stays(tmp_path: Path) -> None
         session = await opened(user, sessions, hut())
         before = session.design
         choose(user, "replace the site from a file")
-        upload = user.find(kind=ui.upload)
-        (element,) = upload.elements
-        with user:
-            await element.handle_uploads(
-                [SmallFileUpload(name="bad.toml", content_type="", _data=b"schema_version = ")]
-            )
+        await upload(user, "bad.toml", b"schema_version = ")
         await user.should_see("line 1, column 18", retries=200)
         await user.should_see("Nothing was changed")
         assert session.design == before
@@ -389,13 +388,7 @@ def test_a_map_becomes_a_site_with_its_deviations_told(
 
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        choose(user, "replace the site from a file")
-        (element,) = user.find(kind=ui.upload).elements
-        content = BLOCK.read_bytes()
-        with user:
-            await element.handle_uploads(
-                [SmallFileUpload(name=BLOCK.name, content_type="", _data=content)]
-            )
+        await replace_site(user, BLOCK)
         await user.should_see("protected buildings (names, separated by commas)")
         mass = field_of(user, "mass of a charge (kg TNT)")
         mass.value = "110 lb"
@@ -437,11 +430,7 @@ def test_a_page_that_is_closed_while_a_file_is_read_leaves_nothing(
 
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
-        choose(user, "replace the site from a file")
-        (element,) = user.find(kind=ui.upload).elements
-        file = SmallFileUpload(name=BLOCK.name, content_type="", _data=BLOCK.read_bytes())
-        with user:
-            await element.handle_uploads([file])
+        await replace_site(user, BLOCK)
         await user.should_see("protected buildings (names, separated by commas)")
         user.find("protected buildings (names, separated by commas)").type("Library")
         user.find(marker="import").click()
@@ -481,11 +470,7 @@ def test_not_all_files_are_read_at_once(tmp_path: Path, monkeypatch: pytest.Monk
 
     async def story(user: User, sessions: Sessions) -> None:
         await user.open("/")
-        (element,) = user.find(kind=ui.upload).elements
-        with user:
-            await element.handle_uploads(
-                [SmallFileUpload(name="x.toml", content_type="", _data=b"x")] * 5
-            )
+        await upload(user, "x.toml", b"x", times=5)
         for _ in range(100):
             await asyncio.sleep(0.1)
             if len(at_work) == 10:

@@ -32,6 +32,11 @@ def outline(places: Places, **tags: Any) -> dict[str, Any]:
     return {"type": "Feature", "properties": properties, "geometry": geometry}
 
 
+def line(places: Sequence[Sequence[float]], **tags: Any) -> dict[str, Any]:
+    geometry = {"type": "LineString", "coordinates": [list(each) for each in places]}
+    return {"type": "Feature", "properties": tags, "geometry": geometry}
+
+
 def charge(x: float, y: float) -> dict[str, Any]:
     geometry = {"type": "Point", "coordinates": [x, y]}
     return {"type": "Feature", "properties": {"kind": "charge_place"}, "geometry": geometry}

@@ -16,7 +16,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportOptions, dxf, geojson, import_site, osm, site_map
 from blast_env.io.importing.ledger import Deed
 from blast_env.site import ScenarioError
-from tests.io.importing.maps import BLOCK, LAYERS, Places, charge, outline, rectangle, written
+from tests.io.importing.maps import BLOCK, LAYERS, Places, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))
 HOUSE = outline(rectangle(0, 0, 6, 4), name="House", protected=True)
@@ -309,12 +309,7 @@ def test_heights_that_are_none_are_noted_and_guessed(tmp_path: Path) -> None:
 def test_streets_of_too_many_bends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bends are made straighter until a scenario takes them, as far as that goes."""
     curve = [[x, 14.0 + 3.0 * (-1) ** (x // 4) + 0.2 * (-1) ** x] for x in range(-8, 15)]
-    street = {
-        "type": "Feature",
-        "properties": {"highway": "service"},
-        "geometry": {"type": "LineString", "coordinates": curve},
-    }
-    path = written(tmp_path, HOUSE, street)
+    path = written(tmp_path, HOUSE, line(curve, highway="service"))
     options = ImportOptions(margin_m=20.0)
     assert len(import_site(path, options).scenario.charge) > 12
     monkeypatch.setattr("blast_env.io.importing.threats.MOST_SOURCES", 12)

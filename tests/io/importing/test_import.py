@@ -20,7 +20,7 @@ from blast_env.layout import usable_cells
 from blast_env.site import AnySource, RectangleSource, Scenario, load_scenario, save_scenario
 from blast_env.site.models import PointM
 from blast_env.site.sections import DrawingGeoreference, MapGeoreference, PolygonSection
-from tests.io.importing.maps import BLOCK, LAYERS, charge, outline, rectangle, written
+from tests.io.importing.maps import BLOCK, LAYERS, charge, line, outline, rectangle, written
 
 HALL = ImportOptions(protect=("Town Hall",))
 MODULE_M = 0.5
@@ -414,11 +414,7 @@ def test_streets_keep_clear_of_buildings_and_border(tmp_path: Path) -> None:
     path = written(
         tmp_path,
         outline(rectangle(10, 0, 6, 10), protected=True),
-        {
-            "type": "Feature",
-            "properties": {"highway": "service"},
-            "geometry": {"type": "LineString", "coordinates": [[-40, 5], [60, 5]]},
-        },
+        line([(-40, 5), (60, 5)], highway="service"),
     )
     scenario = imported(path).scenario
     gap_m = scenario.charge_radius_m

@@ -22,7 +22,7 @@ from blast_env.io.importing.ledger import Deed, Ledger, LedgerEntry
 from blast_env.plots.plan import site_features
 from blast_env.site import RectangleSource, Scenario
 from studies.real_files.__main__ import main
-from tests.io.importing.maps import Places, charge, outline, rectangle, written
+from tests.io.importing.maps import Places, charge, line, outline, rectangle, written
 
 PLACE = charge(-5.0, 2.0)
 HOUSE = outline(rectangle(0, 0, 6, 4), name="House", height=6.0, protected=True)
@@ -74,6 +74,11 @@ class Extract:
         sides = "".join(f'<nd ref="{node}"/>' for node in nodes)
         self.others.append(f'<way id="{number}" {marks}>{sides}{_tags(tags)}</way>')
 
+    def street(self) -> None:
+        """Add a street, way 2, south of what is at the origin."""
+        ends = [self.node(x, -12.0) for x in (-20.0, 30.0)]
+        self.way_of(2, ends, highway="residential", width="8")
+
     def relation(self, number: int, members: Sequence[tuple[int, str]], **tags: str) -> None:
         ways = "".join(f'<member type="way" ref="{way}" role="{role}"/>' for way, role in members)
         tags = {"type": "multipolygon", **tags}
@@ -97,8 +102,7 @@ def town(**tags: str) -> Extract:
     """Return an extract with a house, way 1, and a street beside it, way 2."""
     extract = Extract()
     extract.way(1, rectangle(0, 0, 10, 8), building="yes", height="6", name="House", **tags)
-    street = [extract.node(x, -12.0) for x in (-20.0, 30.0)]
-    extract.way_of(2, street, highway="residential", width="8")
+    extract.street()
     return extract
 
 
@@ -164,8 +168,7 @@ def test_parts_give_a_building_its_heights(tmp_path: Path) -> None:
     extract.way(3, rectangle(0, 0, 10, 10), **{"building:part": "yes", "height": "30"})
     extract.way(4, rectangle(10, 0, 10, 10), **{"building:part": "yes", "building:levels": "2"})
     extract.way(5, rectangle(12, 2, 4, 4), **{"building:part": "yes"})
-    street = [extract.node(x, -12.0) for x in (-20.0, 30.0)]
-    extract.way_of(2, street, highway="residential", width="8")
+    extract.street()
     site = imported(extract.write(tmp_path), protect=("Hall",))
     found = {each.place: (each.height_m, each.outline.area) for each in site.buildings}
     assert {place: height_m for place, (height_m, _) in found.items()} == {
@@ -336,9 +339,8 @@ def test_no_place_for_a_charge_names_what_helps(tmp_path: Path) -> None:
 
 
 def street(y: float, **tags: str) -> dict[str, Any]:
-    line = {"type": "LineString", "coordinates": [[-300, y], [300, y]]}
     tags = {"highway": "residential", "name": "Long Lane", "width": "8", **tags}
-    return {"type": "Feature", "properties": tags, "geometry": line}
+    return line([(-300, y), (300, y)], **tags)
 
 
 def test_ground_reaches_to_the_nearest_street_as_a_guess(tmp_path: Path) -> None:
@@ -419,6 +421,11 @@ def of_layer(name: str) -> dict[str, str]:
     return {"layer": name}
 
 
+def house_at(space: Any, x: float, name: str = "HOUSES") -> None:
+    """Add the outline of a house of 6 m x 4 m."""
+    space.add_lwpolyline(rectangle(x, 0, 6, 4), close=True, dxfattribs=of_layer(name))
+
+
 DRAWN: dict[str, Any] = {
     "buildings_from": ("HOUSES",),
     "protect_near": (1.0, 1.0),
@@ -429,7 +436,7 @@ DRAWN: dict[str, Any] = {
 def test_entities_on_layer_0_of_a_block_have_the_layer_of_the_insert(tmp_path: Path) -> None:
     path, document = drawing(tmp_path)
     inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
-    inner.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("0"))
+    house_at(inner, 0, "0")
     outer.add_blockref("INNER", (0, 0), dxfattribs=of_layer("0"))
     outer.add_lwpolyline(rectangle(10, 0, 4, 4), close=True, dxfattribs=of_layer("TREES"))
     document.modelspace().add_blockref("OUTER", (0, 0), dxfattribs=of_layer("HOUSES"))
@@ -447,7 +454,7 @@ def test_blocks_in_stretched_and_turned_blocks_keep_layers_and_shapes(
     """The content of such a block is skewed, as no insert can be."""
     path, document = drawing(tmp_path)
     inner, outer = document.blocks.new("INNER"), document.blocks.new("OUTER")
-    inner.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("0"))
+    house_at(inner, 0, "0")
     inner.add_circle((20, 2), 3.0, dxfattribs=of_layer("0"))
     turned = of_layer("HOUSES") | {"rotation": turn_deg}
     outer.add_blockref("INNER", (0, 0), dxfattribs=turned)
@@ -474,7 +481,7 @@ def test_outlines_with_a_gap_are_closed_and_named(gap: float, tmp_path: Path) ->
         rectangle(10, 0, 6, 4), [*rectangle(10, 0, 6, 4)[1:], (10.0, gap)], strict=True
     ):
         space.add_line((x, y), (u, v), dxfattribs=of_layer("HOUSES"))
-    space.add_lwpolyline(rectangle(20, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES"))
+    house_at(space, 20)
     document.saveas(path)
     if gap > 0.05:
         others = {"protect_near": (21.0, 1.0), "charge_at": ((15.0, 2.0),)}
@@ -495,14 +502,7 @@ def test_outlines_with_a_gap_are_closed_and_named(gap: float, tmp_path: Path) ->
 def test_lines_joined_to_an_outline_keep_what_they_say(tmp_path: Path) -> None:
     corners = [*rectangle(0, 0, 6, 4), (0, 0)]
     tags = {"building": "yes", "height": 6.0, "min_height": 2.0, "protected": True}
-    sides = [
-        {
-            "type": "Feature",
-            "properties": tags,
-            "geometry": {"type": "LineString", "coordinates": [list(a), list(b)]},
-        }
-        for a, b in pairwise(corners)
-    ]
+    sides = [line(ends, **tags) for ends in pairwise(corners)]
     (house,) = imported(written(tmp_path, *sides, PLACE)).buildings
     assert (house.height_m, house.base_m, house.protected) == (6.0, 2.0, True)
 
@@ -564,7 +564,7 @@ def test_meshes_have_a_footprint_and_their_heights(tmp_path: Path) -> None:
 def test_what_a_drawing_has_of_no_outline_is_named(tmp_path: Path) -> None:
     path, document = drawing(tmp_path)
     space = document.modelspace()
-    space.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES"))
+    house_at(space, 0)
     document.add_xref_def("other.dxf", "OTHER")
     space.add_blockref("OTHER", (0, 0), dxfattribs=of_layer("HOUSES"))
     space.add_xline((0, 0), (1, 1), dxfattribs=of_layer("HOUSES"))
@@ -582,7 +582,7 @@ def test_what_a_drawing_has_of_no_outline_is_named(tmp_path: Path) -> None:
 def test_scale_of_0_is_1(tmp_path: Path) -> None:
     path, document = drawing(tmp_path)
     block = document.blocks.new("HOUSE")
-    block.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("0"))
+    house_at(block, 0, "0")
     marks = {**of_layer("HOUSES"), "xscale": 3.0, "zscale": 3.0}
     document.modelspace().add_blockref("HOUSE", (0, 0), dxfattribs=marks)
     document.saveas(path)
@@ -596,9 +596,7 @@ def test_scale_of_0_is_1(tmp_path: Path) -> None:
 
 def test_damaged_drawing_is_recovered_and_named(tmp_path: Path) -> None:
     path, document = drawing(tmp_path)
-    document.modelspace().add_lwpolyline(
-        rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES")
-    )
+    house_at(document.modelspace(), 0)
     document.saveas(path)
     lines = path.read_text().splitlines()
     at = next(k for k, line in enumerate(lines) if line == "LWPOLYLINE")
@@ -640,12 +638,11 @@ def test_strict_refuses_guesses_and_omissions(tmp_path: Path) -> None:
 
 
 def test_guesses_about_what_is_not_on_the_site_do_not_count(tmp_path: Path) -> None:
-    street: dict[str, Any] = {"type": "LineString", "coordinates": [[300, 0], [300, 9]]}
-    far = {"type": "Feature", "properties": {"highway": "residential"}, "geometry": street}
-    path = written(tmp_path, HOUSE, far, PLACE)
+    far, near = ([(300, 0), (300, 9)], [(9, -9), (9, 13)])
+    path = written(tmp_path, HOUSE, line(far, highway="residential"), PLACE)
     assert imported(path, strict=True, origin=(-10.0, -10.0), size_m=(30.0, 30.0)).buildings
-    near = {**far, "geometry": {**street, "coordinates": [[9, -9], [9, 13]]}}
-    assert "features[1]" in error_of(written(tmp_path, HOUSE, near, PLACE), strict=True)
+    path = written(tmp_path, HOUSE, line(near, highway="residential"), PLACE)
+    assert "features[1]" in error_of(path, strict=True)
 
 
 def test_ledger_has_places_names_and_positions(tmp_path: Path) -> None:
@@ -755,8 +752,7 @@ def test_relation_of_a_building_leaves_its_parts_as_they_are(tmp_path: Path) -> 
     extract.way(4, rectangle(10, 0, 10, 10), **{"building:part": "yes", "height": "6"})
     members = [(1, "outline"), (3, "part"), (4, "part")]
     extract.relation(6, members, type="building")
-    street = [extract.node(x, -12.0) for x in (-20.0, 30.0)]
-    extract.way_of(2, street, highway="residential", width="8")
+    extract.street()
     site = imported(extract.write(tmp_path), protect=("Hall",))
     assert {each.place: each.height_m for each in site.buildings} == {"way 3": 30.0, "way 4": 6.0}
 
@@ -798,7 +794,7 @@ def test_every_entity_of_a_drawing_is_on_the_ledger(
 ) -> None:
     path, document = drawing(tmp_path_factory.mktemp("drawings"))
     space = document.modelspace()
-    space.add_lwpolyline(rectangle(0, 0, 6, 4), close=True, dxfattribs=of_layer("HOUSES"))
+    house_at(space, 0)
     handles = []
     for kind, x, y, side, layer in drawn:
         of, ring = of_layer(layer), rectangle(x, y, side, side)
