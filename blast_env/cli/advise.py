@@ -1,6 +1,5 @@
 """`blast-env advise`: the protection for a budget by kind of measure, and the cost to pass."""
 
-from dataclasses import replace
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
@@ -39,8 +38,7 @@ from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS, AdviceJudge, Advised, advised, asked_site
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCaseSet, draw_threats
-from blast_env.evaluation.cases import one_of_each_charge
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet
 from blast_env.evaluation.engines.contract import JUDGE, find_engine
 from blast_env.evaluation.grid_error import final_engine
 from blast_env.layout import write_layout
@@ -96,11 +94,7 @@ def advise(
     """
     level = wanted_level(target, load_scenario(scenario), LevelOfProtection.MEDIUM)
     site = asked_site(load_scenario(scenario), level, target_probability, budget_cost)
-    given = GivenCharge.of(charge, tnt_kg)
-    drawn = draw_threats(site, range(charges))
-    threats = one_of_each_charge(
-        [replace(each, charge=given.fixed(site, each.charge)) for each in drawn]
-    )
+    threats = GivenCharge.of(charge, tnt_kg).threats(site, charges)
     if budget < len(threats):
         raise BlastEnvError(
             f"budget is {budget} blasts, must be at least {len(threats)}: one per charge"

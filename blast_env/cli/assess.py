@@ -175,7 +175,8 @@ def assess(
         _screen(site, last, mass, required, engine if gas else None, picture)
         return
     refuse_given(context, _OF_SCREENING, "is for --screen")
-    drawn = GivenCharge.of(charge, tnt_kg).fixed_charges(site, charges)
+    threats = GivenCharge.of(charge, tnt_kg).threats(site, charges)
+    drawn = [each.charge for each in threats]
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
         refuse_given(context, (*_OF_ASSESSMENT, "require"), "does not apply to --capacity")

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final
@@ -15,7 +15,7 @@ from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import draw_threats, one_of_each_charge
+from blast_env.evaluation.cases import LoadCase, draw_threats, one_of_each_charge
 from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
@@ -233,7 +233,8 @@ class GivenCharge:
             scenario.with_charge(charge)  # refuses a place that is not clear
         return charge
 
-    def fixed_charges(self, scenario: Scenario, draws: int) -> list[AnyCharge]:
-        """Return the drawn charges, each place once, with the given place and mass."""
-        threats = one_of_each_charge(draw_threats(scenario, range(draws)))
-        return list(dict.fromkeys(self.fixed(scenario, threat.charge) for threat in threats))
+    def threats(self, scenario: Scenario, draws: int) -> tuple[LoadCase, ...]:
+        """Return drawn threats with the given place and mass, each place once."""
+        drawn = draw_threats(scenario, range(draws))
+        fixed = (replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn)
+        return one_of_each_charge(fixed)
