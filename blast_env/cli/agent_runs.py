@@ -71,11 +71,7 @@ _NO_BEST: Final = (
 
 
 def evaluate_run(run: Path, options: EvaluateOptions) -> None:
-    """Evaluate the proposals of the agent of a run folder; print and write the result.
-
-    Raises:
-        BlastEnvError: If it is no run folder, or damaged, or an option does not apply.
-    """
+    """Evaluate the proposals of the agent of a run folder; print and write the result."""
     folder = RunFolder(run)
     configuration = folder.configuration()
     settings, weights = configuration.settings, newest_weights(run)

@@ -183,7 +183,7 @@ class LoadCaseSet:
         charge: The charge, if it is known when a layout is proposed; `None` if it is hidden.
         name: Name for display.
         seed: Seed of the random numbers of a search or a random layout.
-        search_set: LoadCaseSet for the blasts of a search, without any of `threats`.
+        search_set: The set for the blasts of a search, without any of `threats`.
 
     Raises:
         BlastEnvError: If there are no threats, they are not as many for each charge, or one of

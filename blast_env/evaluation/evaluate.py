@@ -133,11 +133,7 @@ def compare(
         progress: Called with the finished share of the blasts.
 
     Raises:
-        LayoutError: If a layout does not fit the build zone of its case.
-        CalibrationError: If a scenario names no calibration, or one that was made with other
-            parameters or another engine.
-        BlastEnvError: If there are no cases, a threat is repeated, `processes` or `cvar_level` is
-            out of bounds, or no load arrives in a case even without a barrier.
+        BlastEnvError: Same as for `evaluate_layout`, and if there are no cases.
     """
     check_cvar_level(cvar_level)
     if not cases:

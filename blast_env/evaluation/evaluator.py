@@ -50,28 +50,19 @@ class BlastEvaluator:
     It can be pickled, with its cached loads.
 
     Args:
-        scenario: The scenario, or its bundled name or path; for the particle engines it must name
-            a calibration.
+        scenario: The scenario; for the particle engines it must name a calibration.
         engine: Name of an engine, or an engine.
         cache_size: Maximum number of loads in memory, unless `cache` is a store.
         cache: Folder of a store, for other processes and later runs, or a store that several
             evaluators share; see `BlastStore`.
         counts: Counts that several evaluators share; its own unless given.
 
-    Attributes:
-        scenario: The scenario.
-        engine: The engine.
-        calibration: The scenario's calibration, checked against its parameters and the engine;
-            `None` for engines without particles, which need none.
-        store: Where the loads are.
-        counts: Counts of blasts.
+    Attributes: calibration: The scenario's calibration, checked against its parameters and the
+    engine; `None` for engines without particles, which need none. store: Where the loads are.
 
     Raises:
-        CalibrationError: If the scenario names no calibration, or one that was made with other
-            parameters or another engine.
-        UnknownNameError: If there is no such engine or calibration.
-        BlastEnvError: If the cache size is negative, `cache` is not usable, or the scenario's
-            objective needs overpressures and the engine has none.
+        BlastEnvError: If the engine cannot compute the loads that the objective needs, its
+            calibration is missing or was made with others, or an argument is not usable.
     """
 
     def __init__(
@@ -134,13 +125,7 @@ class BlastEvaluator:
         Repeated pairs and cached blasts cost nothing. The number of processes changes only the
         time. Blasts that ended before an interruption stay cached.
 
-        Args:
-            pairs: Layouts with threats.
-            processes: Number of worker processes.
-            progress: Called with the finished share of the pairs.
-
         Raises:
-            BlastEnvError: If `processes` is below 1.
             LayoutError: If a layout does not fit the build zone; nothing is simulated then.
             ScenarioError: If a charge is not clear of a structure or the border.
         """
@@ -235,23 +220,10 @@ _MOST_EVALUATORS: Final = 4
 
 
 class Evaluators:
-    """The evaluators of the most recent scenarios.
+    """The evaluators of the most recent scenarios, with one engine and one store.
 
-    Only few are kept, so that a new site at every reset does not fill the memory.
-
-    Args:
-        engine: Name of an engine, or an engine.
-        cache: Folder or store that all of them share; see `BlastEvaluator`.
-        most: Maximum number of evaluators.
-
-    Attributes:
-        engine: The engine.
-        most: Maximum number of evaluators.
-        counts: Counts of the blasts of all of them.
-
-    Raises:
-        BlastEnvError: If the cache is not usable.
-        UnknownNameError: If there is no such engine.
+    Only few are kept, so that a new site at every reset does not fill the memory. Arguments and
+    errors are those of `BlastEvaluator`.
     """
 
     def __init__(

@@ -51,12 +51,7 @@ def convergence_index(
 ) -> float:
     """Return Roache's grid convergence index of a number on the fine cells, in its unit.
 
-    Args:
-        fine: The number with the fine cells.
-        coarse: The same with the coarse ones.
-        ratio: Side of the coarse cells over that of the fine ones.
-        order: Order of convergence.
-        factor: Factor of safety.
+    `ratio` is the side of the coarse cells over that of the fine ones.
 
     Raises:
         BlastEnvError: If `ratio` is not above 1, or `order` or `factor` is not above 0.

@@ -33,11 +33,8 @@ def load_factors(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the factors on pressures and on times for another mass or distance.
 
-    Args:
-        charge: The charge.
-        distance_m: Distances from it.
-        other_kg: Mass of the other charge, in a shape that broadcasts with the distances.
-        other_m: Distances from the other charge.
+    Distances are those from the charge and from the other one; the masses of the other one have a
+    shape that broadcasts with them.
     """
     old = np.broadcast_arrays(distance_m, charge.tnt_kg, other_m, other_kg)[:2]
     new = np.broadcast_arrays(other_m, other_kg, distance_m)[:2]

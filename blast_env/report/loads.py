@@ -57,11 +57,7 @@ class UnitSystem:
 
     @classmethod
     def named(cls, name: str) -> "UnitSystem":
-        """Return the units of a name.
-
-        Raises:
-            UnknownNameError: If no units have that name.
-        """
+        """Return the units of a name."""
         if name not in UNITS:
             raise UnknownNameError("units", name, UNITS)
         return UNITS[name]

@@ -118,11 +118,7 @@ class BayLoads:
         return time_s + 0.5 * step_s * np.array([-1.0, 1.0]), np.repeat(history_pa, 2, axis=1)
 
     def history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
-
-        Raises:
-            UnknownNameError: If no bay of that name touches air.
-        """
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""
         import pandas as pd
 
         names = [each.bay.name for each in self.bays]
@@ -132,11 +128,7 @@ class BayLoads:
         return pd.DataFrame({"time_s": self.recorder.time_s, "overpressure_pa": history})
 
     def table(self, run: "GasRun") -> "pd.DataFrame":
-        """Return one row per bay; see `LOADED_BAY_COLUMNS`.
-
-        Args:
-            run: The run that recorded the bays.
-        """
+        """Return one row per bay of the run that recorded them; see `LOADED_BAY_COLUMNS`."""
         if not self.bays:
             return table_of([], LOADED_BAY_COLUMNS)
         known = self.known(run)
@@ -151,11 +143,7 @@ class BayLoads:
         return table_of(rows, LOADED_BAY_COLUMNS)
 
     def known(self, run: "GasRun") -> dict[str, bool]:
-        """Return whether the load of each bay was known at the end of the run, by its name.
-
-        Args:
-            run: The run that recorded the bays.
-        """
+        """Return whether the load of each bay was known at the end of the run, by its name."""
         names = [each.name for each in run.site.structures]
         come = {name: run.has_come(index) for index, name in enumerate(names)}
         net = impulses(self.response.time_s, self.response.pressure_pa)

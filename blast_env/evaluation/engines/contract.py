@@ -259,11 +259,7 @@ class BlastLoads:
         return max((np.nan if peak is None else peak for peak in peaks), default=0.0)
 
     def load(self, objective: ObjectiveSection) -> float:
-        """Return the load of the protected structures in the unit of the objective.
-
-        Args:
-            objective: Selects the load: impulse, peak or response.
-        """
+        """Return the load of the protected structures that an objective selects, in its unit."""
         impulse_pa_s = {each.name: each.impulse_pa_s for each in self._buildings}
         return sum(
             objective.load(
@@ -378,11 +374,8 @@ class Engine(ABC):
     ) -> BlastLoads:
         """Return the loads of one blast on all structures, by default by running `blast`.
 
-        Args:
-            scenario: The scenario.
-            layout: A legal layout.
-            charge: The charge in place, or the vehicle that carries it.
-            seed: Seed of the noise; engines without noise ignore it.
+        The layout is legal; the charge is in place, or the vehicle that carries it. Engines without
+        noise ignore the seed.
         """
         return self.blast(scenario, layout, seed, charge).run().loads()
 
@@ -439,11 +432,7 @@ class Engine(ABC):
         return self.name
 
     def final(self, scenarios: Sequence[Scenario]) -> "Engine":  # noqa: ARG002
-        """Return the engine with the resolution of final statements on some sites.
-
-        Args:
-            scenarios: The sites.
-        """
+        """Return the engine with the resolution of final statements on some sites."""
         return self
 
     @property

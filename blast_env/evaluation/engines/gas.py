@@ -229,10 +229,8 @@ class GasBlast:
     ) -> "GasResult":
         """Run the blast to its end.
 
-        Args:
-            progress: Called periodically with the elapsed share of the time limit.
-            recorders: Makes further recorders for the grid: maps, pictures. The result keeps them
-                in `run.solver.recorders`.
+        `recorders` makes further recorders for the grid: maps, pictures. The result keeps them in
+        `run.solver.recorders`. Progress is the elapsed share of the time limit.
         """
         run = self.engine.start_on(self.site, recorders, response_time_s(self.scenario))
         oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
@@ -368,11 +366,7 @@ class GasResult:
         return tuple(notes)
 
     def history(self, gauge: str) -> "pd.DataFrame":
-        """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`.
-
-        Raises:
-            UnknownNameError: If there is no gauge of that name.
-        """
+        """Return the overpressure at a gauge over time: `time_s`, `overpressure_pa`."""
         import pandas as pd  # it takes a third of a second
 
         names = [each.name for each in self.run.site.gauges]
@@ -401,11 +395,7 @@ class GasResult:
         )
 
     def bay_history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`.
-
-        Raises:
-            UnknownNameError: If no bay of that name touches air.
-        """
+        """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""
         if self.bay_loads is None:
             raise UnknownNameError("bay", name, ())
         return self.bay_loads.history(name)
@@ -418,11 +408,7 @@ class GasResult:
         return self.piece_loads.table(self.time_s)
 
     def piece_history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressures on the sides of a piece: `time_s`, `west_pa` and others.
-
-        Raises:
-            UnknownNameError: If there is no piece of that name with a height.
-        """
+        """Return the mean overpressures on the sides of a piece: `time_s`, `west_pa` and others."""
         if self.piece_loads is None:
             raise UnknownNameError("piece", name, ())
         return self.piece_loads.history(name)
@@ -461,11 +447,7 @@ class GasResult:
         )
 
     def standing(self, names: Collection[str]) -> Stood:
-        """Return the standing of the load on a structure, or on several that form a building.
-
-        Args:
-            names: Names of the structures whose loads count.
-        """
+        """Return the standing of the load on a structure, or on several that form a building."""
         counted = counted_parts([each for each in self.run.site.structures if each.name in names])
         return worst_standing(self._stood[each.name] for each in counted)
 

@@ -186,11 +186,7 @@ class Blast:
         return self.result(run)
 
     def result(self, run: BlastRun) -> "BlastResult":
-        """Return the outcome of a run that has ended.
-
-        Raises:
-            ValueError: If the run has not ended.
-        """
+        """Return the outcome of a run that has ended."""
         if run.end_reason is None:
             raise ValueError(f"the run is at {run.time_s} s and has not ended: advance it first")
         engine = self.particle_engine
@@ -271,18 +267,12 @@ class BlastResult:
         """The scenario's calibration.
 
         Raises:
-            UnknownNameError: If there is no calibration of that name.
-            CalibrationError: If the scenario names no calibration, or one that was made with
-                other parameters or another engine.
+            CalibrationError: If it has none, or one made with other parameters or another engine.
         """
         return scenario_calibration(self.blast.scenario, self.engine_name)
 
     def obstacle(self, name: str) -> ModularObstacle:
-        """Return a structure, or the barrier, by its name.
-
-        Raises:
-            UnknownNameError: If there is none of that name; the message names the nearest one.
-        """
+        """Return a structure, or the barrier, by its name; errors name the nearest one."""
         by_name = {obstacle.name: obstacle for obstacle in self.obstacles}
         if name not in by_name:
             raise UnknownNameError("structure", name, by_name)
@@ -315,11 +305,7 @@ class BlastResult:
         return ScaledImpulse(scaled.pa_s, False, notes)
 
     def loads(self, calibration: Calibration | None = None) -> BlastLoads:
-        """Return the loads on all structures.
-
-        Args:
-            calibration: By default the scenario's.
-        """
+        """Return the loads on all structures, by the scenario's calibration or another one."""
         law = self.calibration if calibration is None else calibration
         structures = [obstacle for obstacle in self.obstacles if not obstacle.is_barrier]
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]

@@ -186,11 +186,7 @@ class PieceLoads:
         )
 
     def history(self, name: str) -> "pd.DataFrame":
-        """Return the mean overpressures on a piece over time: `time_s`, and one column per side.
-
-        Raises:
-            UnknownNameError: If there is no such piece.
-        """
+        """Return the mean overpressures on a piece over time: `time_s`, and one column per side."""
         import pandas as pd
 
         if name not in self.names:
@@ -202,11 +198,7 @@ class PieceLoads:
         return pd.DataFrame(columns)
 
     def table(self, end_s: float) -> "pd.DataFrame":
-        """Return one row per piece; see `PIECE_COLUMNS`.
-
-        Args:
-            end_s: End time of the blast.
-        """
+        """Return one row per piece at the end of a blast; see `PIECE_COLUMNS`."""
         rows = [self._row(piece, end_s) for piece in range(len(self.elements))]
         return table_of(rows, PIECE_COLUMNS)
 

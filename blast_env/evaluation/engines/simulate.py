@@ -111,17 +111,9 @@ def simulate_many(
 ) -> list[BlastResult]:
     """Run blasts to their ends, several at a time in threads of this process.
 
-    The results are those of `Blast.run`, to the last bit, for any number of threads. Threads
-    shorten the work of compiled engines only; with `pymunk` they change only its order. The
-    preparation of a blast and its result are Python code, which one thread at a time executes.
-
-    Args:
-        blasts: The blasts.
-        threads: Number of threads; more than the number of cores have no benefit.
-        progress: Called in the caller's thread with the finished share of the blasts.
-
-    Returns:
-        The results, in the order of the blasts.
+    The results are those of `Blast.run`, to the last bit, in the order of the blasts. Threads
+    shorten the work of compiled engines only: the preparation of a blast and its result are Python
+    code, which one thread at a time executes. Progress is called in the caller's thread.
 
     Raises:
         BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot run;
