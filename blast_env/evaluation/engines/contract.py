@@ -7,7 +7,7 @@ A custom engine is a class with a name, a version and `loads`; everything else h
 
         def loads(self, scenario, layout, charge, seed): ...
 
-An instance is accepted wherever an engine's name is. A row in the table below registers a name.
+An instance is accepted wherever an engine's name is. An entry point registers a name.
 """
 
 from abc import ABC
@@ -466,38 +466,20 @@ class Engine(ABC):
         return made
 
 
-@dataclass(frozen=True)
-class _Row:
-    """The place of an engine, and the facts needed before its import.
-
-    Attributes:
-        place: "module:Class", as text: only the engine in use is imported, because Numba alone
-            takes half a second. Empty for an engine of another room, which is found by its entry
-            point in the group `blast_env.engines`, as those of other packages are.
-        needs_calibration: Same as `Engine.needs_calibration` of the class.
-        extra: The package extra that it needs; empty for none.
-    """
-
-    place: str
-    needs_calibration: bool = False
-    extra: str = ""
-
-
-_TABLE: Final[Mapping[str, _Row]] = MappingProxyType(
+_PLACES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "pymunk": _Row(
-            "blast_env.evaluation.engines.particles:PymunkEngine", needs_calibration=True
-        ),
-        "event": _Row("blast_env.evaluation.engines.particles:EventEngine", needs_calibration=True),
-        "gas": _Row("blast_env.evaluation.engines.gas:GasEngine"),
-        "surrogate": _Row("", extra="agents"),
+        "pymunk": "blast_env.evaluation.engines.particles:PymunkEngine",
+        "event": "blast_env.evaluation.engines.particles:EventEngine",
+        "gas": "blast_env.evaluation.engines.gas:GasEngine",
     }
 )
+"""The engines of this room, as text: only the one in use is imported, because Numba alone takes
+half a second. Those of other rooms and packages have entry points in `blast_env.engines`."""
 
-ENGINE_NAMES: Final = tuple(_TABLE)
+ENGINE_NAMES: Final = (*_PLACES, "surrogate")
 """The engines in the package; the first one is the reference of the paper's model."""
 
-CALIBRATED_ENGINES: Final = tuple(name for name, row in _TABLE.items() if row.needs_calibration)
+CALIBRATED_ENGINES: Final = ("pymunk", "event")
 """The engines whose loads need a calibration to be in Pa s."""
 
 JUDGE: Final = "gas"
@@ -536,17 +518,15 @@ def find_engine(
 
 
 def _made(name: str) -> Engine:
-    row = _TABLE.get(name, _Row(""))
-    with import_extra(row.extra, f"engine {name!r}") if row.extra else nullcontext():
-        made: Engine = (load_plugin(row.place) if row.place else _of_entry_point(name))()
-    return made
-
-
-def _of_entry_point(name: str) -> Any:
+    if name in _PLACES:
+        own: Engine = load_plugin(_PLACES[name])()
+        return own
     found = entry_points(group="blast_env.engines")
     if name not in found.names:
         raise UnknownNameError("engine", name, sorted({*ENGINE_NAMES, *found.names}))
-    return found[name].load()
+    with import_extra("agents", f"engine {name!r}") if name in ENGINE_NAMES else nullcontext():
+        made: Engine = found[name].load()()
+    return made
 
 
 def load_plugin(place: str) -> Any:
