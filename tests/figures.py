@@ -16,3 +16,10 @@ def undrawn_figures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "draw", lambda *_: None)
         yield
+
+
+@pytest.fixture(scope="package", autouse=True)
+def undrawn_package() -> Iterator[None]:
+    """Leave the figures of the package whose conftest imports this empty, but for `drawn`."""
+    with undrawn_figures():
+        yield

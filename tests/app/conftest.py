@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from blast_env.app import blasts
-from tests.figures import undrawn_figures
+from tests.figures import undrawn_package as undrawn_package
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -14,13 +14,6 @@ def short_films() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(blasts, "FRAMES", 3)
         patch.setattr(blasts, "_FIRST_FRAMES", 2)
-        yield
-
-
-@pytest.fixture(scope="package", autouse=True)
-def _undrawn() -> Iterator[None]:
-    """Leave the figures of these tests empty, unless one asks for `drawn`."""
-    with undrawn_figures():
         yield
 
 

@@ -8,14 +8,7 @@ import pytest
 from blast_env.design.search import advised
 from blast_env.evaluation import assessment
 from blast_env.evaluation.probability import level_probability
-from tests.figures import undrawn_figures
-
-
-@pytest.fixture(scope="package", autouse=True)
-def _undrawn() -> Iterator[None]:
-    """Leave the figures of these tests empty, unless one asks for `drawn`."""
-    with undrawn_figures():
-        yield
+from tests.figures import undrawn_package as undrawn_package
 
 
 @pytest.fixture(scope="package", autouse=True)

@@ -1,12 +1,10 @@
 """One evaluator for all tests here: what it remembers keeps them fast."""
 
-from collections.abc import Iterator
-
 import pytest
 
 from blast_env.evaluation import BlastEvaluator, Evaluation, evaluate_against
 from tests.evaluation.cases import COURTYARD, THREATS, WALL
-from tests.figures import undrawn_figures
+from tests.figures import undrawn_package as undrawn_package
 
 
 @pytest.fixture(scope="session")
@@ -17,10 +15,3 @@ def evaluator() -> BlastEvaluator:
 @pytest.fixture(scope="session")
 def evaluation(evaluator: BlastEvaluator) -> Evaluation:
     return evaluate_against(evaluator, WALL, THREATS)
-
-
-@pytest.fixture(scope="package", autouse=True)
-def _undrawn() -> Iterator[None]:
-    """Leave figures empty, unless a test asks for `drawn`."""
-    with undrawn_figures():
-        yield

@@ -7,7 +7,7 @@ import pytest
 
 from blast_env.evaluation.probability import level_probability
 from blast_env.report import Limit, Study, StudyOptions, page, run_study
-from tests.figures import undrawn_figures
+from tests.figures import undrawn_package as undrawn_package
 from tests.report.sites import LAYOUT, glazed_hut
 
 
@@ -27,10 +27,3 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     limits = (Limit("hut", impulse_pa_s=300.0),)
     options = StudyOptions(limits=limits, front=front, places=1, stills=2)
     return run_study(glazed_hut(), LAYOUT, options)
-
-
-@pytest.fixture(scope="package", autouse=True)
-def _undrawn() -> Iterator[None]:
-    """Leave the figures of these tests empty, unless one asks for `drawn`."""
-    with undrawn_figures():
-        yield
