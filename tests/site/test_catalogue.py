@@ -67,14 +67,11 @@ def test_words_and_defaults_do_not_count_in_the_hash() -> None:
     assert yard(stock=8).content_hash != yard().content_hash
 
 
+TWO_COSTS = {**AREA, "module_cost": 2.0, "cost_factor": 2.0}
 BAD: list[tuple[Document, str]] = [
     ({"items": changed(1, name="wall")}, "items[1].name: is 'wall', already the name of build_zo"),
     ({"items": changed(0, height_m=6.0)}, "items[0].height_m: is 6, must be at most 5, the heigh"),
-    (
-        {"items": changed(0, length_modules=15)},
-        "items[0]: 'wall' of 15 x 1 modules does not fit into the zone of 6 columns and 14 rows in"
-        " either orientation",
-    ),
+    ({"items": changed(0, length_modules=15)}, "items[0]: 'wall' of 15 x 1 modules does not fit "),
     (
         {"items": changed(0, length_modules=7, rotatable=False)},
         "items[0]: 'wall' of 7 x 1 modules does not fit into the zone of 6 columns and 14 rows"
@@ -93,15 +90,9 @@ BAD: list[tuple[Document, str]] = [
     ({"module_cost": 2.0}, "module_cost: is 2, must be left out: each item has its own cost"),
     ({"height_m": 2.0}, "height_m: is 2, must be left out: each item has its own height"),
     ({"cost_areas": [AREA]}, "cost_areas[0].cost_factor: missing"),
-    (
-        {"cost_areas": [{**AREA, "module_cost": 2.0, "cost_factor": 2.0}]},
-        "cost_areas[0].module_cost: must be left out: with a catalogue there is cost_factor",
-    ),
+    ({"cost_areas": [TWO_COSTS]}, "cost_areas[0].module_cost: must be left out: with a catalogue"),
     ({"items": [], "stock": 1, "cost_areas": [AREA]}, "cost_areas[0].module_cost: missing"),
-    (
-        {"items": [], "stock": 1, "cost_areas": [{**AREA, "module_cost": 1.0, "cost_factor": 2.0}]},
-        "cost_areas[0].cost_factor: must be left out: without a catalogue there is module_cost",
-    ),
+    ({"items": [], "stock": 1, "cost_areas": [TWO_COSTS]}, "cost_areas[0].cost_factor: must be l"),
     ({"items": []}, "stock: missing"),
     ({"items": changed(0, length=2)}, "items[0].length: unknown key, did you mean 'length_modules"),
     (
@@ -370,6 +361,8 @@ def test_the_air_is_high_enough_for_the_highest_item() -> None:
 
 # --- The stock list.
 
+PLANTER = {"from_catalogue": "planter"}
+
 
 @pytest.mark.parametrize("name", stock_barriers())
 def test_every_barrier_of_the_stock_list_can_be_taken_by_name(name: str) -> None:
@@ -400,29 +393,21 @@ def test_cost_name_and_words_of_the_stock_list_can_be_changed(tmp_path: Path) ->
     [
         (
             {"from_catalogue": "t_wall_36"},
-            "from_catalogue: is 't_wall_36', there is no such barrier, did you mean 't_wall_3_6'?",
+            "from_catalogue: is 't_wall_36', there is no such barrie",
         ),
         ({"from_catalogue": 3}, "from_catalogue: is 3, must be a string"),
         ({"from_catalog": "planter"}, "from_catalog: unknown key, did you mean 'from_catalogue'?"),
-        (
-            {"from_catalogue": "planter", "height_m": 2.0},
-            "height_m: must be left out: 'planter' has 1",
-        ),
-        (
-            {"from_catalogue": "planter", "cost": 0.0},
-            "cost: is 0.0: Input should be greater than or equal to 0.000001",
-        ),
+        ({**PLANTER, "height_m": 2.0}, "height_m: must be left out: 'planter' has 1"),
+        ({**PLANTER, "cost": 0.0}, "cost: is 0.0: Input should be greater than or equal to 0.000"),
     ],
 )
 def test_bad_use_of_the_stock_list_is_named(keys: Document, words: str) -> None:
     lines = lines_for(items=[{"stock": 1, **keys}])
-    assert f"yard: build_zone.items[0].{words}" in lines
+    assert any(line.startswith(f"yard: build_zone.items[0].{words}") for line in lines), lines
 
 
 def test_what_the_stock_list_needs_beside_the_name_is_the_stock() -> None:
-    assert lines_for(items=[{"from_catalogue": "planter"}])[0] == (
-        "yard: build_zone.items[0].stock: missing"
-    )
+    assert lines_for(items=[PLANTER])[0] == "yard: build_zone.items[0].stock: missing"
 
 
 def test_the_catalogue_of_a_changed_zone_is_its_own() -> None:

@@ -28,47 +28,37 @@ def wall(name: str, corner_m: list[float], rows: int, columns: int) -> dict[str,
 HUT = site_document()["structures"][0]
 
 
+def ground(x_m: float, y_m: float, width_m: float, depth_m: float) -> dict[str, Any]:
+    return {"corner_m": [x_m, y_m], "size_m": [width_m, depth_m]}
+
+
+def pond(*places_m: float) -> dict[str, Any]:
+    return ground(*places_m) | {"reason": "pond"}
+
+
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
+        (entry([1.0, 2.0], [1.0, 6.0]), ".entries[0]: runs from (1, 2) m to (1, 6) m, must lie on"),
+        (entry([0.0, 2.0], [0.0, 3.5]), ".entries[0]: is 1.5 m long, must be at least 2 m, the v"),
+        ({"width_m": 0.5}, ".width_m: is 0.5, must be at least 1, the charge's diameter"),
+        ({"drivable": [ground(0.0, 0.0, 15.0, 8.0)]}, ".drivable[0]: the ground (x 0 to 15 m, y"),
+        ({"keep_outs": [pond(0.0, 5.0, 3.0, 4.0)]}, ".keep_outs[0]: the ground (x 0 to 3 m, y 5"),
         (
-            entry([1.0, 2.0], [1.0, 6.0]),
-            "charge[0].entries[0]: runs from (1, 2) m to (1, 6) m, must lie on one side of the"
-            " site's border (x 0 to 14 m, y 0 to 8 m)",
+            {"keep_outs": [pond(0.0, 0.0, 1.0, 8.0)]},
+            ".entries: the vehicle cannot enter: structures, gates and ground that is closed to it"
+            " leave no entry a gap of 2 m, its width",
         ),
         (
-            entry([0.0, 2.0], [0.0, 3.5]),
-            "charge[0].entries[0]: is 1.5 m long, must be at least 2 m, the vehicle's width",
-        ),
-        (
-            {"width_m": 0.5, **entry([0.0, 2.0], [0.0, 6.0])},
-            "charge[0].width_m: is 0.5, must be at least 1, the charge's diameter",
-        ),
-        (
-            {"drivable": [{"corner_m": [0.0, 0.0], "size_m": [15.0, 8.0]}]},
-            "charge[0].drivable[0]: the ground (x 0 to 15 m, y 0 to 8 m) must lie inside the site"
-            " (x 0 to 14 m, y 0 to 8 m)",
-        ),
-        (
-            {"keep_outs": [{"corner_m": [0.0, 5.0], "size_m": [3.0, 4.0], "reason": "pond"}]},
-            "charge[0].keep_outs[0]: the ground (x 0 to 3 m, y 5 to 9 m) must lie inside the site"
-            " (x 0 to 14 m, y 0 to 8 m)",
-        ),
-        (
-            {"keep_outs": [{"corner_m": [0.0, 0.0], "size_m": [1.0, 8.0], "reason": "pond"}]},
-            "charge[0].entries: the vehicle cannot enter: structures, gates and ground that is"
-            " closed to it leave no entry a gap of 2 m, its width",
-        ),
-        (
-            {"keep_outs": [{"corner_m": [2.0, 0.0], "size_m": [1.0, 8.0], "reason": "pond"}]},
-            "charge[0]: the vehicle comes no nearer to a protected structure than 9 m, as near as"
-            " where it enters: structures, gates and ground that is closed to it leave no gap of"
-            " 2 m, its width",
+            {"keep_outs": [pond(2.0, 0.0, 1.0, 8.0)]},
+            ": the vehicle comes no nearer to a protected structure than 9 m, as near as where it"
+            " enters: structures, gates and ground that is closed to it leave no gap of 2 m, its",
         ),
     ],
 )
 def test_a_vehicle_that_gets_nowhere_is_refused(changes: dict[str, Any], expected: str) -> None:
-    assert problems(vehicle_document(**changes)) == [expected]
+    (line,) = problems(vehicle_document(**changes))
+    assert line.startswith(f"charge[0]{expected}")
 
 
 def test_walls_with_gaps_narrower_than_the_vehicle_let_it_no_further_than_its_entry() -> None:
