@@ -115,6 +115,17 @@ def write_atomically(target: str | Path, durable: bool = True) -> Iterator[Path]
             temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | Path, text: str) -> Path:
+    """Write a text in UTF-8, whole or not at all; return its path.
+
+    Raises:
+        BlastEnvError: If it cannot be written there.
+    """
+    with write_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    return path_of(path)
+
+
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
     """Provide a temporary folder, which is deleted when the block ends.

@@ -14,7 +14,7 @@ from blast_env.benchmark.references import Share
 from blast_env.documents import MAX_BYTES, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation import BudgetError
-from blast_env.files import write_atomically
+from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout import check_layout
 from blast_env.reading import read_apart
@@ -193,9 +193,7 @@ def write_runs(path: str | Path, record: Any) -> Path:
     rest = {name: value for name, value in asdict(record).items() if name != "runs"}
     lines = ",\n".join(f"    {json.dumps(asdict(run))}" for run in record.runs)
     head = json.dumps(rest, indent=2, allow_nan=False)[:-2]
-    with write_atomically(path) as temporary:
-        temporary.write_text(f'{head},\n  "runs": [\n{lines}\n  ]\n}}\n', "utf-8")
-    return path_of(path)
+    return write_text(path, f'{head},\n  "runs": [\n{lines}\n  ]\n}}\n')
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ from blast_env.evaluation import (
 from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.grid_error import percent
-from blast_env.files import write_atomically
+from blast_env.files import write_text
 from blast_env.io.export import LayoutPlan, export_layouts
 from blast_env.layout.build_scene import charge_against
 from blast_env.plots.evaluation_figures import comparison_figure
@@ -134,7 +134,7 @@ def _report_cases(
             cvar_level=options.cvar_level,
             progress=progress,
         )
-    record = {**comparison_record(found, used), "provenance": provenance}
+    record = {**comparison_record(found), "provenance": provenance}
     written = [] if options.out is None else _write(found, record, options.out)
     exported: list[Path] = []
     if options.export is not None:
@@ -145,7 +145,7 @@ def _report_cases(
     if print_json_record(record, [*written, *exported], options, evaluators.counts):
         return
     title = f"{ALGORITHM_NAMES[settings.algorithm]} of {provenance['run']}, a layout a row"
-    _print_cases(found, used, f"{title}, {threats_text(len(cases), seeds)}")
+    _print_cases(found, f"{title}, {threats_text(len(cases), seeds)}")
     charges = [each.charge for each in cases]
     print_if_all_charges(cases[0].scenario, charges, "training may have met them, and ")
     milliseconds = MS_PER_S * median(seconds)
@@ -165,7 +165,7 @@ def _fixed(case: LoadCaseSet, options: EvaluateOptions) -> LoadCaseSet:
     return replace(case, threats=threats, charge=charge)
 
 
-def _print_cases(comparison: Evaluation, engine: Engine, title: str) -> None:
+def _print_cases(comparison: Evaluation, title: str) -> None:
     cases, objective = case_table(comparison), comparison.cases[0].scenario.objective
     rows = [
         (
@@ -184,16 +184,14 @@ def _print_cases(comparison: Evaluation, engine: Engine, title: str) -> None:
     if outside:
         print_line(f"note: {outside} threats are outside the range of the calibration (marked ~)")
     print_means(comparison, objective, "cases")
-    if engine.needs_calibration:
+    if comparison.engine.needs_calibration:
         calibrations = dict.fromkeys(str(case.scenario.calibration) for case in comparison.cases)
         print_line(f"calibration {', '.join(calibrations)}")
 
 
 def _write(comparison: Evaluation, record: dict[str, Any], out: Path) -> list[Path]:
-    path = out / "evaluation.json"
-    with write_atomically(path) as temporary:
-        text = json.dumps(record, indent=2, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    text = json.dumps(record, indent=2, allow_nan=False)
+    path = write_text(out / "evaluation.json", text + "\n")
     table = write_csv(case_table(comparison), out / "cases.csv")
     return [path, table, save_figure(comparison_figure(comparison), out / "evaluation.png")]
 

@@ -40,7 +40,7 @@ from blast_env.envs.arguments import check_names
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import make_folder, write_text
 
 _KEPT: Final = 4096
 
@@ -126,9 +126,7 @@ def judge(
     if not together:
         print_line("no submissions come with the package")
     if page is not None:
-        with write_atomically(page) as temporary:
-            temporary.write_text(standings_page(together), "utf-8")
-        print_written([page])
+        print_written([write_text(page, standings_page(together))])
 
 
 def _definitions(

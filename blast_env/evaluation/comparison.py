@@ -26,7 +26,7 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.evaluation.grid_error import GridError, LoadOf
 from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
-from blast_env.files import write_atomically
+from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
 from blast_env.provenance import versions
@@ -587,10 +587,7 @@ class Evaluation:
 
     def to_json(self, path: str | Path) -> Path:
         """Write `to_dict` to a file, whole or not at all; return its path."""
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
-        with write_atomically(path) as temporary:
-            temporary.write_text(text + "\n", encoding="utf-8")
-        return Path(path)
+        return write_text(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
 
 def _impulses_pa_s(loads: Sequence[BlastLoads]) -> FloatArray:
@@ -623,7 +620,7 @@ def _result(evaluation: "Evaluation") -> dict[str, Any]:
             "unprotected_load": evaluation.unprotected_load,
         },
         "worst": _worst(evaluation.worst),
-        "grid_error": grid_error_record(evaluation, evaluation.engine),
+        "grid_error": grid_error_record(evaluation),
         "in_range": evaluation.in_range,
     }
 
@@ -664,7 +661,7 @@ def case_table(comparison: Evaluation) -> "pd.DataFrame":
     return table_of(rows, CASE_COLUMNS)
 
 
-def comparison_record(comparison: Evaluation, engine: Engine) -> dict[str, Any]:
+def comparison_record(comparison: Evaluation) -> dict[str, Any]:
     """Return a comparison as JSON-compatible data; NaN becomes `None`."""
     cases = [
         {
@@ -678,10 +675,10 @@ def comparison_record(comparison: Evaluation, engine: Engine) -> dict[str, Any]:
         )
     ]
     return {
-        "engine": engine.name,
-        "versions": versions(engine.version),
+        "engine": comparison.engine.name,
+        "versions": versions(comparison.engine.version),
         "result": {
-            "grid_error": grid_error_record(comparison, engine),
+            "grid_error": grid_error_record(comparison),
             "reduction": estimate_record(comparison.reduction),
             "load": estimate_record(comparison.mean),
             "unprotected_load": estimate_record(comparison.unprotected_mean),
@@ -694,13 +691,13 @@ def comparison_record(comparison: Evaluation, engine: Engine) -> dict[str, Any]:
     }
 
 
-def grid_error_record(comparison: Evaluation, engine: Engine) -> dict[str, Any] | None:
+def grid_error_record(comparison: Evaluation) -> dict[str, Any] | None:
     """Return the errors of the cells as JSON-compatible data; `None` without any."""
     error = comparison.grid_error
     if error is None:
         return None
     return {
-        "engine": engine.words,
+        "engine": comparison.engine.words,
         "coarser": error.coarser.words,
         "worst_seed": error.threat.seed,
         "reduction": number_or_none(comparison.reduction_error),

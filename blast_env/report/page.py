@@ -21,7 +21,7 @@ from blast_env.evaluation.engines.bays import bay_rows
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.grid_error import FACTOR, ORDER, worse
 from blast_env.evaluation.probability import level_probability, probability_text
-from blast_env.files import scratch_folder, write_atomically
+from blast_env.files import scratch_folder, write_atomically, write_text
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import layout_counts, layout_text
 from blast_env.layout import write_layout
@@ -75,8 +75,7 @@ def write_report(
     """
     check_targets(html, pdf)
     page = report_html(study, command() if commands is None else commands)
-    with write_atomically(html) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_text(html, page)
     if pdf is None:
         return [Path(html)]
     with write_atomically(pdf) as temporary:

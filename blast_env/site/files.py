@@ -10,7 +10,7 @@ import tomli_w
 from blast_env.bundled import SCENARIO_SUFFIX, bundled_scenarios, scenario_folder
 from blast_env.documents import DocumentError, parse_toml, read_text
 from blast_env.errors import BlastEnvError
-from blast_env.files import write_atomically
+from blast_env.files import write_text
 from blast_env.site.models import Scenario
 from blast_env.site.problems import Problem, ScenarioError, unknown_name
 from blast_env.values import path_of
@@ -136,9 +136,7 @@ def save_scenario(scenario: AnyScenario, path: str | Path) -> None:
         raise ScenarioError(str(path), [Problem("", f"must be a {SUFFIX} file")])
     document = find_scenario(scenario).model_dump(mode="json", exclude_none=True)
     Scenario.from_document(document, str(path))
-    content = tomli_w.dumps(document)
-    with write_atomically(path) as temporary:
-        temporary.write_text(content, encoding="utf-8", newline="\n")
+    write_text(path, tomli_w.dumps(document))
 
 
 def scenario_hash(scenario: AnyScenario) -> str:

@@ -43,7 +43,7 @@ def test_the_record_has_what_the_comparison_found() -> None:
     )
     each = [outcome.reduction for outcome in expected.outcomes]
     assert comparison.reduction.value == pytest.approx(sum(each) / 4)  # every case counts alike
-    record = comparison_record(comparison, evaluators.engine)
+    record = comparison_record(comparison)
     assert record["result"]["reduction"]["value"] == comparison.reduction.value
     assert [case["layout"] for case in record["cases"]] == [[list(cell) for cell in WALLS[0]]] * 4
     assert case_table(comparison)["reduction"].tolist() == pytest.approx(each)

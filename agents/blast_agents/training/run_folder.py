@@ -32,7 +32,7 @@ from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import SINGLE_ARRAYS
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
-from blast_env.files import is_temporary, make_folder, sync, write_atomically
+from blast_env.files import is_temporary, make_folder, sync, write_atomically, write_text
 from blast_env.provenance import versions
 from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
 from blast_env.tables import cell_text
@@ -439,12 +439,12 @@ class RunFolder:
         """
         make_folder(self.path)
         self._check_empty()
-        _write(self._unfinished, json.dumps(configuration.document(), indent=2) + "\n")
+        write_text(self._unfinished, json.dumps(configuration.document(), indent=2) + "\n")
         self.clear_temporaries()
         save_scenario(scenario, self._scenario)
-        _write(self.path / "command.txt", f"{command}\n")
+        write_text(self.path / "command.txt", f"{command}\n")
         known = {"platform": platform.platform()} | versions(packages=_PACKAGES)
-        _write(self.path / "versions.json", json.dumps(known, indent=2) + "\n")
+        write_text(self.path / "versions.json", json.dumps(known, indent=2) + "\n")
         yield
         try:
             os.replace(self._unfinished, self._configuration)
@@ -521,8 +521,3 @@ def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: s
             f"{place}: the scenario's hash is {scenario.content_hash[:12]}..., must be "
             f"{configuration.scenario_hash[:12]}..., that of the run: it is another scenario"
         )
-
-
-def _write(path: Path, text: str) -> None:
-    with write_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")

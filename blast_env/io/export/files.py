@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.errors import BlastEnvError, suggestion
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import make_folder, write_text
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities, element_table, write_excel
 from blast_env.layout import write_layout
 from blast_env.plots.plan import Feature
@@ -71,8 +71,7 @@ def write_geojson(plan: LayoutPlan, path: Path) -> None:
     features = ",\n".join(json.dumps(each, allow_nan=False) for each in collection["features"])
     others = {key: value for key, value in collection.items() if key != "features"}
     head = json.dumps(others, indent=0, allow_nan=False).removesuffix("\n}")
-    with write_atomically(path) as temporary:
-        temporary.write_text(f'{head},\n"features": [\n{features}\n]\n}}\n', encoding="utf-8")
+    write_text(path, f'{head},\n"features": [\n{features}\n]\n}}\n')
 
 
 def _feature(

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word, value_text
-from blast_env.files import write_atomically
+from blast_env.files import write_text
 from blast_env.geometry import Rectangle
 from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
 from blast_env.site import Scenario
@@ -350,8 +350,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
     """
     content = calibration.model_dump(mode="json")
     document = {**content, "checksum": _checksum(content)}
-    with write_atomically(path) as temporary:
-        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(document, indent=2) + "\n")
 
 
 @cache
