@@ -15,6 +15,9 @@ from blast_env.site import (
 from blast_env.site.scene import Charge
 from blast_env.site.sections import PointM
 
+MOST_USUAL: Final = 4
+"""Most sources of charges, without vehicles, that blasts are run with by default."""
+
 _NEAREST: Final = ", as near as it comes"
 
 
@@ -65,6 +68,7 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of the threats that blasts are run with by default.
 
     Of each source, the place that governs by its load in the open; of a vehicle, the nearest one.
+    Of more than `MOST_USUAL` sources without a vehicle, those with the largest loads.
     """
     sources: dict[str, list[LoadCase]] = {}
     for threat in threats_of(scenario):
@@ -75,4 +79,7 @@ def usual_threats(scenario: Scenario) -> tuple[str, ...]:
             return Severity(load=-threat.charge.rank)
         return Severity.in_the_open(scenario, threat.charge)
 
-    return tuple(governing(own, severity).name for own in sources.values())
+    chosen = [governing(own, severity) for own in sources.values()]
+    fixed = [each for each in chosen if not isinstance(each.charge, VehicleCharge)]
+    worst = sorted(fixed, key=severity, reverse=True)[:MOST_USUAL]
+    return tuple(each.name for each in chosen if each in worst or each not in fixed)

@@ -28,7 +28,7 @@ from blast_env.app.records import (
     read_kept,
 )
 from blast_env.app.session import Session, Sessions
-from blast_env.app.threats import threats_of
+from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import verdict_rows
 from blast_env.app.work import ReportChoice, Status, read_status, write_status
 from blast_env.errors import BlastEnvError
@@ -270,6 +270,16 @@ def test_what_is_there_is_not_run_again(gas: Session) -> None:
     gas.blast([0])
     assert path.stat().st_mtime_ns == before
     assert state_of(gas).state == "done"
+
+
+def test_of_many_sources_the_worst_are_blasted_unless_others_are_chosen() -> None:
+    """Six charges at growing distances from the hut; all can be chosen."""
+    places = [(5.5 - 0.5 * k, 4.0) for k in (3, 0, 5, 1, 4, 2)]
+    charges = [{"kind": "point", "position_m": [*each], "tnt_kg": 1.0} for each in places]
+    site = hut(charge=charges)
+    named = {each.name: each.charge.position_m[0] for each in threats_of(site)}  # type: ignore[union-attr]
+    assert [named[each] for each in usual_threats(site)] == [4.0, 5.5, 5.0, 4.5]
+    assert len(named) == 6
 
 
 def test_keys_know_what_a_result_depends_on() -> None:
