@@ -6,11 +6,10 @@ from typing import Any
 import pytest
 from blast_agents.training import load_agent
 from blast_agents.training.run_folder import RunFolder
-from typer.testing import CliRunner, Result
 
-from blast_env.cli import app
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.site import save_scenario
+from tests.cli.running import run
 from tests.gas_sites import glazed_hut, hut
 
 COARSE = 0.5
@@ -36,10 +35,6 @@ def cells(monkeypatch: pytest.MonkeyPatch) -> set[float]:
 
     monkeypatch.setattr(GasEngine, "start_on", watched)
     return used
-
-
-def run(*arguments: str | Path | float) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_training_and_its_evaluations_use_the_cells(

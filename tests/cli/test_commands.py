@@ -9,20 +9,16 @@ from pathlib import Path
 import matplotlib
 import pandas as pd
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 import blast_env
 from blast_env import load_scenario, save_scenario, simulate, write_layout
-from blast_env.cli import app
 from blast_env.particles.calibration.model import load_calibration
 from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.plots import film
 from blast_env.store import Store
+from tests.cli.running import run
 from tests.scenarios import BALLISTIC_COURTYARD
-
-
-def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

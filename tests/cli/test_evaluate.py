@@ -2,17 +2,17 @@
 
 import json
 import signal
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from typer.testing import CliRunner, Result
 
 from blast_env import Charge, load_scenario, save_scenario
-from blast_env.cli import app
 from blast_env.evaluation import evaluate_layout
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import PointSource
+from tests.cli.running import run
 from tests.envs.small import small_scenario
 
 CELLS = [(9, 0), (10, 0), (11, 0)]
@@ -25,10 +25,8 @@ def layout(tmp_path: Path) -> Path:
     return path
 
 
-def evaluate(*arguments: str | Path | int) -> Result:
-    """Evaluate with blasts of milliseconds, unless the arguments name another engine."""
-    words = (str(argument) for argument in arguments)
-    return CliRunner().invoke(app, ["evaluate", "--engine", "event", *words])
+evaluate = partial(run, "evaluate", "--engine", "event")
+"""With blasts of milliseconds, unless the arguments name another engine."""
 
 
 def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: Path) -> None:

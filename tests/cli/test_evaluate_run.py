@@ -1,6 +1,7 @@
 """`blast-env evaluate --run` and `--export`, run in this process."""
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +9,13 @@ import pandas as pd
 import pytest
 from blast_agents.training import load_agent, train
 from ezdxf.filemanagement import readfile
-from typer.testing import CliRunner, Result
 
 from blast_env import load_scenario
-from blast_env.cli import app
 from blast_env.evaluation import SeedRange, draw_threats, evaluate_layout
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutFile, load_layout, write_layout
 from tests.agents.training_runs import hyperparameters, scenario_file, settings
+from tests.cli.running import run
 
 CELLS = ((1, 0), (2, 0))
 
@@ -35,10 +35,8 @@ def hidden(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_run(tmp_path_factory.mktemp("hidden"), threat="hidden")
 
 
-def evaluate(*arguments: str | Path | int) -> Result:
-    """Evaluate with blasts of milliseconds, whatever the command would take."""
-    words = (str(argument) for argument in arguments)
-    return CliRunner().invoke(app, ["evaluate", "--engine", "event", *words])
+evaluate = partial(run, "evaluate", "--engine", "event")
+"""With blasts of milliseconds, whatever the command would take."""
 
 
 def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path: Path) -> None:

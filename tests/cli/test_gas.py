@@ -6,13 +6,12 @@ from pathlib import Path
 
 import matplotlib
 import pytest
-from typer.testing import CliRunner, Result
 
 import blast_env
-from blast_env.cli import app
 from blast_env.layout import write_layout
 from blast_env.plots import pressure_film
 from blast_env.site import Scenario, save_scenario
+from tests.cli.running import run
 from tests.gas_sites import WALL, hut
 
 
@@ -21,10 +20,6 @@ def site(tmp_path: Path) -> Path:
     path = tmp_path / "hut.toml"
     save_scenario(hut(), path)
     return path
-
-
-def run(*arguments: str | Path | float) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_a_blast_prints_what_the_library_finds(site: Path, tmp_path: Path) -> None:

@@ -1,15 +1,12 @@
 """`blast-env train`, run in this process."""
 
+from functools import partial
 from pathlib import Path
 
-from typer.testing import CliRunner, Result
-
-from blast_env.cli import app
 from tests.agents.training_runs import SMALL, scenario_file
+from tests.cli.running import run
 
-
-def run(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(app, ["train", *(str(argument) for argument in arguments)])
+train = partial(run, "train")
 
 
 def small(folder: Path) -> list[str | Path]:
@@ -24,11 +21,11 @@ def small(folder: Path) -> list[str | Path]:
 
 def test_a_run_says_what_it_came_to_and_can_be_taken_up_again(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    result = run("--steps", "20", "--seed", "3", "--run", folder, *small(tmp_path))
+    result = train("--steps", "20", "--seed", "3", "--run", folder, *small(tmp_path))
     assert result.exit_code == 0, result.output
     assert "32 steps, 8 episodes" in result.stdout  # two whole rollouts
     assert "best on held-out threats" in result.stdout
     assert str(folder / "checkpoint.pt") in result.stdout
-    again = run("--resume", folder)
+    again = train("--resume", folder)
     assert again.exit_code == 0, again.output
     assert "32 steps, 8 episodes" in again.stdout
