@@ -30,7 +30,7 @@ from blast_env.files import write_text
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
 from blast_env.provenance import versions
-from blast_env.site import Scenario
+from blast_env.site import AnyScenario, Scenario, find_scenario
 from blast_env.site.scene import Charge
 from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import (
@@ -217,13 +217,14 @@ class ThreatOutcome:
     @classmethod
     def of(
         cls,
-        scenario: Scenario,
+        scenario: AnyScenario,
         layout: Layout,
         threat: LoadCase,
         loads: BlastLoads,
         unprotected: BlastLoads,
     ) -> Self:
         """Return the outcome of a threat from its loads with a layout and without a barrier."""
+        scenario = find_scenario(scenario)
         charge, elsewhere = (threat.charge_against(scenario, each) for each in (layout, ()))
         return cls(
             threat=threat,

@@ -17,7 +17,7 @@ from blast_env.layout.placement import load_relevant
 from blast_env.particles.calibration.model import Calibration
 from blast_env.provenance import code_version
 from blast_env.runner import as_completed, check_workers
-from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site import AnyCharge, AnyScenario, find_scenario
 from blast_env.site.scene import Charge
 
 
@@ -106,7 +106,7 @@ class BlastEvaluator:
             return None
         return BlastEvaluator(self.scenario, engine, cache=self.store, counts=self.counts)
 
-    def of(self, scenario: Scenario) -> "BlastEvaluator":  # noqa: ARG002
+    def of(self, scenario: AnyScenario) -> "BlastEvaluator":  # noqa: ARG002
         """Return itself, as `Evaluators.of` of its scenario."""
         return self
 
