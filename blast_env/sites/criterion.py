@@ -34,6 +34,9 @@ DIRECTIONS: Final = 360
 TARGETS: Final = 3
 """Number of target heights on a facade with a height: the middles of its thirds."""
 
+MOST_CROSSINGS: Final = 40_000_000
+"""Most lines times cells; of more lines, as many are kept, evenly spaced."""
+
 PLACES: Final = 9
 """Number of places along a segment or an entry, or in a rectangle (3 x 3)."""
 
@@ -91,6 +94,7 @@ class Visibility:
                 other_m = np.minimum(other_m, entry_m)
         free = (weight > 0.0) & (protected_m < other_m)
         open_share = float(weight[free].sum() / max(weight.sum(), 1e-300))
+        free &= _kept(free, scenario.zone.rows * scenario.zone.columns)
         cut, along_share = _cut(scenario, origin[free], direction[free], protected_m[free])
         if not target_m.any():
             return cls(weight[free], cut, np.zeros(cut.shape), open_share)
@@ -142,6 +146,14 @@ def _all_lines(scenario: Scenario) -> tuple[FloatArray, FloatArray, FloatArray]:
     origin = np.repeat(np.array([place for place, _ in places]), DIRECTIONS, axis=0)
     weight = np.repeat(np.array([weight for _, weight in places]), DIRECTIONS)
     return origin, np.tile(np.array(_directions()), (len(places), 1)), weight
+
+
+def _kept(free: BoolArray, cells: int) -> BoolArray:
+    """Return which lines to keep, so that they take no more memory than `MOST_CROSSINGS`."""
+    numbers, most = np.flatnonzero(free), max(MOST_CROSSINGS // cells, 1)
+    kept = np.zeros(len(free), dtype=bool)
+    kept[numbers[np.linspace(0, len(numbers) - 1, min(len(numbers), most)).astype(int)]] = True
+    return kept
 
 
 @cache

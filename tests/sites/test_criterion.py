@@ -2,7 +2,9 @@
 
 import pytest
 
-from blast_env.sites import Objection, VisibilityCriterion
+from blast_env.site import load_scenario
+from blast_env.sites import Objection, VisibilityCriterion, criterion
+from blast_env.sites.criterion import Visibility
 from tests.sites.cases import block, yard
 
 ANY = VisibilityCriterion(0.0, 0.0, 1.0, 0.0)
@@ -46,3 +48,16 @@ def test_a_wall_that_cuts_everything_is_refused() -> None:
     assert objection == Objection(
         "share cut by the best straight wall: must be at most 0.95", "is 1.000"
     )
+
+
+def test_lines_of_many_sources_are_thinned_to_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A large zone and many sources would take gigabytes; the shares stay nearly the same."""
+    site = load_scenario("courtyard")
+    whole = Visibility.of(site)
+    cells = site.zone.rows * site.zone.columns
+    monkeypatch.setattr(criterion, "MOST_CROSSINGS", 100 * cells)
+    thinned = Visibility.of(site)
+    assert len(thinned.weight) == 100 < len(whole.weight)
+    assert thinned.open_share == pytest.approx(whole.open_share)
+    wall = [(row, 0) for row in range(14, 26)]
+    assert thinned.cut_share(wall) == pytest.approx(whole.cut_share(wall), abs=0.05)
