@@ -505,6 +505,48 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
     assert not page.faults()
 
 
+def test_from_a_public_extract_to_the_verdict(page: Page) -> None:
+    """A car park of OpenStreetMap by the page alone, on coarse cells; its seconds are written."""
+    began_s = monotonic()
+    stages: list[str] = []
+
+    def reached(stage: str) -> None:
+        stages.append(f"{monotonic() - began_s:.0f} s: {stage}")
+        (PICTURES / "extract_to_verdict.txt").write_text("\n".join(stages) + "\n")
+
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    page.open()
+    page.all("input[type=file]")[0].send_keys(str(DATA / "car_park.osm"))
+    page.sees("protected buildings")
+    for label in ("middle of the site", "or the building nearest to"):
+        page.fill(label, "26.944, 60.5227")
+    page.fill("width, depth of the site", "90, 90")
+    page.button("import").click()
+    page.sees("modules off by")
+    page.button("use this site").click()
+    page.until(lambda: "/design/" in page.driver.current_url)
+    page.until(lambda: page.all(".be-plan svg text"))
+    page.choose("selected", "building_1")
+    page.choose("windows", "window, laminated, 3 + 3 mm")
+    page.choose("wall panels", "reinforced concrete wall, 200 mm")
+    reached("the site with its windows and walls")
+    page.button("Screening").click()
+    page.sees("worst place of each threat by damage", 300.0)
+    reached("stand-offs")
+    page.choose("engine", "gas, coarse growing cells")
+    page.button("Propose").click()
+    page.sees("proposed by the package", 900.0)
+    page.button("use it").click()
+    page.until(lambda: re.search(r"[1-9]\d* of 20 modules", page.text()))
+    reached("a proposal")
+    page.button("Verdict").click()
+    page.button("assess").click()
+    page.sees("probability, layout A", 1800.0)
+    page.shoot("extract_verdict")
+    reached("the verdict of gas dynamics, with its probability")
+    assert not page.faults()
+
+
 def large_site() -> Scenario:
     """An office on 100 m, a charge, walls to choose from, and no word of windows yet."""
     document = office_park().model_dump(mode="json", exclude_none=True)
