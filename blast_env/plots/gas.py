@@ -159,6 +159,7 @@ _FACADES_IN: Final = 11.0
 _ROW_LETTERS: Final = 26  # most letters in a line beside a row of walls
 _LEAST_WALL_SHARE: Final = 0.13  # of the width of all walls, for the title
 _WALL_HEIGHTS_IN: Final = (1.0, 4.0)
+_SHOWN_SHARE: Final = 0.99  # of the drawn area, on the scale
 
 _LEFT_TO_RIGHT: Final[dict[WallName, tuple[str, bool]]] = {
     "west": ("y", True),
@@ -191,8 +192,9 @@ def facades(
             or how else one is drawn.
         beside: Another result with the same site and charge, drawn above on the same scale:
             without the barrier, or with another layout.
-        full: End of the scale, for comparisons of figures; see `full_load`. By default the
-            largest load drawn, rounded up.
+        full: End of the scale, for comparisons of figures; see `full_load`. By default the load
+            that 99 % of the drawn area do not exceed, rounded up: the cells before a charge at the
+            wall would leave all others pale. Larger loads have the darkest colour.
 
     Raises:
         BlastEnvError: If site or charge of the results differ, or there is no structure.
@@ -223,7 +225,9 @@ def facades(
     for axes, wall in zip(panels[-1], _LEFT_TO_RIGHT, strict=True):
         axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
     colours = ScalarMappable(scale, load_colours())
-    add_bar(figure, panels.ravel().tolist(), colours, kind.label, shrink=0.85, pad=0.02)
+    extend = "max" if _largest(walls) > scale.vmax else "neither"
+    around = panels.ravel().tolist()
+    add_bar(figure, around, colours, kind.label, shrink=0.85, pad=0.02, extend=extend)
     name = results[0].blast.scenario.title_of(outline.name)
     title, subtitle = gas_heading(results, f"{kind.name} on the walls of {name}")
     write_heading(figure, title, f"{subtitle}; walls seen from outside")
@@ -247,8 +251,15 @@ def full_load(result: GasResult, structure: str, quantity: Quantity) -> float:
 
 
 def _full(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
-    largest = max(float(np.nanmax(v, initial=0.0)) for row in walls for v in row.values())
-    return nice_ceiling(largest) if largest > 0.0 else 1.0
+    """Return the load that most of the drawn area does not exceed, rounded up."""
+    loads = np.concatenate([each.ravel() for row in walls for each in row.values()])
+    loads = loads[np.isfinite(loads)]
+    most = float(np.quantile(loads, _SHOWN_SHARE)) if len(loads) else 0.0
+    return nice_ceiling(most) if most > 0.0 else 1.0
+
+
+def _largest(walls: Sequence[Mapping[WallName, FloatArray]]) -> float:
+    return max(float(np.nanmax(v, initial=0.0)) for row in walls for v in row.values())
 
 
 @dataclass(frozen=True)
@@ -344,6 +355,7 @@ def _draw_wall(
         origin="lower",
         interpolation="nearest",
         extent=(low, high, 0.0, height_m),
+        aspect="auto",  # narrow walls have room for their title, and the height of the others
     )
     axes.set_xlim((high, low) if falls else (low, high))
     for spine in axes.spines.values():

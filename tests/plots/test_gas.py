@@ -144,10 +144,12 @@ def test_walls_of_their_own_can_have_the_scale_of_another(
     for result in (unprotected, protected):
         images = images_of(facades(result, "hut", "impulse", full=full))
         assert {image.get_clim() for image in images} == {(0.0, full)}
-    largest = max(
-        float(np.nanmax(values_of(image))) for image in images_of(facades(unprotected, "hut"))
+    loads = np.concatenate(
+        [values_of(image).ravel() for image in images_of(facades(unprotected, "hut"))]
     )
-    assert largest <= full <= 1.3 * largest
+    loads = loads[np.isfinite(loads)]
+    assert np.mean(loads > full) <= 0.01  # the cells before the charge alone
+    assert full <= 1.3 * loads.max()
 
 
 def test_solids_are_no_ground(protected: GasResult) -> None:
