@@ -325,15 +325,21 @@ def facades_for(scenario: Scenario, glazing: str | None, wall: str | None) -> Sc
     """Return a scenario whose protected structures without a facade have one.
 
     Raises:
+        BlastEnvError: If a component is given, but each protected structure has a facade.
         ScenarioError: If a structure has no height, or a component does not exist or fit.
     """
     facade = {key: name for key, name in (("glazing", glazing), ("wall", wall)) if name}
     if not facade:
         return scenario
     document = scenario.model_dump(mode="json", exclude_none=True)
-    for structure in document["structures"]:
-        if structure["protected"] and "facade" not in structure:
-            structure["facade"] = facade
+    without = [s for s in document["structures"] if s["protected"] and "facade" not in s]
+    if not without:
+        given = " and ".join(f"{key} {name!r}" for key, name in facade.items())
+        raise BlastEnvError(
+            f"{given}: each protected structure of {scenario.name} has a facade already"
+        )
+    for structure in without:
+        structure["facade"] = facade
     return Scenario.from_document(document, scenario.name)
 
 

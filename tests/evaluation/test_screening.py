@@ -138,6 +138,8 @@ def test_a_site_without_facades_takes_the_components_that_are_named() -> None:
     assert found.threats[0].name == "car"
     assert found.threats[0].condition is None
     assert found.threats[0].may_breach
+    with pytest.raises(BlastEnvError, match="glazing 'none': each protected structure of hut has"):
+        facades_for(facades_for(hut(), None, "brick_215"), "none", None)
 
 
 def test_a_charge_of_a_file_takes_its_mass_from_a_preset_or_an_explosive() -> None:
