@@ -205,7 +205,8 @@ def facades(
     walls = [
         {wall: _wall(each, outline, wall, kind) for wall in _LEFT_TO_RIGHT} for each in results
     ]
-    scale = Normalize(0.0, _full(walls) if full is None else full)
+    end = _full(walls) if full is None else full
+    scale = Normalize(0.0, end)
     lengths = np.array([_length_m(outline, wall) for wall in _LEFT_TO_RIGHT])
     widths = np.maximum(lengths, _LEAST_WALL_SHARE * lengths.sum())
     height_m = outline.height_m
@@ -225,7 +226,7 @@ def facades(
     for axes, wall in zip(panels[-1], _LEFT_TO_RIGHT, strict=True):
         axes.set_xlabel(f"{_LEFT_TO_RIGHT[wall][0]} (m)")
     colours = ScalarMappable(scale, load_colours())
-    extend = "max" if _largest(walls) > scale.vmax else "neither"
+    extend = "max" if _largest(walls) > end else "neither"
     around = panels.ravel().tolist()
     add_bar(figure, around, colours, kind.label, shrink=0.85, pad=0.02, extend=extend)
     name = results[0].blast.scenario.title_of(outline.name)
