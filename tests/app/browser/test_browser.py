@@ -353,7 +353,7 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
         page.choose("picture", picture)
         sleep(1.5)
         page.shoot(("results_gas_map", "results_gas_walls", "results_gas_gauges")[number])
-    assert "gas, cells of 0.5 m" in page.text()
+    assert "gas, cells of 0.25 m" in page.text()
     assert not page.faults()
 
 
