@@ -204,7 +204,11 @@ def assess(
     with resumable(resume_words(cache)):
         with progress_bar(counted(len(drawn))) as progress:
             assessed = assessed_by(
-                *(site, layouts, drawn, engine, progress),
+                site,
+                layouts,
+                drawn,
+                engine,
+                progress,
                 without_fallen=without_fallen,
                 cache=cache,
             )

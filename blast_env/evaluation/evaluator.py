@@ -57,8 +57,10 @@ class BlastEvaluator:
             evaluators share; see `BlastStore`.
         counts: Counts that several evaluators share; its own unless given.
 
-    Attributes: calibration: The scenario's calibration, checked against its parameters and the
-    engine; `None` for engines without particles, which need none. store: Where the loads are.
+    Attributes:
+        calibration: The scenario's calibration, checked against its parameters and the engine;
+            `None` for engines without particles, which need none.
+        store: Where the loads are.
 
     Raises:
         BlastEnvError: If the engine cannot compute the loads that the objective needs, its

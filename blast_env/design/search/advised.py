@@ -250,7 +250,13 @@ def advised(
         part = share_of(progress, number, len(kinds))
         found.append(
             advise_until(
-                *(judge.verdict, judge.problem, kind, budget, seed, first, part),
+                judge.verdict,
+                judge.problem,
+                kind,
+                budget,
+                seed,
+                first,
+                part,
                 rounds=rounds,
                 margin=margin,
             )
