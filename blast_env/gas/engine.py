@@ -7,6 +7,7 @@ until the loads on the structures are known.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from math import cbrt, ceil, hypot
 from typing import TYPE_CHECKING, Final
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
+from blast_env.compilation import compilation_notice
 from blast_env.errors import BlastEnvError
 from blast_env.gas.coarsening import CoarseningSolver, shape_to_double
 from blast_env.gas.cost import cost_of_run
@@ -50,6 +52,10 @@ _HOTTEST: Final = 4.0  # temperature limit of settled products, in units of stil
 _LOOK_EVERY: Final = 4  # steps between two checks of the loads
 
 Recorders = Callable[[GasGrid], Sequence[Recorder]]
+
+
+def _notice() -> AbstractContextManager[None]:
+    return compilation_notice("gas dynamics (some 20 s)")
 
 
 def _none(_: GasGrid) -> Sequence[Recorder]:
@@ -137,8 +143,9 @@ class GasRun:
             settling=Settling(settings.settled_s * scale, _HOTTEST),
             threads=settings.threads,
         )
-        set_charge(solver, self.charge, self.remap_radius_m)
-        doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
+        with _notice():
+            set_charge(solver, self.charge, self.remap_radius_m)
+            doubled_s = [self.charge.profile(run_m).time_s for run_m in settings.doubled_m]
         self.solver: Gas = CoarseningSolver(solver, doubled_s) if doubled_s else solver
         if self.gauges is not None:
             _add_opening(self.gauges, self.grid, self.charge, self.remap_radius_m)
@@ -177,7 +184,8 @@ class GasRun:
         The division of a run into calls does not change its results.
         """
         while self.end_reason is None and self.solver.time_s < until_s:
-            self.solver.step()
+            with _notice():
+                self.solver.step()
             asked = self.settings.until_s is not None
             if self.solver.time_s >= self.limit_s:
                 self.end_reason = EndReason.TIME_ASKED if asked else EndReason.TIME_LIMIT

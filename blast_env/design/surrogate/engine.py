@@ -8,6 +8,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from blast_env.compilation import compilation_notice
 from blast_env.design.surrogate.network import Guess, Surrogate, load_surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import Memory, SurrogateSite, site_of
 from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find_engine
@@ -99,9 +100,10 @@ class SurrogateEngine(Engine):
             of_sites.setdefault(each.scenario.content_hash, []).append(number)
         for numbers in of_sites.values():
             own = [blasts[number] for number in numbers]
-            site = self._site(own[0].scenario)
-            charges = [charge_against(*each[:3]) for each in own]
-            guess = self.surrogate.guess(site, [each.layout for each in own], charges)
+            with compilation_notice("the surrogate (some 10 s)"):
+                site = self._site(own[0].scenario)
+                charges = [charge_against(*each[:3]) for each in own]
+                guess = self.surrogate.guess(site, [each.layout for each in own], charges)
             if self.safe:
                 guess = self.surrogate.upper_ends(guess, np.array([bool(e.layout) for e in own]))
             for index, number in enumerate(numbers):

@@ -3,7 +3,6 @@
 It consists of a compiled loop from collision to collision, and the run that calls it.
 """
 
-import logging
 from collections.abc import Callable
 from hashlib import sha256
 from math import inf, sqrt
@@ -13,9 +12,9 @@ from typing import Any, Final
 
 import numpy as np
 from numba import njit
-from numba.core import event
 from numpy.typing import NDArray
 
+from blast_env.compilation import compilation_notice
 from blast_env.particles.event.contacts import collide_balls, collide_with_module
 from blast_env.particles.event.prediction import (
     cell_at,
@@ -219,23 +218,7 @@ def _can_reach(
     return False
 
 
-_LOGGER: Final = logging.getLogger("blast_env")
 _FIRST_CALL: Final = Lock()
-
-
-class _CompilationNotice(event.Listener):
-    """Logs that Numba compiles, which it does if its disk cache is empty."""
-
-    def __init__(self) -> None:
-        self.given = False
-
-    def on_start(self, _event: Any) -> None:
-        if not self.given:
-            self.given = True
-            _LOGGER.warning("compiling the event engine, once per installation: some 10 s ...")
-
-    def on_end(self, _event: Any) -> None:
-        pass
 
 
 def _source_digest() -> int:
@@ -296,7 +279,7 @@ def run_world(world: World, record: NDArray[np.float64], until_s: float) -> int:
         if _RUN.signatures:  # type: ignore[attr-defined]
             answer = int(_RUN(*world, record, until_s))
         else:
-            with _FIRST_CALL, event.install_listener("numba:compile", _CompilationNotice()):
+            with _FIRST_CALL, compilation_notice("the event engine (some 10 s)"):
                 answer = int(_RUN(*world, record, until_s))
     return answer
 
