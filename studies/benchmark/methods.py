@@ -113,7 +113,8 @@ def ppo(problem: BenchmarkProblem, seed: int) -> Layout:
     """PPO of Stable-Baselines3; its action is a row across the line of sight."""
     env = _environment(problem, "row")
     model = PPO("MlpPolicy", env, seed=seed, **_SETTINGS).learn(_STEPS)
-    return _best_drawn(problem, env, lambda seen, steady: model.predict(seen, None, None, steady))
+    draws = _draws(env, lambda seen, steady: model.predict(seen, None, None, steady), _DRAWS)
+    return _best_of(problem, _ranked(draws))
 
 
 def maskable_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
@@ -124,6 +125,29 @@ def maskable_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
 
 def imitation(problem: BenchmarkProblem, seed: int) -> Layout:
     """A policy that learns to place the best layouts of a search by guesses, piece by piece."""
+    env, model = _imitating(problem, seed)
+    return _of_masked(problem, env, model, 0)
+
+
+def imitation_unranked(problem: BenchmarkProblem, seed: int) -> Layout:
+    """The same, with blasts of the first draws instead of the best guesses among 200."""
+    env, model = _imitating(problem, seed)
+    return _best_of(problem, _draws(env, _masked(env, model), problem.most_blasts))
+
+
+def imitation_then_ppo(problem: BenchmarkProblem, seed: int) -> Layout:
+    """Imitation, then MaskablePPO on guesses."""
+    env, model = _imitating(problem, seed)
+    return _of_masked(problem, env, model, _STEPS)
+
+
+def untrained(problem: BenchmarkProblem, seed: int) -> Layout:
+    """Ranked draws of an untrained policy: imitation without its demonstrations."""
+    env = _environment(problem, "place")
+    return _of_masked(problem, env, MaskablePPO("MlpPolicy", env, seed=seed, **_SETTINGS), 0)
+
+
+def _imitating(problem: BenchmarkProblem, seed: int) -> tuple[BlastBarrierEnv, MaskablePPO]:
     torch.manual_seed(seed)
     env, rng = _environment(problem, "place"), generator(seed)
     guesses = Guesses.of(packaged_surrogate(), problem.case)
@@ -139,7 +163,7 @@ def imitation(problem: BenchmarkProblem, seed: int) -> Layout:
         loss: torch.Tensor = -log_likelihood.mean()
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
-    return _of_masked(problem, env, model, 0)
+    return env, model
 
 
 _SETTINGS: Final[dict[str, Any]] = {
@@ -185,19 +209,23 @@ def _of_masked(
 ) -> Layout:
     if steps:
         model.learn(steps)
-    return _best_drawn(
-        problem,
-        env,
-        lambda seen, steady: model.predict(
-            seen, deterministic=steady, action_masks=env.action_masks()
-        ),
+    return _best_of(problem, _ranked(_draws(env, _masked(env, model), _DRAWS)))
+
+
+def _masked(env: BlastBarrierEnv, model: MaskablePPO) -> Predict:
+    return lambda seen, steady: model.predict(
+        seen, deterministic=steady, action_masks=env.action_masks()
     )
 
 
-def _best_drawn(problem: BenchmarkProblem, env: BlastBarrierEnv, predict: Predict) -> Layout:
-    """Blast the policy's proposal, then its draws, the best guess first; return the best."""
+Guessed = tuple[Layout, float]
+"""A layout and the share of the load that it takes off by the surrogate's guess."""
 
-    def drawn(*, steady: bool) -> tuple[Layout, float]:
+
+def _draws(env: BlastBarrierEnv, predict: Predict, number: int) -> list[Guessed]:
+    """Return the policy's proposal, then random draws."""
+
+    def drawn(*, steady: bool) -> Guessed:
         seen, _ = env.reset(seed=0)
         ended = False
         while not ended:
@@ -205,9 +233,17 @@ def _best_drawn(problem: BenchmarkProblem, env: BlastBarrierEnv, predict: Predic
             seen, _, ended, _, info = env.step(np.int64(action))
         return tuple(sorted(info["layout"])), info["reduction"]
 
-    proposal, _ = drawn(steady=True)
-    guessed = dict(drawn(steady=False) for _ in range(_DRAWS))
-    for layout in (proposal, *sorted(guessed, key=lambda each: -guessed[each])):
+    return [drawn(steady=index == 0) for index in range(number + 1)]
+
+
+def _ranked(draws: Sequence[Guessed]) -> list[Guessed]:
+    """Return the proposal, then the draws, the best guess first."""
+    return [draws[0], *sorted(draws[1:], key=lambda each: -each[1])]
+
+
+def _best_of(problem: BenchmarkProblem, draws: Sequence[Guessed]) -> Layout:
+    """Blast layouts until the budget ends; return the best."""
+    for layout in dict.fromkeys(layout for layout, _ in draws):
         problem.evaluate(layout)
     assert problem.best is not None
     return problem.best.layout
