@@ -9,7 +9,7 @@ export PYGAME_HIDE_SUPPORT_PROMPT := 1
 # Python keeps what it has compiled, whatever the shell says: the tests start many processes.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test suite test-browser attack mutants matrix quick docs site shown lint types compiled \
+.PHONY: demo test suite test-browser matrix quick docs site shown lint types compiled \
 	check setup clean
 
 demo: $(STAMP)
@@ -32,24 +32,6 @@ quick: $(STAMP)
 # The page in a real browser, headless; needs chromium and chromium-driver. Screenshots: out/app/.
 test-browser: compiled
 	$(BIN)/pytest tests/app/browser
-
-# Thousands of wrong files of every format that is read, files made to take long or much, kills at
-# steps on the disk, full devices, and strangers at the page; an hour on one core.
-attack: $(STAMP)
-	$(BIN)/python -m tests.attack.run files
-	$(BIN)/python -m tests.attack.run made
-	$(BIN)/python -m tests.attack.run hostile
-	$(BIN)/python -m tests.attack.run kills
-	$(BIN)/python -m tests.attack.run disks
-	$(BIN)/python -m tests.attack.run web
-
-# Small errors put into the rules of the core: do their tests notice? Half an hour on one core.
-mutants: $(VENV)/.mutants
-	$(BIN)/python -m tests.mutation
-
-$(VENV)/.mutants: $(STAMP)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt cosmic-ray
-	touch $@
 
 # The tests of `make quick` with other Pythons, which uv gets, and with the oldest libraries that
 # pyproject.toml allows; torch stays as it is, because each of its versions is gigabytes. Without

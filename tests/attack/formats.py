@@ -1,8 +1,8 @@
-"""Every kind of file that the packages read: sound ones, and what reads them."""
+"""Sound files of the formats that the packages read, and their readers."""
 
 import json
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -37,7 +37,7 @@ from blast_env.report.study import front_layouts
 from blast_env.site import Scenario, load_scenario, save_scenario
 from blast_env.site.scene import Charge
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
-from tests.io.importing.maps import Places, charge, outline, rectangle, written
+from tests.io.importing.maps import BLOCK, LAYERS
 from tests.site.documents import full_document
 
 
@@ -117,12 +117,6 @@ def _configuration(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, lambda _: run.configuration()))
 
 
-def _versions(folder: Path) -> Format:
-    path = folder / "versions.json"
-    sample = json.dumps({"blast-env": "0.1.0", "numpy": "2.4"}, indent=2).encode()
-    return Format((sample,), _from_file(path, lambda _: RunFolder(folder).versions))
-
-
 def _rollouts(folder: Path) -> Format:
     path = folder / "rollouts.csv"
     rows = [RolloutRow(16 * n, n, 0.1, 0.25, 3.5, 10 * n, n, 1.5 * n) for n in range(1, 8)]
@@ -184,73 +178,17 @@ def _loads(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, read), True)
 
 
-def _geojson(folder: Path) -> Format:
-    house = outline(_in_degrees(rectangle(0, 0, 6, 4)), name="House", height=6)
-    road = {"type": "LineString", "coordinates": _in_degrees([(-5, -8), (15, -8)])}
-    street = {"type": "Feature", "properties": {"highway": "service"}, "geometry": road}
-    sample = written(folder, house, street, crs=None).read_bytes()
-    return _map(folder, (sample,), ".geojson", _HOUSE)
+def _map(suffix: str, **options: Any) -> Callable[[Path], Format]:
+    """Return the invented block of a town as one kind of map."""
 
+    def form(folder: Path) -> Format:
+        def read(path: Path) -> Any:
+            return import_site(path, ImportOptions(protect=("Town Hall",), **options)).scenario
 
-def _in_degrees(places: Places) -> Places:
-    """Return places in metres as degrees, not far from the equator."""
-    return [(round(1e-5 * x, 7), round(1e-5 * y, 7)) for x, y in places]
+        sample = BLOCK.with_suffix(suffix).read_bytes()
+        return Format((sample,), _from_file(folder / f"map{suffix}", read))
 
-
-def _local_geojson(folder: Path) -> Format:
-    site = (outline(rectangle(0, 0, 6, 4), name="House", protected=True), charge(12.0, 2.0))
-    return _map(folder, (written(folder, *site).read_bytes(),), ".geojson", ImportOptions())
-
-
-def _osm(folder: Path) -> Format:
-    places = [*rectangle(0, 0, 6, 4), *rectangle(0, 12, 6, 4), (-5, -8), (15, -8)]
-    nodes = [
-        f'<node id="{number}" lat="{y}" lon="{x}"/>'
-        for number, (x, y) in enumerate(_in_degrees(places), start=1)
-    ]
-    ways = (
-        _way(11, (1, 2, 3, 4, 1), building="yes", name="House", height="6"),
-        _way(12, (5, 6, 7, 8, 5)),
-        _way(13, (9, 10), highway="service"),
-    )
-    outer = '<member type="way" ref="12" role="outer"/>'
-    shed = f'<relation id="1">{outer}{_tags(type="multipolygon", building="yes")}</relation>'
-    sample = "\n".join(('<osm version="0.6">', *nodes, *ways, shed, "</osm>", "")).encode()
-    return _map(folder, (sample,), ".osm", _HOUSE)
-
-
-def _way(number: int, nodes: Sequence[int], **tags: str) -> str:
-    refs = "".join(f'<nd ref="{each}"/>' for each in nodes)
-    return f'<way id="{number}">{refs}{_tags(**tags)}</way>'
-
-
-def _tags(**tags: str) -> str:
-    return "".join(f'<tag k="{key}" v="{value}"/>' for key, value in tags.items())
-
-
-def _dxf(folder: Path) -> Format:
-    outline = "".join(f"0\nVERTEX\n8\nB\n10\n{x}\n20\n{y}\n" for x, y in rectangle(0, 0, 6, 4))
-    entities = (
-        f"0\nPOLYLINE\n8\nB\n66\n1\n70\n1\n39\n5.0\n{outline}0\nSEQEND\n",
-        "0\nTEXT\n8\nB\n10\n3.0\n20\n2.0\n40\n1.0\n1\nHouse\n",
-        "0\nCIRCLE\n8\nS\n10\n12.0\n20\n2.0\n40\n1.0\n",
-        "0\nPOINT\n8\nS\n10\n12.0\n20\n2.0\n",
-    )
-    sample = f"0\nSECTION\n2\nENTITIES\n{''.join(entities)}0\nENDSEC\n0\nEOF\n".encode()
-    options = ImportOptions(
-        units="m", buildings_from=("B",), charges_from=("S",), protect=("House",)
-    )
-    return _map(folder, (sample,), ".dxf", options)
-
-
-_HOUSE: Final = ImportOptions(protect=("House",))
-
-
-def _map(folder: Path, samples: tuple[bytes, ...], suffix: str, options: ImportOptions) -> Format:
-    def read(path: Path) -> Any:
-        return import_site(path, options).scenario
-
-    return Format(samples, _from_file(folder / f"map{suffix}", read))
+    return form
 
 
 def _parquet(folder: Path) -> Format:
@@ -299,16 +237,14 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "layout": _layout,
         "calibration": _calibration,
         "run: config.json": _configuration,
-        "run: versions.json": _versions,
         "run: rollouts.csv": _rollouts,
         "run: checkpoint.pt": _checkpoint,
         "--set": _setting,
         "front.csv": _front,
         "store of blasts": _loads,
-        "GeoJSON": _geojson,
-        "GeoJSON, local": _local_geojson,
-        "OpenStreetMap": _osm,
-        "DXF": _dxf,
+        "GeoJSON": _map(".geojson"),
+        "OpenStreetMap": _map(".osm"),
+        "DXF": _map(".dxf", units="mm", **LAYERS),
         "collisions (Parquet)": _parquet,
         "page: design": _design,
         "page: task": _task,

@@ -1,18 +1,24 @@
-"""Special files, numbers out of bounds and foreign texts end in the usual errors, or are shown."""
+"""Special files, numbers out of bounds and foreign texts end in the documented error."""
 
-import json
+import os
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from stat import S_IFSOCK
+from typing import Any, Final
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import torch
 from blast_agents.training.checkpoint import _check_optimizer
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from blast_env.benchmark import Run, Submission
+from blast_env.benchmark import Run, Submission, make
+from blast_env.benchmark.methods import find_method
 from blast_env.benchmark.standings import StandingsTable
-from blast_env.design.surrogate.network import load_surrogate
+from blast_env.cli.output import print_table
 from blast_env.documents import DocumentError, parse_json, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import simulate
@@ -21,30 +27,113 @@ from blast_env.files import write_atomically
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
 from blast_env.particles.parquet import checked_table
+from blast_env.response.facade import respond
 from blast_env.site import Scenario, ScenarioError
 from blast_env.store import Store
-from tests.attack import hostile
+from blast_env.tables import markdown_table
+from blast_env.values import STEERING, markup_text
+from tests.io.importing.maps import BLOCK
+from tests.site.documents import Document, changed, key_paths, minimal_document, value_at
 
-DOCUMENT = hostile.site_document()
+SPECIAL: Final = ("a pipe", "a device", "a socket", "a sparse file of 20 GB")
+
+TEXTS: Final = (
+    *("\x1b]0;title\x07", "\x1b[31mred", "a\0b", "\u202eright to left", "\u2066\u200f", "\x9b2J"),
+    *("a\n\n# Heading", "<script>alert(1)</script>", "[here](javascript:alert(1))", "{raw}`x`"),
+)
+
+ABOUT: Final = {"title": "A component", "source": "a test"}
+COMPONENTS: Final[Document] = {
+    "window": ABOUT
+    | {"kind": "glazing", "cost_m2": 100.0, "width_m": 1.2, "height_m": 1.5}
+    | {"thickness_mm": 6.0, "outer_thickness_mm": 4.0}
+    | {"interlayer": {"tension_n_m": 16e3, "tear_share": 0.15}},
+    "concrete": ABOUT
+    | {"kind": "wall", "span_m": 3.0}
+    | {
+        "section": {
+            "kind": "reinforced_concrete",
+            "thickness_m": 0.2,
+            "steel_share": 0.003,
+            "cover_m": 0.03,
+            "concrete_pa": 30e6,
+            "steel_pa": 500e6,
+            "dynamic_increase": 1.2,
+        }
+    },
+    "brick": ABOUT
+    | {"kind": "wall", "supports": "fixed"}
+    | {
+        "section": {
+            "kind": "masonry",
+            "thickness_m": 0.2,
+            "density_kg_m3": 1900.0,
+            "flexural_pa": 7e5,
+            "young_pa": 6e9,
+        }
+    },
+    "sheet": ABOUT
+    | {"kind": "wall"}
+    | {
+        "section": {
+            "kind": "sheeting",
+            "material": "steel",
+            "moment_n": 5e3,
+            "mass_kg_m2": 30.0,
+            "bending_stiffness_n_m": 4e5,
+        }
+    },
+}
 
 
-@pytest.mark.parametrize("kind", hostile.SPECIAL)
+def site_document() -> Document:
+    """Return a small site with components of all kinds, and an objective with references."""
+    document = minimal_document()
+    parts = [{"walls": [w], "wall": c} for w, c in (("east", "brick"), ("north", "sheet"))]
+    facade = {"glazing": "window", "wall": "concrete", "parts": parts}
+    document["structures"][0] |= {"height_m": 3.0, "weight": 3.0, "facade": facade}
+    references = {"reference_impulse_pa_s": 500.0, "reference_peak_pa": 5e4}
+    return document | {
+        "components": COMPONENTS,
+        "objective": {"quantity": "both", **references},
+    }
+
+
+DOCUMENT: Final = site_document()
+NUMBERS: Final = [
+    path
+    for path in key_paths(DOCUMENT)
+    if isinstance(value_at(DOCUMENT, path), float) and path[0] in ("components", "objective")
+]
+
+
+def special(path: Path, kind: str) -> Path:
+    if kind == "a pipe":
+        os.mkfifo(path)
+    elif kind == "a device":
+        path.symlink_to("/dev/full")
+    elif kind == "a socket":
+        os.mknod(path, S_IFSOCK | 0o600)
+    else:
+        with path.open("wb") as file:
+            file.truncate(20_000_000_000)  # takes no room on the disk
+    return path
+
+
+@pytest.mark.parametrize("kind", SPECIAL)
 def test_a_special_file_is_refused(kind: str, tmp_path: Path) -> None:
-    hostile.special(tmp_path / "a.json", kind)
+    path = special(tmp_path / "a.json", kind)
     with pytest.raises(DocumentError, match=r"not a regular file|bytes, must|cannot be read"):
-        read_text(tmp_path / "a.json")
+        read_text(path)
     with pytest.raises(BlastEnvError, match=r"a\.json: (cannot be used|is damaged)"):
-        Store(tmp_path / "a.json")
+        Store(path)
 
 
 def test_nothing_is_written_in_the_place_of_a_device(tmp_path: Path) -> None:
-    hostile.special(tmp_path / "a.json", "a pipe")
-    with (
-        pytest.raises(BlastEnvError, match=r"a\.json: is not a regular file"),
-        write_atomically(tmp_path / "a.json"),
-    ):
+    path = special(tmp_path / "a.json", "a pipe")
+    with pytest.raises(BlastEnvError, match="not a regular file"), write_atomically(path):
         pass
-    assert (tmp_path / "a.json").is_fifo()
+    assert path.is_fifo()
 
 
 @pytest.mark.parametrize(
@@ -52,7 +141,6 @@ def test_nothing_is_written_in_the_place_of_a_device(tmp_path: Path) -> None:
     [
         ("structure", [1.0], "column 'structure' holds double, must hold texts"),
         ("time_s", ["a"], "column 'time_s' holds string, must hold numbers or truth values"),
-        ("time_s", [b"a"], "column 'time_s' holds binary"),
         ("own", [[1.0]], "column 'own' holds list"),
         ("structure", ["a", None], "column 'structure' has 1 missing values"),
     ],
@@ -70,80 +158,65 @@ def test_values_are_counted_before_they_are_read() -> None:
         parse_json("[" + "[]," * 1_600_000 + "[]]")
 
 
-@pytest.mark.parametrize(
-    ("place", "value", "words"),
-    [
-        (("components", "brick", "section", "thickness_m"), 1e-300, "equal to 0.01"),
-        (("components", "brick", "section", "thickness_m"), "0.2", "should be a valid number"),
-        (("components", "window", "outer_thickness_mm"), 1e-300, "must be 0 or at least 1"),
-        (("components", "concrete", "section", "steel_pa"), 3e9, "must be at most 0.0085"),
-        (("components", "window", "title"), "\x1b[2J", "must not have the character"),
-    ],
-)
-def test_numbers_of_a_site_are_numbers_within_bounds(
-    place: hostile.Place, value: Any, words: str
+@settings(deadline=None, derandomize=True)
+@given(st.sampled_from(NUMBERS), st.sampled_from((5e-324, 1e-300, 1e38, 1e300, -1.0, True, "1.0")))
+def test_any_number_of_a_site_is_refused_or_gives_finite_numbers(
+    path: tuple[str | int, ...], value: Any
 ) -> None:
-    document = hostile.replaced(DOCUMENT, place, value)
-    if value == 3e9:
-        document["components"]["concrete"]["section"]["steel_share"] = 0.03
-    with pytest.raises(ScenarioError, match=words):
-        Scenario.from_document(document, "test")
+    with suppress(ScenarioError):
+        scenario = Scenario.from_document(changed(DOCUMENT, path, value), "test")
+        bays, house = scenario.bays, scenario.structures[0]
+        time_s = np.linspace(0.0, 0.02, 41)
+        pressure_pa = np.outer(np.ones(len(bays)), 3e4 * np.exp(-time_s / 0.004))
+        load = scenario.objective.load(300.0, 3e4, house.weight, house.counted_peak_weight)
+        panes = respond(bays, time_s, pressure_pa).broken_panes
+        assert np.isfinite([panes, load, 1.0 / load]).all()
 
 
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        (("members", 0, 0, 0), 1e38),
-        (("scale", 0), 1e-300),
-        (("mean", 0), "1.0"),
-        (("mean", 0), True),
-    ],
-)
-def test_numbers_of_a_surrogate_are_numbers_within_bounds(
-    place: hostile.Place, value: Any, tmp_path: Path
+@pytest.mark.parametrize("text", TEXTS)
+def test_foreign_texts_reach_neither_terminal_nor_page_as_they_are(
+    text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    make, _, _ = hostile.DOCUMENTS["surrogate.json"]
-    (tmp_path / "a.json").write_text(json.dumps(hostile.replaced(make(), place, value)))
-    with pytest.raises(
-        BlastEnvError, match=rf"a.json: is no surrogate, .*{place[0]}.*Input should"
-    ):
-        load_surrogate(tmp_path / "a.json")
+    submission = Submission(text, (Run("control_room-known-v2", 0, 0, 0, ()),), text)
+    table = StandingsTable(submission.method, ("method",), ((text,),))
+    print_table(table.title, table.headers, table.rows)
+    assert STEERING.search(capsys.readouterr().out) is None
+    page = markdown_table(("note",), [(markup_text(submission.note),)])
+    marks = ("<script", "[here](javascript", "\n# Heading", "{raw}`", "\x1b", "\u202e")
+    assert not any(mark in page for mark in marks)
 
 
-@pytest.mark.parametrize("text", hostile.TEXTS[:-2])
-def test_foreign_texts_reach_neither_terminal_nor_page_as_they_are(text: str) -> None:
-    run = Run("control_room-known-v2", 0, 0, 0, ())
-    assert hostile.shown([StandingsTable(text, ("method",), ((text,),))], "") == ""
-    assert hostile._use_submission(Submission(text, (run,), text)) == ""
-
-
-def test_messages_quote_little_of_a_long_text(tmp_path: Path) -> None:
+def test_messages_quote_little_of_a_long_text() -> None:
     long = "x" * 500_000
     with pytest.raises(BlastEnvError) as layout:
         LayoutFile((), long, "0" * 64).layout_for("courtyard")
-    (tmp_path / "a.geojson").write_text(json.dumps(hostile.map_document()))
     with pytest.raises(BlastEnvError) as crs:
-        import_site(tmp_path / "a.geojson", ImportOptions(crs=long))
+        import_site(BLOCK, ImportOptions(crs=long))
     for each in (layout, crs):
-        assert hostile.message_problem(str(each.value)) == ""
+        assert "x" * 81 not in str(each.value)
 
 
-def test_a_gauge_that_is_moved_out_of_a_solid_is_said_to_be() -> None:
-    site = hostile.gauge_site((22.0, 10.0, 0.3))
+@pytest.mark.parametrize(("z_m", "moved"), [(0.3, True), (1.0, False)])
+def test_a_gauge_that_is_moved_out_of_a_solid_is_noted(z_m: float, moved: bool) -> None:
+    document = minimal_document()
+    document["structures"][0]["height_m"] = 0.5
+    document["gauges"] = [{"name": "door", "position_m": [11.0, 5.0, z_m]}]
+    site = Scenario.from_document(document, "gauge")
     result = simulate(site, engine="gas", cell_m=0.5, until=0.001)
     assert isinstance(result, GasResult)
-    (note,) = result.moved_gauges
-    assert "gauge gauge: lies inside a solid" in note
-    assert note in result.gauge_notes
-    assert hostile.gauge_outcome((15.0, 10.0, 1.0)) == ""
+    assert ["gauge door: lies inside a solid" in note for note in result.moved_gauges] == [True] * (
+        moved
+    )
+    assert set(result.moved_gauges) <= set(result.gauge_notes)
 
 
 @pytest.mark.parametrize("name", ["os:system", "builtins:pow", "math:pi", "nothing:at_all"])
-def test_what_is_no_method_is_refused(name: str) -> None:
-    assert hostile.method_outcome(name) == ""
+def test_a_function_that_is_no_method_is_refused(name: str) -> None:
+    with pytest.raises(BlastEnvError):
+        find_method(name)(make("control_room-known-v2", 0), 0)
 
 
-def _stepped() -> torch.optim.Adam:
+def stepped() -> torch.optim.Adam:
     layer = torch.nn.Linear(2, 1)
     optimizer = torch.optim.Adam(layer.parameters(), lr=1e-3)
     layer(torch.ones(1, 2)).sum().backward()
@@ -151,30 +224,20 @@ def _stepped() -> torch.optim.Adam:
     return optimizer
 
 
-def _forge(content: Any, change: str) -> None:
-    if change == "rate":
-        content["param_groups"][0]["lr"] = "fast"
-    elif change == "setting":
-        content["param_groups"][0]["foreach"] = True
-    elif change == "shape":
-        content["state"][0]["exp_avg"] = torch.zeros(7)
-    elif change == "text":
-        content["state"][0]["exp_avg"] = "x"
-    elif change == "index":
-        content["state"][9] = content["state"].pop(0)
-    else:
-        content["state"][0]["exp_avg_sq"] = torch.full((1, 2), -1.0)
-
-
-def test_the_state_of_an_optimiser_fits_itself() -> None:
-    optimizer = _stepped()
-    _check_optimizer(optimizer, optimizer.state_dict())
-
-
-@pytest.mark.parametrize("change", ["rate", "setting", "shape", "text", "index", "negative"])
-def test_the_state_of_a_forged_optimiser_is_refused(change: str) -> None:
-    optimizer = _stepped()
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("lr", "fast"),
+        ("foreach", True),
+        ("exp_avg", torch.zeros(7)),
+        ("exp_avg", "x"),
+        ("exp_avg_sq", torch.full((1, 2), -1.0)),
+    ],
+)
+def test_the_state_of_a_forged_optimiser_is_refused(key: str, value: Any) -> None:
+    optimizer = stepped()
     content = optimizer.state_dict()
-    _forge(content, change)
+    _check_optimizer(optimizer, content)
+    (content["param_groups"][0] if key in ("lr", "foreach") else content["state"][0])[key] = value
     with pytest.raises((ValueError, KeyError)):
-        _check_optimizer(_stepped(), content)
+        _check_optimizer(stepped(), content)

@@ -1,47 +1,87 @@
-"""kill -9 at a moment, then the same command again: the result is the one it would have been.
+"""kill -9 at a step on the disk, then the same work again: the result is the undisturbed one."""
 
-Every step on the disk of every job takes minutes (`tests/attack/kills.py`); here is one of them.
-"""
-
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
+from typing import Any
 
 import pytest
+from blast_agents.training import resume, train
+from blast_agents.training.checkpoint import Checkpoint
 
 from blast_env.errors import BlastEnvError
-from tests.attack import kills
-from tests.attack.kills import JOBS, Job, in_process, outcome_after_kill, steps_and_outcome
+from blast_env.files import is_temporary
+from tests.agents.training_runs import hyperparameters, scenario_file, settings
+
+STEPS = ("os.rename", "os.mkdir", "os.remove", "open")
+"""What changes names or opens a file to write. Python reports each before it happens."""
 
 
-def _two_files(folder: Path) -> None:
-    """Write files that belong together, and take one for both."""
-    if not (folder / "first").exists():
-        (folder / "first").write_text("a")
-        (folder / "second").write_text("b")
+def training(folder: Path) -> None:
+    """Train, or go on with what is there, as the error says."""
+    chosen = settings(scenario_file(folder), steps=32)
+    try:
+        train(chosen, hyperparameters(), folder / "run")
+    except BlastEnvError as error:
+        if "--resume continues" not in str(error):
+            raise
+        resume(folder / "run")
 
 
-def _refused(folder: Path) -> None:
-    raise BlastEnvError(f"{folder.name} is of no use")
+def outcome(folder: Path) -> Any:
+    """Return all of a training but its times."""
+    run = folder / "run"
+    checkpoint = Checkpoint.load(run / "checkpoint.pt")
+    lines = [(run / f"{name}.csv").read_text().count("\n") for name in ("rollouts", "evaluations")]
+    weights = [
+        each.numpy().tobytes()
+        for policy in (checkpoint.policy, checkpoint.best_policy)
+        for each in policy.values()
+    ]
+    steps = [row.steps for row in checkpoint.rollouts]
+    reductions = [row.reduction for row in checkpoint.evaluations]
+    left = [path.name for path in run.iterdir() if is_temporary(path.name)]
+    return weights, steps, reductions, lines, left
 
 
-def _names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
+def run_until(work: Callable[[Path], None], folder: Path, kill_at: int, steps: Any) -> None:
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event not in STEPS or not str(arguments[0]).startswith(str(folder)):
+            return
+        writes = isinstance(arguments[-1], int) and arguments[-1] & (os.O_WRONLY | os.O_RDWR)
+        if event == "open" and not writes:
+            return
+        if steps.value == kill_at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        steps.value += 1
+
+    sys.addaudithook(watch)
+    work(folder)
+
+
+def in_process(work: Callable[[Path], None], folder: Path, kill_at: int = -1) -> tuple[int, int]:
+    """Work in a process that is killed at a step, unless that is negative; code and steps."""
+    folder.mkdir(exist_ok=True)
+    # Optimisers of torch import its compiler, which would take each process a second and a half.
+    import_module("torch._dynamo")
+    context = multiprocessing.get_context("fork")
+    steps = context.Value("i", 0, lock=False)
+    process = context.Process(target=run_until, args=(work, folder, kill_at, steps))
+    process.start()
+    process.join()
+    return process.exitcode or 0, steps.value
 
 
 @pytest.mark.slow
-def test_training_goes_on_and_what_does_not_is_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """One test, because the processes begin with seconds of imports."""
-    steps, whole = steps_and_outcome("train", tmp_path / "whole")
-    assert outcome_after_kill("train", tmp_path / "killed", steps // 2) == whole
-
-    wrong = {"two": Job(_two_files, _names), "refused": Job(_refused, _names)}
-    monkeypatch.setattr(kills, "JOBS", MappingProxyType({**JOBS, **wrong}))
-    assert steps_and_outcome("two", tmp_path / "both") == (2, ["first", "second"])
-    assert outcome_after_kill("two", tmp_path / "one", 1) == ["first"]
-    assert in_process(_refused, tmp_path / "no").said == "no is of no use"
-    with pytest.raises(RuntimeError, match="ended with 3 before it was killed: no is of no use"):
-        outcome_after_kill("refused", tmp_path / "no", 0)
-    with pytest.raises(RuntimeError, match="refused: no is of no use"):
-        steps_and_outcome("refused", tmp_path / "no")
+def test_training_goes_on_after_a_kill(tmp_path: Path) -> None:
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    code, steps = in_process(training, whole)
+    assert code == 0
+    assert steps > 10
+    assert in_process(training, killed, steps // 2)[0] == -signal.SIGKILL
+    assert in_process(training, killed)[0] == 0
+    assert outcome(killed) == outcome(whole)

@@ -122,10 +122,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786 --run runs/gas": (
         f"{_TRAIN} --engine event {_CLUSTER}"
     ),
-    "python -m tests.attack.run files": "--count 1",
-    "python -m tests.attack.run hostile": "--only methods",
-    "python -m tests.attack.run kills": "--most 1",
-    "python -m tests.attack.run disks": "--most 1",
     # docs/engineers/gas.md, docs/howto/pictures.md
     "blast-env search --scenario my_site.toml --engine gas --cells coarse --out found": (
         "--budget 2 --held-out 1"
