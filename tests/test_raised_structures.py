@@ -13,7 +13,6 @@ from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine, GasResult
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutState
-from blast_env.plots.oblique import ObliqueView, boxes_of, painted_order
 from blast_env.plots.plan import structure_features
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -128,12 +127,6 @@ def test_what_begins_where_another_ends_stands_on_it() -> None:
     upper = raised(2.0, 4.0, (6.0, 3.0), name="upper", columns=4)
     scenario = hut_with(upper)
     assert scenario.structures[1].rectangle_m == scenario.structures[0].rectangle_m
-    order = painted_order(
-        ObliqueView(scenario.site.rectangle_m),
-        [each.rectangle_m for each in scenario.structures],
-        [each.base_m for each in scenario.structures],
-    )
-    assert order == [0, 1]
 
 
 def test_gauges_may_be_below_but_not_inside() -> None:
@@ -183,8 +176,6 @@ def test_pictures_draw_it_above_the_ground() -> None:
     hut, canopy = structure_features(scenario.structures)
     assert (hut.look.dashed, canopy.look.dashed) == (False, True)
     assert canopy.title == "protected structure above the ground"
-    box = next(each for each in boxes_of(scenario) if each.base_m)
-    assert (box.base_m, box.height_m) == (2.5, 3.0)
     solid = next(each for each in boxes(scenario, ()) if each.name == "canopy")
     assert solid.centre_m[2] == pytest.approx(2.75)
     assert solid.size_m[2] == pytest.approx(0.5)

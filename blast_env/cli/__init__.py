@@ -12,7 +12,7 @@ class _Commands(LazyGroup):
 
     summaries = {  # noqa: RUF012  # annotated in the base class
         "simulate": "Run one blast and print the load on each structure.",
-        "draw": "Check scenario files, and draw the plan and the oblique view of each site.",
+        "draw": "Check scenario files, and draw the plan of each site.",
         "calibrate": (
             "Run blasts at many distances, fit the three laws, and store one as a calibration."
         ),

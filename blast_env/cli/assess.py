@@ -130,9 +130,6 @@ def assess(
         "the probability over the mass (--capacity)",
         *PICTURES,
     ),
-    view: Path | None = writes(
-        "Picture of the site in three dimensions, bays by their damage", *PICTURES
-    ),
     diagram: Path | None = writes("Pressure-impulse diagram with every bay on it", *PICTURES),
     table: Path | None = writes("Table of every bay under every charge", ".csv", ".xlsx"),
     charge: ChargeOption = None,
@@ -215,7 +212,7 @@ def assess(
         print_answer(assessed.answer(level, mass_error, required))
     if table is not None:
         _write_table(assessed, table, engine)
-    _draw(assessed, picture, view, diagram)
+    _draw(assessed, picture, diagram)
 
 
 def _write_table(assessed: Assessed, path: Path, engine: Engine) -> None:
@@ -239,11 +236,9 @@ def _write_table(assessed: Assessed, path: Path, engine: Engine) -> None:
     print_written([write_tables(record, tables, path, f"Bays of {assessed.scenario.name}")])
 
 
-def _draw(
-    assessed: Assessed, picture: Path | None, view: Path | None, diagram: Path | None
-) -> None:
-    """Draw the facades, the site, and the pressure-impulse diagram under the worst charge."""
-    rows = _worst_rows(assessed) if picture or view or diagram else []
+def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> None:
+    """Draw the facades and the pressure-impulse diagram under the worst charge."""
+    rows = _worst_rows(assessed) if picture or diagram else []
 
     def title() -> str:
         building = rows[0][1].building
@@ -261,19 +256,7 @@ def _draw(
 
         return pressure_impulse_diagram([(name, each.facade) for name, each in rows], title())
 
-    def site() -> "Figure":
-        from blast_env.plots.facade import damage_view
-
-        worst = rows[0][1]
-        number = assessed.found[rows[0][0]].of(worst.building).index(worst)
-        views = [
-            (name, assessed.layouts[name], [each.of(b)[number] for b in each.buildings])
-            for name, each in assessed.found.items()
-        ]
-        words = f"{assessed.scenario.name}: {charge_text(worst.charge)}, the worst"
-        return damage_view(assessed.scenario, views, words)
-
-    print_written(save_figures((picture, facades), (diagram, pressure_impulse), (view, site)))
+    print_written(save_figures((picture, facades), (diagram, pressure_impulse)))
 
 
 def _worst_rows(assessed: Assessed) -> list[tuple[str, BuildingResponse]]:

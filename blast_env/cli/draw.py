@@ -18,21 +18,14 @@ def draw(
     scenarios: list[str] = typer.Argument(help="Bundled names, or scenario files."),
     layout: LayoutOption = None,
     out: Path | None = writes("Picture to write, else NAME.png of the scenario", *PICTURES),
-    view: str = typer.Option("both", help="both, plan or oblique."),
-    corner: str | None = typer.Option(
-        None,
-        "--from",
-        help="Corner of the viewpoint: southwest, southeast, northeast, northwest.",
-        show_default="on the side of the charges",
-    ),
     check_only: bool = typer.Option(
         False, "--check-only", help="Check the files, and draw nothing."
     ),
 ) -> None:
-    """Check scenario files, and draw the plan and the oblique view of each site.
+    """Check scenario files, and draw the plan of each site.
 
     The command prints the uses and limits of each file, or its errors; the exit code is 1 if one
-    has any. Heights are to scale. No blast is run.
+    has any. No blast is run.
     """
     for option, path in (("--layout", layout), ("--out", out)):
         if path is not None and len(scenarios) > 1:
@@ -41,7 +34,7 @@ def draw(
         raise typer.Exit(1)
     if not check_only:
         for name in scenarios:
-            _draw(name, layout, view, corner, out)
+            _draw(name, layout, out)
 
 
 def _is_sound(name: str) -> bool:
@@ -58,7 +51,7 @@ def _is_sound(name: str) -> bool:
     return True
 
 
-def _draw(name: str, layout: Path | None, view: str, corner: str | None, out: Path | None) -> None:
+def _draw(name: str, layout: Path | None, out: Path | None) -> None:
     scenario = load_scenario(name)
     elements = () if layout is None else load_layout(layout, scenario)
     # Here, because pictures need the extra `render`.
@@ -67,5 +60,5 @@ def _draw(name: str, layout: Path | None, view: str, corner: str | None, out: Pa
 
     for sentence in LayoutState.of(scenario, elements).explain_vehicles():
         print_line(sentence)
-    figure = site_picture(scenario, elements, view, corner)
+    figure = site_picture(scenario, elements)
     print_line(f"wrote {save_figure(figure, out or Path(f'{scenario.name}.png'))}")

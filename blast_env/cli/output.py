@@ -161,7 +161,7 @@ def save_pictures(*asked: "tuple[Path | None, Callable[[], Figure]]") -> list[Pa
 
 
 def layout_picture(scenario: Scenario, layout: Sequence[Element]) -> "Figure":
-    """Draw the plan and the oblique view of a layout on its site."""
+    """Draw the plan of a layout on its site."""
     # Here, because pictures need the extra `render`.
     from blast_env.plots.site_picture import site_picture
 

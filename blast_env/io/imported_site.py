@@ -17,7 +17,6 @@ from blast_env.plots.plan import (
 )
 from blast_env.plots.site_picture import draw_north
 from blast_env.plots.site_plan import (
-    PLAN,
     draw_plan,
     legend_of,
     outline_path,
@@ -70,7 +69,7 @@ def imported_plan(imported: ImportedSite) -> Figure:
     draw_plan(axes, features)
     for building in imported.buildings:
         _draw_building(axes, building)
-    draw_north(axes, scenario, PLAN)
+    draw_north(axes, scenario)
     write_legend(figure, [*_legend(), *legend_of(features)])
     worst = max(imported.buildings, key=lambda each: each.deviation.outline_m)
     write_heading(

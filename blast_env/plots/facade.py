@@ -1,22 +1,15 @@
-"""Facades coloured by level of protection: unfolded, and in the oblique view of the site."""
+"""Unfolded facades coloured by level of protection."""
 
 from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
 from blast_env.evaluation.consequences import BuildingResponse
-from blast_env.geometry import Layout
-from blast_env.plots.oblique import Colour, Tile, draw_oblique
-from blast_env.plots.site_plan import write_names
 from blast_env.plots.style import render_extra
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import Bay, FacadeResponse
-from blast_env.site import Scenario
 
 with render_extra():
     from matplotlib.axes import Axes
-    from matplotlib.colors import to_rgb
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch, Rectangle
 
@@ -37,7 +30,6 @@ _LEVEL_WORDS: Final = {
 }
 _NOTHING: Final = "#d4d8dd"
 _GAP_M: Final = 2.0
-_VIEW_IN: Final = (5.2, 4.4)
 
 
 def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> Figure:
@@ -56,44 +48,6 @@ def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> 
         _draw(plot, response.facade)
         level = response.facade.level_of_protection.label
         plot.set_title(f"{words}: level of protection {level}", fontsize=10, loc="left")
-    _write_levels(figure, 2)
-    return figure
-
-
-def damage_view(
-    scenario: Scenario,
-    views: Sequence[tuple[str, Layout, Sequence[BuildingResponse]]],
-    title: str,
-) -> Figure:
-    """Return the site in the oblique view, each bay in the colour of its level of protection.
-
-    Args:
-        scenario: The scenario.
-        views: Title of each view, its layout, and the responses of the buildings to one charge.
-        title: Title of the picture.
-    """
-    width_in, height_in = _VIEW_IN
-    figure = Figure(figsize=(width_in * len(views), height_in + 1.2), layout="constrained")
-    figure.suptitle(title)
-    panels = figure.subplots(1, len(views), squeeze=False)[0]
-    shown = []
-    for axes, (words, layout, responses) in zip(panels, views, strict=True):
-        tiles: dict[str, list[Tile]] = {}
-        for response in responses:
-            for index, each in enumerate(response.facade.bays):
-                bay = each.bay
-                tile = _tile(scenario, bay, to_rgb(_bay_colour(response.facade, index)))
-                tiles.setdefault(bay.structure, []).append(tile)
-        view, features = draw_oblique(axes, scenario, layout, tiles=tiles)
-        axes.set_title(words, fontsize=10)
-        shown.append((axes, features, view))
-    _write_levels(figure, 2 if len(views) > 1 else 1)
-    for axes, features, view in shown:
-        write_names(axes, features, view)
-    return figure
-
-
-def _write_levels(figure: Figure, columns: int) -> None:
     handles = [
         Patch(facecolor=LEVEL_COLOURS[level], edgecolor="0.4", label=words)
         for level, words in _LEVEL_WORDS.items()
@@ -101,31 +55,12 @@ def _write_levels(figure: Figure, columns: int) -> None:
     figure.legend(
         handles=handles,
         loc="outside lower center",
-        ncols=columns,
+        ncols=2,
         fontsize=8,
         title="level of protection that a pane or a wall panel allows",
         title_fontsize=8,
     )
-
-
-def _bay_colour(facade: FacadeResponse, index: int) -> str:
-    found = (facade.glass_levels.get(index), facade.wall_levels.get(index))
-    return LEVEL_COLOURS[min(each for each in found if each is not None)]
-
-
-def _tile(scenario: Scenario, bay: Bay, colour: Colour) -> Tile:
-    """Return a bay as a tile on a wall of its structure."""
-    structure = next(each for each in scenario.structures if each.name == bay.structure)
-    left, bottom, right, top = structure.rectangle_m
-    at_m = {"west": left, "east": right, "south": bottom, "north": top}[bay.wall]
-    sides = [(bay.left_m, bay.floor_m), (bay.right_m, bay.floor_m)]
-    sides += [(bay.right_m, bay.top_m), (bay.left_m, bay.top_m)]
-    if bay.line is not None:
-        corners = [(*bay.line.point_at(along), z) for along, z in sides]
-        return Tile(bay.wall, np.array(corners), colour)
-    across = bay.wall in ("west", "east")
-    corners = [(at_m, along, z) if across else (along, at_m, z) for along, z in sides]
-    return Tile(bay.wall, np.array(corners), colour)
+    return figure
 
 
 def _draw(plot: Axes, facade: FacadeResponse) -> None:

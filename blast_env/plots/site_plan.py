@@ -1,11 +1,10 @@
 """The plan of a site in matplotlib: features, loads, names, legends and headings."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 
-from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle, outlines
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
@@ -46,24 +45,6 @@ with render_extra():
 
 
 Obstacle = ModularObstacle | StructureOutline
-
-
-class View(Protocol):
-    """A projection from places on a site to positions in a picture."""
-
-    def places(self, points_m: FloatArray) -> FloatArray:
-        """Return positions in the picture (n, 2) of x, y and height (n, 3), m."""
-
-
-class PlanView:
-    """The view from above, which ignores heights."""
-
-    def places(self, points_m: FloatArray) -> FloatArray:
-        """Return x and y (n, 2) of x, y and height (n, 3), m."""
-        return np.asarray(points_m, dtype=np.float64)[:, :2]
-
-
-PLAN: Final = PlanView()
 
 
 def load_colours() -> Colormap:
@@ -117,13 +98,12 @@ def draw_plan(axes: Axes, features: Sequence[Feature], margin: float = 0.03) -> 
     draw_features(axes, features)
 
 
-def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) -> list[Artist]:
+def draw_features(axes: Axes, features: Iterable[Feature]) -> list[Artist]:
     """Draw features by their geometry and their look.
 
     Args:
         axes: The axes, in metres.
-        features: The features to draw; points with a height are drawn above the ground.
-        view: The projection of the picture.
+        features: The features to draw.
 
     Returns:
         The artists drawn, the lowest first.
@@ -134,27 +114,18 @@ def draw_features(axes: Axes, features: Iterable[Feature], view: View = PLAN) ->
         if len(feature.places_m) > 2:
             areas.setdefault((feature.kind, feature.look, feature.colour), []).append(feature)
         elif len(feature.places_m) == 2:
-            drawn.append(_line(feature, _places(feature, view)))
+            drawn.append(_line(feature))
         else:
-            drawn += _sign(feature, _places(feature, view), view)
+            drawn.append(_sign(feature))
     for (kind, look, fill), alike in areas.items():
         # One patch, so that there is no seam between neighbours.
-        patch = PathPatch(_path_of(outlines_of(alike), view))
+        patch = PathPatch(_path_of(outlines_of(alike)))
         patch.set(**area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
     drawn.sort(key=lambda artist: artist.get_zorder())
     for artist in drawn:
         axes.add_artist(artist)
     return drawn
-
-
-def _places(feature: Feature, view: View) -> FloatArray:
-    height_m = feature.above_ground_m if len(feature.places_m) == 1 else 0.0
-    return view.places(_at_height(feature.places_m, height_m))
-
-
-def _at_height(places_m: Iterable[PointM], height_m: float = 0.0) -> FloatArray:
-    return np.array([(*place_m, height_m) for place_m in places_m])
 
 
 def area_style(look: Look, fill: object) -> dict[str, Any]:
@@ -169,15 +140,16 @@ def area_style(look: Look, fill: object) -> dict[str, Any]:
     return style | {"hatch": "////"} if look.hatched else style
 
 
-def _line(feature: Feature, places: FloatArray) -> Artist:
-    look, (start, end) = feature.look, places.tolist()
+def _line(feature: Feature) -> Artist:
+    look, (start, end) = feature.look, feature.places_m
     colour = unit_interval(look.line or INK)
     if look.arrows:
         arrow = FancyArrowPatch(start, end, arrowstyle="<->", shrinkA=0, shrinkB=0)
         arrow.set(color=colour, linewidth=look.width, mutation_scale=14.0)
         arrow.set_zorder(feature.kind.level)
         return arrow
-    line = Line2D(*places.T, color=colour, linewidth=look.width, linestyle=_dashes(look))
+    x, y = zip(start, end, strict=True)
+    line = Line2D(x, y, color=colour, linewidth=look.width, linestyle=_dashes(look))
     line.set(solid_capstyle="butt", zorder=feature.kind.level)
     return line
 
@@ -186,16 +158,12 @@ def _dashes(look: Look) -> tuple[float, Sequence[float]] | None:
     return (0.0, (3.0, 1.5)) if look.dashed else None
 
 
-def _sign(feature: Feature, places: FloatArray, view: View) -> list[Artist]:
-    """Return the sign of a single point, on a stem if the view shows its height."""
-    sign = Line2D(*places.T, **_sign_style(feature.kind))
+def _sign(feature: Feature) -> Artist:
+    """Return the sign of a single point."""
+    ((x, y),) = feature.places_m
+    sign = Line2D([x], [y], **_sign_style(feature.kind))
     sign.set_zorder(Kinds.CHARGE.level)
-    on_ground = view.places(np.array([(*feature.places_m[0], 0.0)]))
-    if (on_ground == places).all():
-        return [sign]
-    stem = Line2D(*np.vstack([on_ground, places]).T, color=unit_interval(INK), linewidth=0.8)
-    stem.set_zorder(Kinds.CHARGE.level - 0.05)
-    return [stem, sign]
+    return sign
 
 
 def _sign_style(kind: FeatureKind) -> dict[str, Any]:
@@ -245,14 +213,13 @@ def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
     return lines
 
 
-def outline_path(rectangles: Sequence[Rectangle], view: View = PLAN) -> Path:
+def outline_path(rectangles: Sequence[Rectangle]) -> Path:
     """Return the common outline of rectangles that do not overlap."""
-    return _path_of(outlines(rectangles), view)
+    return _path_of(outlines(rectangles))
 
 
-def _path_of(rings: Iterable[Sequence[PointM]], view: View) -> Path:
-    places = [view.places(_at_height(ring)) for ring in rings]
-    closed = (Path(np.vstack([each, each[:1]]), closed=True) for each in places)
+def _path_of(rings: Iterable[Sequence[PointM]]) -> Path:
+    closed = (Path(np.array([*ring, ring[0]]), closed=True) for ring in rings)
     return Path.make_compound_path(*closed)
 
 
@@ -345,9 +312,7 @@ _STAR_PT: Final = 15.0
 _FAR_PT: Final = 7.0  # distance beyond which a line joins a name to its feature
 
 
-def write_names(
-    axes: Axes, features: Sequence[Feature], view: View = PLAN, *, inside: bool = True
-) -> list[Artist]:
+def write_names(axes: Axes, features: Sequence[Feature], *, inside: bool = True) -> list[Artist]:
     """Write the labels of features inside or beside them, without overlap if possible.
 
     Call it last: positions depend on the final layout of the figure.
@@ -355,7 +320,6 @@ def write_names(
     Args:
         axes: The picture of the site.
         features: Its features, which are labelled and not to be covered.
-        view: The projection of the picture.
         inside: Whether labels may cover their features; not if these show loads by colour.
 
     Returns:
@@ -373,8 +337,8 @@ def write_names(
         features,
         labels,
         [(extent.width, extent.height) for extent in extents],
-        lambda each: _boxes(axes, each, view, pixels_per_pt)[0],
-        lambda each: _boxes(axes, each, view, pixels_per_pt)[1] if inside else None,
+        lambda each: _box(axes, each, pixels_per_pt),
+        lambda each: _box(axes, each, pixels_per_pt) if inside else None,
         Rectangle(*axes.get_window_extent().extents),
         gap=_GAP_PT * pixels_per_pt,
         far=_FAR_PT * pixels_per_pt,
@@ -418,22 +382,13 @@ def _other_texts(axes: Axes, names: Sequence[Text]) -> list[Rectangle]:
     return [Rectangle(*box.extents) for box in boxes]
 
 
-def _boxes(
-    axes: Axes, feature: Feature, view: View, pixels_per_pt: float
-) -> tuple[Rectangle, Rectangle]:
-    """Return the solid part of a feature, its roof or its sign, and its bounding box, pixels."""
-    height_m = feature.properties.get("height_m", feature.above_ground_m)
-    places = view.places(np.array([(*place_m, height_m) for place_m in feature.places_m]))
-    pixels = axes.transData.transform(places)
-    (left, bottom), (right, top) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
-    around = Rectangle(left, bottom, right, top)
+def _box(axes: Axes, feature: Feature, pixels_per_pt: float) -> Rectangle:
+    """Return the bounding box of a feature or its sign, pixels."""
+    pixels = axes.transData.transform(feature.places_m)
+    around = Rectangle(*pixels.min(axis=0).tolist(), *pixels.max(axis=0).tolist())
     if len(feature.places_m) == 1:
         around = around.grown(_STAR_PT / 2.0 * pixels_per_pt)
-    if len(feature.places_m) < 3 or view is PLAN:
-        return around, around
-    # A roof in the oblique view fills only the middle of its bounding box.
-    width, height = (right - left) / 4.0, (top - bottom) / 4.0
-    return Rectangle(left + width, bottom + height, right - width, top - height), around
+    return around
 
 
 _HEADING_SHARE: Final = 0.97  # of the width of a figure

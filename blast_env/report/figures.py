@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.evaluation import LoadCase, ThreatOutcome
 from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout
-from blast_env.plots.facade import damage_view, facade_picture
+from blast_env.plots.facade import facade_picture
 from blast_env.plots.figures import png_of
 from blast_env.plots.gas import KINDS, Kind, facades
 from blast_env.plots.ground_map import threshold_map
@@ -29,7 +29,6 @@ from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 from blast_env.plots.site_picture import draw_north, draw_scale
 from blast_env.plots.site_plan import (
-    PLAN,
     draw_plan,
     legend_of,
     rectangle_patch,
@@ -97,7 +96,7 @@ def site_plan(scenario: Scenario, threats: Sequence[LoadCase], layout: Layout) -
     for threat in threats:
         _draw_stand_off(axes, scenario, threat.charge_against(scenario, layout).position_m)
     draw_scale(axes, scenario)
-    draw_north(axes, scenario, PLAN)
+    draw_north(axes, scenario)
     write_legend(figure, legend_of(features))
     write_names(axes, features)
     return png(figure)
@@ -195,29 +194,15 @@ def _history(
     return f"{target.name}: overpressure over time, mean over its {wall} wall", png(figure)
 
 
-def damage_pictures(
-    scenario: Scenario,
-    layout: Layout,
-    unprotected: Consequences,
-    protected: Consequences,
-    threat: str,
-) -> tuple[Picture, ...]:
+def damage_pictures(unprotected: Consequences, protected: Consequences) -> tuple[Picture, ...]:
     """Return pictures of the damage to facades under one threat, without the layout and with it.
 
-    They are the site in three dimensions, and the unfolded facades and the pressure-impulse diagram
-    of each building.
+    They are the unfolded facades and the pressure-impulse diagram of each building.
     """
-    if not protected.responses:
-        return ()
-    words = ("no barrier", "layout")
-    views = [
-        (words[0], (), unprotected.responses),
-        (words[1], layout, protected.responses),
-    ]
-    pictures = [("damage of the facades", png(damage_view(scenario, views, threat)))]
+    pictures: list[Picture] = []
     for first, second in zip(unprotected.responses, protected.responses, strict=True):
         name = second.building
-        rows = list(zip(words, (first, second), strict=True))
+        rows = list(zip(("no barrier", "layout"), (first, second), strict=True))
         pictures.append((f"{name}: facades unfolded", png(facade_picture(rows, name))))
         points = [(each, response.facade) for each, response in rows]
         diagram = pressure_impulse_diagram(points, name)

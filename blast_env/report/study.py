@@ -465,7 +465,7 @@ class Runs:
                 self._found[fine, is_walled][-1] for is_walled in (False, True)
             )
             self.pictures[threat.name] = (
-                *damage_pictures(self.scenario, self.layout, unprotected, protected, threat.name),
+                *damage_pictures(unprotected, protected),
                 risk_picture(*both),
                 *blast_pictures(both[0], both[1], self.options.units),
             )

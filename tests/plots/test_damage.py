@@ -1,17 +1,16 @@
-"""Pictures of damage: facades unfolded and in three dimensions, pressure-impulse diagrams."""
+"""Pictures of damage: unfolded facades, pressure-impulse diagrams."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Rectangle
 
 from blast_env.calibration import kingery_bulmash
 from blast_env.evaluation.consequences import BuildingResponse
 from blast_env.evaluation.engines.gas import GasBlast
-from blast_env.plots.facade import LEVEL_COLOURS, damage_view, facade_picture
+from blast_env.plots.facade import LEVEL_COLOURS, facade_picture
 from blast_env.plots.ground_map import ground_recorders, open_distance_m, threshold_map
 from blast_env.plots.pressure_impulse import level_bounds, pressure_impulse_diagram
 from blast_env.response.buildings import LevelOfProtection, ground_thresholds
@@ -60,19 +59,6 @@ def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> 
         assert colours.count(to_rgb(panes)) >= 2
     assert "level of protection below standards" in figure.axes[0].get_title("left")
     assert "level of protection high" in figure.axes[1].get_title("left")
-
-
-def test_a_view_shows_the_bays_of_the_walls_that_are_seen(site: Scenario) -> None:
-    """From the south-west: the western bay, with and without a barrier, and the southern one."""
-    (_, unprotected), (_, protected) = both(site)
-    figure = damage_view(
-        site, [("no barrier", (), [unprotected]), ("walls", WALL, [protected])], "hut"
-    )
-    for axes, west in zip(figure.axes, (WORST, BEST), strict=True):
-        faces = next(each for each in axes.collections if isinstance(each, PolyCollection))
-        colours = [tuple(each[:3]) for each in np.asarray(faces.get_facecolor()).tolist()]
-        assert colours.count(to_rgb(west)) == (1 if west == WORST else 2)
-        assert colours.count(to_rgb(BEST)) == (1 if west == WORST else 2)
 
 
 def test_a_diagram_has_a_point_a_bay_and_layout(site: Scenario) -> None:

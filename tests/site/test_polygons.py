@@ -22,7 +22,6 @@ from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import clearance_outlines
 from blast_env.layout import LayoutState, usable_cells
 from blast_env.layout.build_scene import build_scene, vehicle_reach, worst_places
-from blast_env.plots.facade import damage_view
 from blast_env.plots.plan import Kinds, site_features
 from blast_env.plots.site_picture import site_picture
 from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
@@ -220,7 +219,6 @@ def test_a_facade_is_set_once_for_all_walls() -> None:
     result = GasBlast(scenario, engine=GasEngine(border_m=0.0, until=0.02)).run()
     assert not result.unjudged
     assert len(result.bays)
-    damage_view(scenario, [("view", (), [])], "museum")
 
 
 def test_the_page_edits_what_a_polygon_has() -> None:
