@@ -135,12 +135,6 @@ def simulate(
         help="Parameters of this name instead of the scenario's.",
         rich_help_panel=_PARTICLES,
     ),
-    scheme: Path | None = writes(
-        "Write a picture of the initial state", *PICTURES, panel=_PARTICLES
-    ),
-    velocities: Path | None = writes(
-        "Write a picture of the fan's velocities", *PICTURES, panel=_PARTICLES
-    ),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     as_json: JsonOption = False,

@@ -26,8 +26,6 @@ class BlastFiles:
         film: Film of the spread of the blast, .mp4 or .gif.
         heat_map: Load over the protected facades.
         history: Load over time; by gas dynamics at a gauge.
-        scheme: Initial state of the particles.
-        velocities: Velocities of the fan.
         impulse_map: Impulse over the ground, by gas dynamics.
         peak_map: Peak overpressure over the ground.
         risk_map: Risks to windows and eardrums.
@@ -40,8 +38,6 @@ class BlastFiles:
     film: Path | None = None
     heat_map: Path | None = None
     history: Path | None = None
-    scheme: Path | None = None
-    velocities: Path | None = None
     impulse_map: Path | None = None
     peak_map: Path | None = None
     risk_map: Path | None = None
@@ -122,7 +118,7 @@ class BlastFiles:
         Pictures of gas dynamics have two blasts side by side. Those of particles go into files of
         their own, that of the first blast with `_without` at the end of its name.
         """
-        every = (self.heat_map, self.history, self.scheme, self.velocities)
+        every = (self.heat_map, self.history)
         if not any((*every, self.impulse_map, self.peak_map, self.risk_map)):
             return []
         if isinstance(results[-1], BlastResult):
@@ -133,7 +129,7 @@ class BlastFiles:
         # Here, because pictures need the extra `render`.
         from blast_env.plots import figures
 
-        blast, written = results[-1].blast, []
+        written = []
         for number, each in enumerate(reversed(results)):
             if self.heat_map is not None:
                 figure = figures.heat_map(each, scale=figures.common_scale(results))
@@ -141,11 +137,6 @@ class BlastFiles:
             if self.history is not None:
                 figure = figures.impulse_over_time(each)
                 written.append(figures.save_figure(figure, _named(self.history, number)))
-        if self.scheme is not None:
-            written.append(figures.save_figure(figures.model_scheme(blast.scene), self.scheme))
-        if self.velocities is not None:
-            figure = figures.initial_velocities(blast.scenario.parameters)
-            written.append(figures.save_figure(figure, self.velocities))
         return written
 
     def _draw_gas(self, result: "GasResult", unprotected: "GasResult | None" = None) -> list[Path]:

@@ -38,8 +38,6 @@ BAD: dict[str, str] = {
     "simulate street_junction --layout courtyard.json": (
         "courtyard.json: the layout was saved for 'courtyard' (hash "
     ),
-    f"{GAS} --scheme a.png": "--scheme is for particles: engine is 'gas'",
-    f"{GAS} --velocities a.png": "--velocities is for particles: engine is 'gas'",
     f"{GAS} --preset ballistic": "--preset is for particles",
     f"{GAS} --gauge front": "--gauge is for --history: no history is to be drawn",
     f"{GAS} --gauge frnt --history a.png": "did you mean 'front'",

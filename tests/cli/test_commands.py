@@ -72,8 +72,6 @@ def test_simulate_prints_loads_with_units_and_writes_all_files(
     [
         ("--heat-map", "building"),
         ("--history", "impulse over time"),
-        ("--scheme", "Model scheme: the state at the detonation"),
-        ("--velocities", "Initial velocities of 12 explosive balls"),
     ],
 )
 def test_simulate_writes_each_picture(

@@ -5,16 +5,13 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.quiver import Quiver
 
-from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.particles.tables import faces_hit
 from blast_env.plots.figures import (
     heat_map,
     impulse_over_time,
-    initial_velocities,
-    model_scheme,
     save_figure,
 )
 from blast_env.plots.style import short_number
@@ -97,33 +94,6 @@ def test_a_blast_without_hits_can_be_drawn(result: BlastResult) -> None:
     )
     assert "no hits" in texts_of(impulse_over_time(empty))
     heat_map(empty).draw_without_rendering()
-
-
-def test_initial_velocities_are_those_of_the_model(result: BlastResult) -> None:
-    figure = initial_velocities(result.blast.scenario.parameters)
-    (axes,) = figure.axes
-    (arrows,) = (artist for artist in axes.collections if isinstance(artist, Quiver))
-    tip = np.column_stack((arrows.X, arrows.Y)) + np.column_stack((arrows.U, arrows.V))
-    angle = 2.0 * np.pi * np.arange(1, 13) / 12
-    assert tip == pytest.approx(500.0 * np.column_stack((np.cos(angle), np.sin(angle))))
-    assert axes.get_xlabel() == "velocity in x (m/s)"
-    assert r"$\theta_{1}$ = 30°" in texts_of(figure)
-
-
-@pytest.mark.parametrize("count", [0, 37])
-def test_the_number_of_velocities_is_bounded(result: BlastResult, count: int) -> None:
-    with pytest.raises(BlastEnvError, match=f"count is {count}, must be 1 to 36"):
-        initial_velocities(result.blast.scenario.parameters, count)
-
-
-def test_the_model_scheme_numbers_its_three_parts(barrier_result: BlastResult) -> None:
-    figure = model_scheme(barrier_result.blast.scene)
-    numbers = [text for text in texts_of(figure) if text in {"1", "2", "3"}]
-    assert sorted(set(numbers)) == ["1", "2", "3"]
-    key = figure.legends[0].get_title().get_text()
-    assert "1  air particles" in key
-    assert "2  explosive particles: 240 balls" in key
-    assert "3  obstacles" in key
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
