@@ -12,7 +12,6 @@ from blast_env.cli.options import (
     UNTIL_HELP,
     CacheOption,
     ChargeOption,
-    ClusterAddress,
     CvarOption,
     EngineChoice,
     FinalCellOption,
@@ -24,7 +23,6 @@ from blast_env.cli.options import (
     TntOption,
     any_json,
     resume_words,
-    running_on,
 )
 from blast_env.cli.output import resumable
 from blast_env.cli.targets import Target
@@ -75,7 +73,6 @@ def evaluate(
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
-    cluster: ClusterAddress = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
     json_all: JsonAllOption = False,
@@ -101,7 +98,7 @@ def evaluate(
         seeds=drawn,
         is_json=any_json(as_json, json_all),
     )
-    with running_on(cluster), resumable(resume_words(cache)):
+    with resumable(resume_words(cache)):
         if run is not None:
             _evaluate_run(run, layout, scenario, options)
         elif layout is not None:
