@@ -35,7 +35,7 @@ test-browser: compiled
 
 # The tests of `make quick` with other Pythons, which uv gets, and with the oldest libraries that
 # pyproject.toml allows; torch stays as it is, because each of its versions is gigabytes. Without
-# agents: MATRIX_EXTRAS=app,report MATRIX_TESTS="tests/particles".
+# agents: MATRIX_EXTRAS=app,cluster,report MATRIX_TESTS="tests/particles".
 MATRIX := 3.11 3.12 3.13 lowest
 MATRIX_EXTRAS ?= all
 MATRIX_TESTS ?= $(QUICK:%=tests/%)

@@ -1,4 +1,4 @@
-"""Independent pieces of work in parallel processes."""
+"""Independent pieces of work in parallel, on this machine or on a cluster (`on_cluster`)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
@@ -26,7 +26,7 @@ def run_all(
 
     Results do not depend on the number of workers. When an item raises, items that have not begun
     are left out; of several errors the first in the order of the items is raised. If joblib has
-    another backend (`joblib.parallel_config`), that one does the work, with its
+    another backend (`joblib.parallel_config`, `on_cluster`), that one does the work, with its
     number of workers if that is larger.
 
     Args:
@@ -68,6 +68,11 @@ def as_completed(
     return _parallel(numbered, list(enumerate(items)), count, "generator_unordered")
 
 
+def workers_told() -> int:
+    """Return the number of workers set for joblib (`on_cluster`), by default 1."""
+    return int(joblib.effective_n_jobs(None))
+
+
 @overload
 def share_of(progress: Tell, done: int, whole: int, part: int = 1) -> Tell: ...
 @overload
@@ -99,7 +104,7 @@ def _numbered(function: Callable[[Any], Any], numbered: tuple[int, Any]) -> tupl
 
 def _processes(workers: int, items: int) -> int:
     """Return the number of processes for the work; 1 for this process alone."""
-    return max(min(max(workers, int(joblib.effective_n_jobs(None))), items), 1)
+    return max(min(max(workers, workers_told()), items), 1)
 
 
 def _parallel(

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import DesignProblem, layouts_by_rule
@@ -172,6 +173,7 @@ def main(
     random_layouts: Annotated[int, typer.Option(min=2)] = 50,
     threats: Annotated[int, typer.Option(min=1, help="Charges and seeds a layout.")] = 4,
     processes: int = 2,
+    cluster: ClusterAddress = None,
     family: Annotated[str, typer.Option(help="sites, item_sites or large_sites.")] = SITES,
     engine: Annotated[str | None, typer.Option(show_default="event, or gas with items")] = None,
     rejected: Annotated[
@@ -182,7 +184,7 @@ def main(
     picture: Annotated[Path | None, typer.Option(help="Where to draw the first twelve.")] = None,
 ) -> None:
     """Print tables about generated sites, and draw some."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         if family not in FAMILIES:
             raise UnknownNameError("family", family, FAMILIES)
         ranges = replace(FAMILIES[family], preset=preset, calibration=calibration)

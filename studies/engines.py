@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import simulate
@@ -119,9 +120,10 @@ def main(
     seeds: Annotated[int, typer.Option(min=3, help="Blasts on each engine, at each step.")] = 40,
     scene: Annotated[str | None, typer.Option(help="Only this scene.")] = None,
     processes: Annotated[int, typer.Option(min=1)] = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Compare the loads of pymunk, at decreasing steps, with those of the event engine."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         scenes = engine_scenes()
         if scene is not None:
             if scene not in scenes:

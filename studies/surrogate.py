@@ -15,6 +15,7 @@ import torch
 import typer
 
 from blast_env.arrays import BoolArray
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout
 from blast_env.design.search import layouts_by_rule
@@ -86,12 +87,13 @@ def blasts(
         "out/surrogate/blasts"
     ),
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Run blasts on generated sites for the layouts of a recipe: rules, random, changed rules.
 
     Cached blasts are not repeated. `studies.blast_table` turns the cache into a table.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         make_folder(cache)
         liked = None if surrogate is None else load_surrogate(surrogate)
         recipe = Recipe(layouts, rules, liked, favourites, changes)
@@ -431,12 +433,13 @@ def judge(
     changes: Annotated[int, typer.Option(min=0, help="Layouts that it looks at.")] = 300,
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Compare the surrogate's proposals, by gas dynamics, with its predictions and every rule.
 
     An exploited surrogate predicts a larger reduction than gas dynamics gives.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         loaded, rows = load_surrogate(surrogate), []
         for name in scenarios:
             scenario = load_scenario(name)

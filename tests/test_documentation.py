@@ -131,7 +131,9 @@ def test_exceptions_stand_for_commands_and_code_that_the_pages_show() -> None:
     blocks = {(each.page, each.number) for page in CODE for each in CODE[page]}
     assert {*exceptions.CODE_NOT_RUN, *exceptions.CODE_SHORTENED} <= blocks
     assert {*exceptions.CODE_OF_THE_BUILD} <= {*WITH_CODE}
-    assert {page for each in exceptions.GIVEN for page in each.pages} <= {*STEPS}
+    assert {*exceptions.BACKGROUND} | {
+        page for each in exceptions.GIVEN for page in each.pages
+    } <= {*STEPS}
 
 
 def test_what_pages_take_for_granted_they_name() -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import typer
 
 from blast_env.cli.command import writes
-from blast_env.cli.options import ProcessesOption, TntOption, numbers
+from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, numbers, running_on
 from blast_env.cli.output import (
     print_line,
     print_table,
@@ -77,6 +77,7 @@ def calibrate(
     ),
     out: Path = writes("Folder for all files", default=Path("out/calibration")),
     processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Run blasts at many distances, fit the three laws, and store one as a calibration.
 
@@ -105,7 +106,7 @@ def calibrate(
     kept = Path(f"{stem}.runs.sqlite")
     label = f"{seeds * len(distances_m)} blasts"
     resume = "the same command resumes after the finished blasts"
-    with resumable(resume), progress_bar(label) as progress:
+    with resumable(resume), running_on(cluster), progress_bar(label) as progress:
         runs = study.run(processes, kept, progress)
     report = fit_laws(study, runs, compared, simulated)
     stored = report.calibration(name, law).model_copy(update={"tnt_range_kg": tnt_range_kg})

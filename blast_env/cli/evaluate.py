@@ -12,6 +12,7 @@ from blast_env.cli.options import (
     UNTIL_HELP,
     CacheOption,
     ChargeOption,
+    ClusterAddress,
     CvarOption,
     EngineChoice,
     FinalCellOption,
@@ -23,6 +24,7 @@ from blast_env.cli.options import (
     TntOption,
     any_json,
     resume_words,
+    running_on,
 )
 from blast_env.cli.output import resumable
 from blast_env.cli.targets import Target
@@ -73,6 +75,7 @@ def evaluate(
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
     json_all: JsonAllOption = False,
@@ -98,7 +101,7 @@ def evaluate(
         seeds=drawn,
         is_json=any_json(as_json, json_all),
     )
-    with resumable(resume_words(cache)):
+    with running_on(cluster), resumable(resume_words(cache)):
         if run is not None:
             _evaluate_run(run, layout, scenario, options)
         elif layout is not None:

@@ -1,7 +1,8 @@
 """Options that commands and studies share, with one name and one meaning in all."""
 
-from collections.abc import Collection
-from contextlib import suppress
+import logging
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -10,6 +11,8 @@ from typing import Annotated, Any, Final
 import typer
 
 from blast_env.cli.command import checked_first
+from blast_env.cli.output import message_console
+from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, draw_threats, one_of_each_charge
@@ -17,7 +20,7 @@ from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAM
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
 from blast_env.site.sections import PointM
-from blast_env.values import plain_number
+from blast_env.values import plain_number, printable
 
 SCENARIO_HELP: Final = "Bundled name, or a scenario file."
 ENGINE_HELP: Final = (
@@ -101,6 +104,14 @@ CvarOption = Annotated[
     ),
 ]
 ProcessesOption = Annotated[int, typer.Option("--processes", help="Worker processes.", min=1)]
+ClusterAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        help="Address or scheduler file of a Dask cluster, which then runs the blasts in the place "
+        "of worker processes (docs/howto/cluster.md).",
+    ),
+]
 CacheOption = Annotated[
     Path | None,
     typer.Option(
@@ -120,6 +131,21 @@ def any_json(as_json: bool, json_all: bool) -> bool:
     if as_json and json_all:
         raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
     return as_json or json_all
+
+
+@contextmanager
+def running_on(cluster: str | None) -> Iterator[None]:
+    """Run the blasts of this block on a cluster, if one is given; see `on_cluster`."""
+    if cluster is None:
+        yield
+        return
+    # Dask logs the fate of its workers; `on_cluster` turns serious losses into errors.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    with on_cluster(cluster) as size:
+        now = f"{size.workers} workers with {size.threads} threads now"
+        text = f"cluster {cluster}: {now if size.workers else 'waits for the first worker'}"
+        message_console().print(printable(text))
+        yield
 
 
 def resume_words(cache: Path | None) -> str:

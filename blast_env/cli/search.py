@@ -20,6 +20,7 @@ from blast_env.cli.options import (
     CellOption,
     CellsOption,
     ChargeOption,
+    ClusterAddress,
     CvarOption,
     EngineChoice,
     GivenCharge,
@@ -27,6 +28,7 @@ from blast_env.cli.options import (
     TntOption,
     refuse_given,
     resume_words,
+    running_on,
 )
 from blast_env.cli.output import (
     LAYOUT_NAME,
@@ -98,12 +100,12 @@ PACKAGE: Final = PackageProposer().name
 _PROPOSAL: Final = "this proposal"
 _NOTHING: Final = "no barrier"
 _SURROGATE: Final = "surrogate"
-_NOT_OF_THE_SEARCH: Final = ("processes", "cache", "out", "held_out", "verify")
+_NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out", "verify")
 """Options that do not affect the layout."""
 
 _WITH_BLASTS: Final = (
     *("seed", "threat", "threats", "realisations", "risk", "cvar_level", "engine", "cell_m"),
-    *("start_from", "surrogate", "held_out", "cache"),
+    *("start_from", "surrogate", "held_out", "cluster", "cache"),
 )
 """Options of the searches by blasts alone."""
 
@@ -156,6 +158,7 @@ def search(
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     processes: ProcessesOption = 1,
+    cluster: ClusterAddress = None,
     cache: CacheOption = None,
 ) -> None:
     """Search for the layout with the least load on the protected structures.
@@ -178,7 +181,7 @@ def search(
         return
     if verify:
         raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
-    with resumable(resume_words(cache)):
+    with running_on(cluster), resumable(resume_words(cache)):
         site, used = load_scenario(scenario), find_engine(engine, cell_m, cells=cells)
         if out is not None:
             make_folder(out)

@@ -14,7 +14,9 @@ from blast_env.cli.options import (
     ENGINE_HELP,
     CellOption,
     CellsOption,
+    ClusterAddress,
     refuse_given,
+    running_on,
 )
 from blast_env.cli.output import (
     LAYOUT_PICTURE,
@@ -43,7 +45,7 @@ _DEFAULT_SCENARIO: Final = "courtyard"
 _ENGINE_HELP: Final = f"{ENGINE_HELP} surrogate guesses them."
 _SETTINGS: Final = ("steps", "seed", "threat", "engine", "observation", "cell_m", "cells")
 """Options that are settings of a run."""
-_WITH_RESUME: Final = ("resume", "scenario")
+_WITH_RESUME: Final = ("resume", "scenario", "cluster")
 """Options allowed with `--resume`; the run folder fixes the others."""
 
 
@@ -91,14 +93,15 @@ def train(
         None, help="Run folder with the initial weights (its best), for a scenario of this size."
     ),
     resume: Path | None = typer.Option(
-        None, help="Resume the run of this folder; no other option."
+        None, help="Resume the run of this folder; no other option but --cluster."
     ),
+    cluster: ClusterAddress = None,
 ) -> None:
     """Train an agent that proposes layouts, or resume an interrupted training."""
     folder = resume or run
     if folder is None:
         raise BlastEnvError("--run is missing: the folder for the run (or --resume)")
-    with resumable(partial(_how_to_resume, folder)):
+    with running_on(cluster), resumable(partial(_how_to_resume, folder)):
         if resume is not None:
             fixed = {each.name or "" for each in context.command.params} - {*_WITH_RESUME}
             refuse_given(context, fixed, "cannot be changed with --resume: the run folder fixes it")

@@ -30,9 +30,10 @@ class BlastBarrierVectorEnv(PlainSpec, VectorEnv[Any, IntArray, NDArray[Any]]):
     """Barrier environments that are computed together, in one process.
 
     Masks and observations are arrays over the environments. The blasts of all episodes that end in
-    a step run together: by the surrogate in one pass of its networks. Episodes are those of
-    `BlastBarrierEnv` with the same seeds, to the last bit. In the final information, `blasts`,
-    `cache_hits` and `cache_hit_rate` count those of all environments, which share a cache.
+    a step run together: by the surrogate in one pass of its networks, by other engines on the
+    workers of `on_cluster`. Episodes are those of `BlastBarrierEnv` with the same seeds, to the
+    last bit. In the final information, `blasts`, `cache_hits` and `cache_hit_rate` count those of
+    all environments, which share a cache.
 
     Args:
         num_envs: Number of environments.

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from blast_env.arrays import FloatArray
+from blast_env.cli.options import ClusterAddress, running_on
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import random_layout, wall_near_building, wall_near_charge
 from blast_env.evaluation.engines.gas import GasBlast
@@ -96,9 +97,10 @@ def endings(
     ] = 17,
     times: Annotated[float, typer.Option(min=1.0, help="Length of the longer runs.")] = 4.0,
     processes: Processes = 1,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Print the loads that runs miss, against longer runs, for two layouts per site."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         jobs = {
             (title, name): GasBlast(site, layout, engine=engine)
             for title, site, engine in sites(generated)
@@ -232,9 +234,10 @@ def cells(
         float | None, typer.Option(help="m, for none and the first three layouts only.")
     ] = None,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Print the effect of cell size on loads, reductions and the order of layouts."""
-    with user_errors():
+    with user_errors(), running_on(cluster):
         site = yard() if scenario == YARD else load_scenario(scenario)
         charge = draw_charge(site, 0)
         run = partial(cell_loads, site, charge=charge, processes=processes)
@@ -328,12 +331,13 @@ def judge(
     charges: Annotated[int, typer.Option(min=1)] = 3,
     seeds: Annotated[int, typer.Option(min=1)] = 4,
     processes: Processes = 2,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Judge the presets of the particle model by gas dynamics: order, overstatement, regret.
 
     Layouts are random ones and the two walls by rule, under charges drawn from the scenario.
     """
-    with user_errors():
+    with user_errors(), running_on(cluster):
         chosen = load_scenario(scenario)
         rng = np.random.default_rng(0)
         drawn = [draw_charge(chosen, seed) for seed in range(charges)]

@@ -1,6 +1,7 @@
 """What training changes about the environment: the reward, and which episodes there are."""
 
 import gymnasium as gym
+import joblib
 import numpy as np
 import pytest
 from blast_agents.training import TrainingSettings, load_hyperparameters
@@ -8,6 +9,7 @@ from blast_agents.training.environments import (
     SITES_ID,
     EnvironmentMaker,
     ThreatPool,
+    make_environments,
 )
 from blast_agents.training.run_folder import RunConfiguration
 from stable_baselines3.common.vec_env import DummyVecEnv
@@ -105,18 +107,20 @@ def test_environments_whose_blasts_run_together_are_those_that_run_their_own() -
     )
     source = scenario_source(small_scenario())
     alone = DummyVecEnv([EnvironmentMaker(configuration, source, index) for index in range(3)])
-    together = EnvironmentMaker(configuration, source, 0).batch()
-    for env in (alone, together):
-        env.seed(7)
-    np.testing.assert_array_equal(alone.reset(), together.reset())
-    rng, ended = np.random.default_rng(0), 0
-    for _ in range(14):
-        masks = together.env_method("action_masks")
-        actions = np.array([rng.choice(np.flatnonzero(mask)) for mask in masks])
-        actions[0] = 0  # illegal after the first step
-        for one, other in zip(alone.step(actions), together.step(actions), strict=True):
-            np.testing.assert_equal(_without_clock(one), _without_clock(other))
-        ended += int(alone.buf_dones.sum())
+    with joblib.parallel_config("threading", n_jobs=2):
+        together = make_environments(configuration, source)
+        assert not isinstance(together, DummyVecEnv)
+        for env in (alone, together):
+            env.seed(7)
+        np.testing.assert_array_equal(alone.reset(), together.reset())
+        rng, ended = np.random.default_rng(0), 0
+        for _ in range(14):
+            masks = together.env_method("action_masks")
+            actions = np.array([rng.choice(np.flatnonzero(mask)) for mask in masks])
+            actions[0] = 0  # illegal after the first step
+            for one, other in zip(alone.step(actions), together.step(actions), strict=True):
+                np.testing.assert_equal(_without_clock(one), _without_clock(other))
+            ended += int(alone.buf_dones.sum())
     assert ended >= 6
 
 

@@ -24,6 +24,7 @@ from blast_agents.training.run_folder import (
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
 from blast_env.app.work import ReportTask, read_task, write_task
+from blast_env.cluster import address_of
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad
@@ -223,6 +224,13 @@ def _task(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, lambda _: read_task(folder)))
 
 
+def _scheduler(folder: Path) -> Format:
+    record = {"type": "Scheduler", "id": "Scheduler-1", "address": "tcp://10.0.0.1:8786"}
+    sample = json.dumps({**record, "services": {"dashboard": 8787}, "workers": {}}, indent=2)
+    path = folder / "scheduler.json"
+    return Format((sample.encode(),), _from_file(path, lambda path: address_of(str(path))))
+
+
 FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
     {
         "scenario": _scenario,
@@ -240,6 +248,7 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "collisions (Parquet)": _parquet,
         "page: design": _design,
         "page: task": _task,
+        "scheduler file": _scheduler,
     }
 )
 """By names for a table; each is made in a folder of its own."""

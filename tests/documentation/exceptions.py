@@ -54,7 +54,7 @@ _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
 GIVEN: Final = (
     Given(("docs/start.md",), "depot.toml", "docs/data/depot.toml"),
     Given(
-        ("docs/howto/pictures.md", "docs/engineers/gas.md"),
+        ("docs/howto/pictures.md", "docs/engineers/gas.md", "docs/howto/cluster.md"),
         "wall.json",
         "wall/layout.json",
         _WALL,
@@ -80,6 +80,17 @@ SERVERS: Final = {
     "tensorboard --logdir runs/courtyard/tensorboard": Server(6006),
 }
 
+BACKGROUND: Final = {
+    "docs/howto/cluster.md": (
+        "dask scheduler --host 127.0.0.1 --scheduler-file dask.json --no-dashboard",
+        "dask worker --scheduler-file dask.json --nworkers 1 --nthreads 1 --no-dashboard",
+    )
+}
+"""What runs beside all commands of a page, in the place of what a reader has elsewhere."""
+
+_CLUSTER: Final = "--cluster dask.json"
+
+
 SMALLER: Final[dict[str, str]] = {
     # README.md
     "blast-env evaluate --layout found/layout.json --scenario visitor_entrance --seeds 4": (
@@ -101,6 +112,16 @@ SMALLER: Final[dict[str, str]] = {
     ),
     "blast-env report site.toml --layout layout.json --out report.html --limit Pump_House=300,60"
     " --charge 5,9,100": "--places 1 --stills 1 --no-items",
+    "blast-env search --engine gas --method genetic --budget 2000 --cache blasts"
+    " --cluster tcp://login1:8786": (
+        f"--scenario visitor_entrance --budget 4 --held-out 1 {_CLUSTER}"
+    ),
+    "blast-env evaluate --engine gas --layout wall.json --seeds 1000 --cluster dask.json": (
+        "--seeds 1 --cell 0.5"
+    ),
+    "blast-env train --engine gas --envs 64 --cluster tcp://login1:8786 --run runs/gas": (
+        f"{_TRAIN} --engine event {_CLUSTER}"
+    ),
     # docs/engineers/gas.md, docs/howto/pictures.md
     "blast-env search --scenario my_site.toml --engine gas --cells coarse --out found": (
         "--budget 2 --held-out 1"
@@ -234,6 +255,7 @@ NOT_RUN: Final[dict[str, str]] = {
 CODE_OF_THE_BUILD: Final = {
     "docs/researchers/benchmark.md": "a dozen blasts of gas dynamics",
     "docs/engineers/gas.md": "three blasts of gas dynamics on a large site",
+    "docs/howto/cluster.md": "needs a cluster, which runs beside the page's commands",
     "docs/researchers/training.md": "needs the agent that the page's commands train",
 }
 """Pages whose code `make docs` runs and `make test` compiles only, and why."""

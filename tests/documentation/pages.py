@@ -24,6 +24,8 @@ OTHERS: Final = {
     "source": "changes the shell that it is given to",
     "mkdir": "belongs to docker",
     "docker": "no container tool here",
+    "dask": "runs until it is stopped; tests/test_cluster.py has a cluster",
+    "sbatch": "needs Slurm",
     "tensorboard": "runs until it is stopped",
 }
 """Other programs that pages show, and why their lines are not run."""
@@ -66,7 +68,7 @@ class Command:
             return self.words[1:] == ("-m", "blast_env")
         if len(self.words) == 2:
             return not self.words[1].startswith("-")
-        named = ("--run", "--export", "--screen", "--capacity")
+        named = ("--run", "--export", "--cluster", "--screen", "--capacity")
         return self.words[2:] in [(name,) for name in named]
 
     def __str__(self) -> str:

@@ -12,7 +12,8 @@ import socket
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
@@ -23,6 +24,7 @@ from typing import Annotated, Final
 import typer
 
 from tests.documentation.exceptions import (
+    BACKGROUND,
     CODE_NOT_RUN,
     GIVEN,
     NOT_RUN,
@@ -199,14 +201,32 @@ def provide(page: str, folder: Path, kept: Path) -> None:
             shutil.copy(source / given.made, target)
 
 
+@contextmanager
+def beside(page: str, folder: Path) -> Iterator[None]:
+    """Keep running what a page's commands need beside them."""
+    running = [
+        subprocess.Popen(
+            shlex.split(line), cwd=folder, env=environment(), stderr=subprocess.DEVNULL
+        )
+        for line in BACKGROUND.get(page, ())
+    ]
+    try:
+        yield
+    finally:
+        for process in reversed(running):
+            process.send_signal(signal.SIGTERM)
+            process.wait(30)
+
+
 def run_page(name: str, steps: Sequence[Step], kept: Path, tally: Tally) -> None:
     """Run steps in a folder of the page's own, which is thrown away."""
     with TemporaryDirectory() as scratch:
         page = Page(Path(scratch))
         copy_checkout(page.folder)
         provide(name, page.folder, kept)
-        for step in steps:
-            run_and_tell(step, page, tally)
+        with beside(name, page.folder):
+            for step in steps:
+                run_and_tell(step, page, tally)
 
 
 def run_and_tell(step: Step, page: Page, tally: Tally) -> None:

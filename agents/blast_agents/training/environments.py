@@ -25,6 +25,7 @@ from blast_env.envs.strategies import ScenarioSource
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.store import BlastStore
+from blast_env.runner import workers_told
 from blast_env.sites import FAMILIES
 from blast_env.values import checked_seed, whole_number
 
@@ -103,8 +104,9 @@ def environment_id(scenario: str) -> str:
 class BatchVecEnv(VecEnv):
     """A `BlastBarrierVectorEnv` for algorithms of stable-baselines3, masked ones included.
 
-    It suits engines that compute many blasts at once. Observations, rewards and masks are those of
-    any other vector of the same environments.
+    It suits engines that compute many blasts at once, and workers of `on_cluster`, to which the
+    blasts of all episodes that end in a step are sent together. Observations, rewards and masks are
+    those of any other vector of the same environments.
 
     Args:
         envs: The environments, with the autoreset mode `"Disabled"`.
@@ -268,11 +270,12 @@ class EnvironmentMaker:
 def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
     """Return the parallel environments, each in a separate process if there are several.
 
-    They are a batch in this process where the engine computes many blasts at once.
+    They are a batch in this process where the engine computes many blasts at once, and within
+    `on_cluster`, whose workers run their blasts.
     """
     count = configuration.ppo.n_envs
     engine = configuration.settings.blast_engine
-    if count > 1 and engine.at_once > 1:
+    if workers_told() > 1 or (count > 1 and engine.at_once > 1):
         return EnvironmentMaker(configuration, source, 0).batch()
     makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]
     if count == 1:

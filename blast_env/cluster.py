@@ -1,0 +1,267 @@
+"""Work on other machines: a joblib backend for a Dask cluster.
+
+It replaces joblib's Dask backend, which waits for ever for work whose worker was killed too often
+or whose scheduler has gone, and submits no more work than the workers present at the start can do.
+"""
+
+import asyncio
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import joblib
+from joblib.parallel import ParallelBackendBase, SequentialBackend
+
+from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.errors import BlastEnvError, import_extra, value_text
+from blast_env.provenance import code_digest, versions
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+_CONNECT_S: Final = 10.0
+_UNDER_WAY: Final = 500
+"""Least number of submitted pieces of work, so that workers that join later find some."""
+_OWN: Final = ("blast_env", "blast_agents")
+_OTHERS: Final = ("numba", "numpy", "pymoo", "pymunk", "scipy")
+"""Packages on which the bits of a result may depend."""
+
+
+class ClusterSize(NamedTuple):
+    """The present size of a cluster, which may grow.
+
+    Attributes:
+        workers: Number of worker processes.
+        threads: Number of their threads; each does one piece of work at a time.
+    """
+
+    workers: int
+    threads: int
+
+
+@contextmanager
+def on_cluster(address: str | Path) -> Iterator[ClusterSize]:
+    """Run the work of `blast_env.runner` in this block on the workers of a Dask cluster.
+
+    Results equal those of this machine and are kept here as soon as they arrive. The work of a
+    worker that dies is done again by another. Workers must have the code and the versions of this
+    process; a worker with others refuses the work.
+
+    Args:
+        address: Address of the scheduler, e.g. `"tcp://login1:8786"`, or path of its scheduler
+            file.
+
+    Yields:
+        The size of the cluster.
+
+    Raises:
+        MissingExtraError: If the extra `cluster` is not installed.
+        BlastEnvError: If no scheduler answers. In the block, from the runner: if the connection
+            is lost, or the same piece of work has killed several workers in turn.
+    """
+    client = _connect(str(address))
+    try:
+        threads = client.ncores()
+        with joblib.parallel_config(backend=ClusterBackend(client), n_jobs=-1):
+            yield ClusterSize(len(threads), sum(threads.values()))
+    finally:
+        client.close(timeout=_CONNECT_S)
+
+
+def _connect(address: str) -> "Client":
+    with import_extra("cluster", "work on a cluster"):
+        from distributed import Client
+
+    scheduler = address_of(address)
+    try:
+        # A client that finds no scheduler leaves a thread behind, so try a connection first.
+        with ThreadPoolExecutor(1) as pool:  # in a notebook this thread has an event loop already
+            pool.submit(asyncio.run, _knock(scheduler)).result()
+        return Client(scheduler, timeout=_CONNECT_S, set_as_default=False, name="blast-env")
+    except (OSError, ValueError, TypeError) as error:  # no answer; no address
+        raise BlastEnvError(
+            f"cluster {value_text(address)}: no scheduler answers: {error}"
+        ) from error
+
+
+@dataclass(frozen=True)
+class _SchedulerFile:
+    """The only part of a scheduler file that is read."""
+
+    address: str
+
+
+def address_of(scheduler: str) -> str:
+    """Return the address of a scheduler.
+
+    Args:
+        scheduler: The address, or the path of its scheduler file.
+
+    Raises:
+        BlastEnvError: If a scheduler file cannot be read.
+    """
+    if not os.path.isfile(scheduler):
+        return scheduler
+    try:
+        return checked_as(_SchedulerFile, parse_json(read_text(Path(scheduler)))).address
+    except DocumentError as error:
+        raise BlastEnvError(
+            f"cluster {value_text(scheduler)}: is no scheduler file: {error}"
+        ) from error
+
+
+async def _knock(address: str) -> None:
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    comm = await connect(address, _CONNECT_S, **Security().get_connection_args("client"))
+    await comm.close()
+
+
+class _Done(NamedTuple):
+    """A finished piece of work, and the callback for its outcome."""
+
+    future: "Future"
+    tell: Callable[["_Outcome"], None]
+
+
+class _Outcome(NamedTuple):
+    """The result of a piece of work, or its error."""
+
+    result: Any = None
+    error: BaseException | None = None
+
+
+class ClusterBackend(ParallelBackendBase):
+    """Submits each piece of work separately; fetches all finished results together.
+
+    Args:
+        client: A client connected to the scheduler.
+    """
+
+    supports_retrieve_callback = True
+    default_n_jobs = -1
+
+    def __init__(self, client: "Client") -> None:
+        super().__init__(nesting_level=0)
+        self._client = client
+        self._done: SimpleQueue[_Done | None] = SimpleQueue()
+        self._under_way: set[Future] = set()
+
+    def effective_n_jobs(self, n_jobs: int | None) -> int:  # noqa: ARG002
+        """Return the number of pieces of work to keep submitted; `n_jobs` does not change it."""
+        threads: int = sum(self._client.ncores().values())
+        return max(2 * threads, _UNDER_WAY)
+
+    def start_call(self) -> None:
+        """Start a thread that fetches results until `stop_call`."""
+        self._done = SimpleQueue()
+        Thread(target=self._fetch, args=(self._done,), daemon=True).start()
+
+    def stop_call(self) -> None:
+        """Stop fetching results."""
+        self._done.put(None)
+
+    def submit(self, func: Callable[[], Any], callback: Callable[[_Outcome], None]) -> "Future":
+        """Submit a piece of work; `callback` is called with its outcome."""
+        future = self._client.submit(_do, func, _origin(), pure=False)
+        self._under_way.add(future)
+        done = self._done
+        future.add_done_callback(lambda future: done.put(_Done(future, callback)))
+        return future
+
+    def retrieve_result_callback(self, outcome: _Outcome) -> Any:
+        """Return the result of a piece of work, or raise its error."""
+        if outcome.error is not None:
+            raise _known(outcome.error)
+        return outcome.result
+
+    def abort_everything(self, ensure_ready: bool = True) -> None:  # noqa: ARG002
+        """Cancel all work that has not begun; workers finish their present piece."""
+        under_way, self._under_way = self._under_way, set()
+        self._client.cancel(list(under_way))
+
+    def get_nested_backend(self) -> tuple[ParallelBackendBase, None]:
+        """Return a sequential backend: a piece of work does not distribute its parts."""
+        return SequentialBackend(nesting_level=1), None
+
+    def _fetch(self, queue: "SimpleQueue[_Done | None]") -> None:
+        """Fetch results, all that are ready at a time, until `stop_call` ends the queue."""
+        is_over = False
+        while not is_over:
+            taken = [queue.get()]
+            while not queue.empty():
+                taken.append(queue.get())
+            done = [each for each in taken if each is not None]
+            is_over = len(done) < len(taken)
+            for (future, tell), outcome in zip(done, self._outcomes(done), strict=True):
+                self._under_way.discard(future)
+                tell(outcome)
+
+    def _outcomes(self, done: Sequence[_Done]) -> list[_Outcome]:
+        futures = [future for future, _ in done]
+        if all(future.status == "finished" for future in futures):
+            try:
+                return [_Outcome(result) for result in self._client.gather(futures)]
+            except Exception:  # one was lost meanwhile; each is fetched separately below
+                pass
+        return [_outcome(future) for future in futures]
+
+
+def _outcome(future: "Future") -> _Outcome:
+    try:
+        return _Outcome(future.result())
+    except Exception as error:
+        return _Outcome(error=error)
+
+
+def _known(error: BaseException) -> BaseException:
+    """Return an error of the cluster as a `BlastEnvError` with the cause; any other unchanged."""
+    from distributed import KilledWorker
+    from distributed.comm import CommClosedError
+
+    if isinstance(error, KilledWorker):
+        reworded = BlastEnvError(
+            f"cluster: one task has ended {error.allowed_failures + 1} workers, for lack "
+            f"of memory or because they were killed; the last one was {error.last_worker.address}"
+        )
+    elif isinstance(error, CancelledError | CommClosedError):
+        reworded = BlastEnvError(
+            "cluster: the connection to the scheduler was lost; results so far are kept if the "
+            "command has a folder for them, and the same command resumes"
+        )
+    else:
+        return error
+    reworded.__cause__ = error
+    return reworded
+
+
+def _do(work: Callable[[], Any], origin: str) -> Any:
+    """Do a piece of work, on a worker with the code and versions of the submitting process."""
+    if _origin() != origin:
+        raise BlastEnvError(
+            f"cluster: a worker has {_origin()}, must have that of the submitter: {origin}"
+        )
+    return work()
+
+
+@cache
+def _origin() -> str:
+    """Return the code digests and versions on which the result of a piece of work depends."""
+    specs = (find_spec(name) for name in _OWN)
+    folders = (Path(spec.origin).parent for spec in specs if spec is not None and spec.origin)
+    known = versions(packages=_OTHERS)
+    return ", ".join(
+        [
+            f"blast-env {known['blast_env']}+{'+'.join(map(code_digest, folders))}",
+            *(f"{name} {known[name]}" for name in _OTHERS),
+        ]
+    )
