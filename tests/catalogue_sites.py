@@ -4,6 +4,8 @@ from typing import Any
 
 from blast_env.geometry import Layout, Piece
 from blast_env.site import Scenario
+from tests import builders
+from tests.builders import block, point
 
 WALL: Layout = (Piece(5, 1, "wall", True), Piece(8, 1, "wall", True), Piece(4, 1, "post"))
 """Two walls in line before the building, and a post beside them."""
@@ -28,31 +30,10 @@ def yard_document(**zone: Any) -> dict[str, Any]:
     Args:
         zone: Other keys of the build zone.
     """
-    return {
-        "schema_version": 2,
-        "name": "walled_yard",
-        "site": {"width_m": 12.0, "height_m": 12.0, "air_height_m": 5.0},
-        "charge": [{"kind": "point", "position_m": [2.0, 6.0], "tnt_kg": 5.0}],
-        "build_zone": {
-            "corner_m": [3.5, 2.5],
-            "rows": 14,
-            "columns": 6,
-            "budget": 20.0,
-            "items": ITEMS,
-            **zone,
-        },
-        "structures": [
-            {
-                "kind": "ModularObstacle",
-                "name": "hut",
-                "corner_m": [7.5, 4.5],
-                "rows": 6,
-                "columns": 6,
-                "height_m": 2.5,
-                "protected": True,
-            }
-        ],
-    }
+    cells = builders.zone(3.5, 2.5, 14, 6, budget=20.0, items=ITEMS) | zone
+    hut = block("hut", 7.5, 4.5, 6, 6, height_m=2.5, protected=True)
+    charge = point(2.0, 6.0, 5.0)
+    return builders.site_document("walled_yard", (12.0, 12.0, 5.0), charge, hut, build_zone=cells)
 
 
 def yard(**zone: Any) -> Scenario:

@@ -31,7 +31,7 @@ os.environ.pop("COLUMNS", None)
 multiprocessing.get_start_method()
 
 
-hypothesis.settings.register_profile("quick", max_examples=30)
+hypothesis.settings.register_profile("quick", max_examples=30, deadline=None)
 hypothesis.settings.load_profile("quick")
 
 

@@ -7,6 +7,8 @@ import pandas as pd
 
 from blast_env.evaluation.engines.gas import GasResult
 from blast_env.site import Scenario
+from tests import builders
+from tests.builders import block, point, zone
 
 WALL = tuple((row, 0) for row in range(6))
 """In front of the building, between it and the charge."""
@@ -14,34 +16,18 @@ WALL = tuple((row, 0) for row in range(6))
 
 def site_document(**changes: Any) -> dict[str, Any]:
     """Return a charge of 5 kg in the west, a zone of 2 x 6 cells, a hut in the east."""
-    return {
-        "schema_version": 2,
-        "name": "hut",
-        "site": {"width_m": 10.0, "height_m": 8.0, "air_height_m": 5.0},
-        "charge": [{"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 5.0}],
-        "build_zone": {
-            "corner_m": [4.0, 2.5],
-            "rows": 6,
-            "columns": 2,
-            "stock": 6,
-            "height_m": 1.5,
-        },
-        "structures": [
-            {
-                "kind": "ModularObstacle",
-                "name": "hut",
-                "corner_m": [6.0, 3.0],
-                "rows": 4,
-                "columns": 4,
-                "height_m": 2.0,
-                "protected": True,
-            }
-        ],
-        "gauges": [
+    document = builders.site_document(
+        "hut",
+        (10.0, 8.0, 5.0),
+        point(2.0, 4.0, 5.0),
+        block("hut", 6.0, 3.0, 4, 4, height_m=2.0, protected=True),
+        build_zone=zone(4.0, 2.5, 6, 2, stock=6, height_m=1.5),
+        gauges=[
             {"name": "front", "position_m": [5.75, 4.25, 0.25]},
             {"name": "behind", "position_m": [9.0, 4.25, 0.25]},
         ],
-    } | changes
+    )
+    return document | changes
 
 
 def hut(**changes: Any) -> Scenario:

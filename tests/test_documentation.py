@@ -11,6 +11,7 @@ import re
 import shlex
 from pathlib import Path
 from textwrap import dedent
+from types import ModuleType
 
 import gymnasium as gym
 import pytest
@@ -18,7 +19,7 @@ import typer
 from typer import Typer
 
 from blast_env.cli import app
-from blast_env.envs import simulator_env
+from blast_env.envs import barrier_env, simulator_env
 from tests.documentation import exceptions
 from tests.documentation.pages import (
     COMMANDS,
@@ -50,14 +51,14 @@ def test_the_code_of_a_page_runs(
         shorter = exceptions.CODE_SHORTENED.get((page, block.number), ("", ""))
         assert shorter[0] in block.source
         compiled = compile(block.source.replace(*shorter), str(block), "exec")
-        known = (page, block.number) in exceptions.CODE_NOT_RUN
-        if page not in exceptions.CODE_OF_THE_BUILD and not known:
+        if page not in exceptions.CODE_OF_THE_BUILD:
             exec(compiled, names)
 
 
 @pytest.mark.slow
-def test_examples_in_the_environment_s_docstring() -> None:
-    failures, tried = doctest.testmod(simulator_env)
+@pytest.mark.parametrize("module", [barrier_env, simulator_env])
+def test_examples_in_docstrings_of_environments(module: ModuleType) -> None:
+    failures, tried = doctest.testmod(module)
     assert tried > 5
     assert failures == 0
 
@@ -129,7 +130,7 @@ def test_exceptions_stand_for_commands_and_code_that_the_pages_show() -> None:
     assert {*exceptions.SMALLER, *exceptions.NOT_RUN} <= LINES
     assert {*exceptions.SERVERS} <= shown
     blocks = {(each.page, each.number) for page in CODE for each in CODE[page]}
-    assert {*exceptions.CODE_NOT_RUN, *exceptions.CODE_SHORTENED} <= blocks
+    assert {*exceptions.CODE_SHORTENED} <= blocks
     assert {*exceptions.CODE_OF_THE_BUILD} <= {*WITH_CODE}
     assert {*exceptions.BACKGROUND} | {
         page for each in exceptions.GIVEN for page in each.pages

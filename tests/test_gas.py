@@ -17,6 +17,7 @@ from blast_env.gas.tables import FACE_COLUMNS
 from blast_env.particles.parquet import read_parquet
 from blast_env.particles.run import EndReason
 from blast_env.site.scene import Charge
+from tests.builders import block
 from tests.gas_sites import WALL, hut
 
 HUT = hut()
@@ -116,14 +117,7 @@ def test_a_run_ends_when_its_loads_are_known(unprotected: GasResult) -> None:
     assert not cut.structures["known"].any()
 
 
-SHED = {
-    "kind": "ModularObstacle",
-    "name": "shed",
-    "corner_m": [4.5, 6.0],
-    "rows": 2,
-    "columns": 2,
-    "height_m": 2.0,
-}
+SHED = block("shed", 4.5, 6.0, 2, 2, height_m=2.0)
 
 
 @pytest.fixture(scope="module")

@@ -22,6 +22,7 @@ import pytest
 from blast_env.evaluation.engines import simulate
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.site.parameters import parameters_digest
+from tests.builders import block, site, square, zone
 from tests.digests import CONDITIONS, Condition, need_the_same_bits
 
 LAYOUT: Final = ((4, 0), (5, 0), (6, 1))
@@ -52,49 +53,20 @@ def sparse_courtyard() -> Scenario:
 
 def dense_yard() -> Scenario:
     """Return a small yard in dense air, with friction, spin and modules that break."""
-    return Scenario.from_document(
-        {
-            "schema_version": 2,
-            "name": "dense_yard",
-            "site": {"width_m": 24.0, "height_m": 18.0},
-            "charge": [
-                {"kind": "rectangle", "corner_m": (4.0, 7.0), "size_m": (1.0, 4.0), "tnt_kg": 20.0}
-            ],
-            "structures": [
-                {
-                    "kind": "ModularObstacle",
-                    "name": "house",
-                    "corner_m": (14.0, 6.0),
-                    "rows": 12,
-                    "columns": 4,
-                    "protected": True,
-                    "module_capacity": 2000.0,
-                },
-                {
-                    "kind": "ConcreteSquare",
-                    "name": "shed",
-                    "corner_m": (8.0, 14.0),
-                    "side_modules": 4,
-                },
-            ],
-            "build_zone": {
-                "corner_m": (8.0, 5.0),
-                "rows": 12,
-                "columns": 4,
-                "stock": 6,
-                "module_capacity": 1000.0,
-            },
-            "simulation": {
-                "preset": "ballistic",
-                "overrides": {
-                    "air": {"spacing_units": 3.4, "mass": 0.2, "elasticity": 0.97, "friction": 0.6},
-                    "explosive": {"ball_count": 240, "elasticity": 0.97, "friction": 0.4},
-                    "contact": {"module_friction": 0.5, "base_impulse": 1.0},
-                    "stepping": {"time_limit_s": 0.1},
-                },
-            },
-        },
+    overrides = {
+        "air": {"spacing_units": 3.4, "mass": 0.2, "elasticity": 0.97, "friction": 0.6},
+        "explosive": {"ball_count": 240, "elasticity": 0.97, "friction": 0.4},
+        "contact": {"module_friction": 0.5, "base_impulse": 1.0},
+        "stepping": {"time_limit_s": 0.1},
+    }
+    return site(
         "dense_yard",
+        (24.0, 18.0),
+        {"kind": "rectangle", "corner_m": (4.0, 7.0), "size_m": (1.0, 4.0), "tnt_kg": 20.0},
+        block("house", 14.0, 6.0, 12, 4, protected=True, module_capacity=2000.0),
+        square("shed", 8.0, 14.0, 4),
+        build_zone=zone(8.0, 5.0, 12, 4, stock=6, module_capacity=1000.0),
+        simulation={"preset": "ballistic", "overrides": overrides},
     )
 
 

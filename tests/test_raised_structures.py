@@ -17,6 +17,7 @@ from blast_env.plots.plan import structure_features
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
+from tests.builders import block
 from tests.gas_sites import site_document
 from tests.io.importing.maps import charge, outline, rectangle, written
 from tests.vehicle_sites import gate_site, vehicle_of
@@ -29,9 +30,9 @@ def raised(
 ) -> dict[str, Any]:
     """Return a structure, 2 m along y and half a metre along x unless said otherwise."""
     keys = {"name": "canopy", "rows": 4, "columns": 1, **keys}
-    top = {} if height_m is None else {"height_m": height_m}
-    size = {"corner_m": corner_m, "base_m": base_m, **top}
-    return {"kind": "ModularObstacle", **size, **keys}
+    if height_m is not None:
+        keys["height_m"] = height_m
+    return block(x_m=corner_m[0], y_m=corner_m[1], base_m=base_m, **keys)
 
 
 def hut_with(*structures: dict[str, Any], **changes: Any) -> Scenario:

@@ -21,10 +21,12 @@ from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import build_site, vehicle_drive
 from blast_env.plots.plan import Kinds, on_levels, site_features
-from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.site import Scenario, ScenarioError
 from blast_env.site.heights import highest_top_m
 from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
+from tests import builders
+from tests.builders import block, point, zone
 from tests.catalogue_sites import item
 from tests.gas_sites import column, net_on_modules
 from tests.io.importing.maps import charge, outline, rectangle, written
@@ -33,27 +35,10 @@ from tests.vehicle_sites import gate_site, vehicle_document, vehicle_of
 
 ENGINE = GasEngine(border_m=0.0)
 
-TERRACE: dict[str, Any] = {
-    "kind": "ModularObstacle",
-    "name": "podium",
-    "corner_m": [6.0, 2.0],
-    "rows": 16,
-    "columns": 14,
-    "height_m": 1.0,
-    "carries": True,
-}
+TERRACE = block("podium", 6.0, 2.0, 16, 14, height_m=1.0, carries=True)
 """Under the eastern half of the zone."""
 
-HALL = {
-    "kind": "ModularObstacle",
-    "name": "hall",
-    "corner_m": [8.5, 3.5],
-    "rows": 10,
-    "columns": 8,
-    "base_m": 1.0,
-    "height_m": 4.0,
-    "protected": True,
-}
+HALL = block("hall", 8.5, 3.5, 10, 8, base_m=1.0, height_m=4.0, protected=True)
 """On the terrace."""
 
 WALL: Layout = (Piece(3, 4, "wall", True), Piece(7, 4, "wall", True))
@@ -64,28 +49,14 @@ RATING = {"mass_kg": LORRY["mass_kg"], "speed_km_h": 10.0}
 """Of what gives way."""
 
 
-def solid(
-    name: str, x_m: float, y_m: float, rows: int, columns: int, **keys: Any
-) -> dict[str, Any]:
-    size = {"corner_m": [x_m, y_m], "rows": rows, "columns": columns}
-    return {"kind": "ModularObstacle", "name": name, **size, **keys}
-
-
 def site_document(*structures: dict[str, Any], **changes: Any) -> dict[str, Any]:
     """A charge of 5 kg in the west, a zone of 14 x 8 cells, all symmetric about y = 6 m."""
-    return {
-        "schema_version": 2,
-        "name": "terraced",
-        "site": {"width_m": 14.0, "height_m": 12.0, "air_height_m": 6.0},
-        "charge": [{"kind": "point", "position_m": [2.0, 6.0], "tnt_kg": 5.0}],
-        "structures": [HALL, *(structures or (TERRACE,))],
-        "build_zone": {
-            "corner_m": [4.0, 2.5],
-            "rows": 14,
-            "columns": 8,
-            "items": [item("wall", 4, 1, 1.0, stock=4), item("post", 1, 1, 1.5, stock=4)],
-        },
-    } | changes
+    items = [item("wall", 4, 1, 1.0, stock=4), item("post", 1, 1, 1.5, stock=4)]
+    charge, cells = point(2.0, 6.0, 5.0), zone(4.0, 2.5, 14, 8, items=items)
+    found = builders.site_document(
+        "terraced", (14.0, 12.0, 6.0), charge, HALL, *(structures or (TERRACE,)), build_zone=cells
+    )
+    return found | changes
 
 
 def terraced(*structures: dict[str, Any], **changes: Any) -> Scenario:
@@ -116,12 +87,12 @@ def protected() -> GasResult:
 @pytest.mark.parametrize(
     "structures",
     [
-        (TERRACE, solid("parapet", 6.0, 4.0, 8, 1, base_m=1.0, height_m=2.0)),
+        (TERRACE, block("parapet", 6.0, 4.0, 8, 1, base_m=1.0, height_m=2.0)),
         (
             TERRACE | {"corner_m": [6.5, 2.0], "columns": 13},
             TERRACE | {"name": "south", "rows": 4, "columns": 1},
             TERRACE | {"name": "north", "corner_m": [6.0, 8.0], "rows": 4, "columns": 1},
-            solid("parapet", 6.0, 4.0, 8, 1, height_m=2.0),
+            block("parapet", 6.0, 4.0, 8, 1, height_m=2.0),
         ),
     ],
     ids=["a structure on the terrace", "a structure of 2 m beside it"],
@@ -299,7 +270,7 @@ def test_vehicles_stop_at_it_and_meet_nothing_on_it(rated: bool) -> None:
     post = item("post", 1, 1, 1.0, stock=40, **({"crash_rating": RATING} if rated else {}))
     zone = {"corner_m": [4.0, 0.0], "rows": 16, "columns": 4, "items": [post]}
     motion = {"motion": LORRY | {"max_speed_km_h": 60.0, "entry_speed_km_h": 50.0}} if rated else {}
-    strip = solid("strip", 5.0, 0.0, 16, 4, height_m=0.5, carries=True)
+    strip = block("strip", 5.0, 0.0, 16, 4, height_m=0.5, carries=True)
     document = gate_site().model_dump(exclude_none=True)
     document["structures"] = [*document["structures"], strip | {"rows": 12}]
     document |= {"build_zone": zone, "charge": [vehicle_document(**motion)]}
@@ -314,20 +285,6 @@ def test_vehicles_stop_at_it_and_meet_nothing_on_it(rated: bool) -> None:
 
 
 # --- Files and errors.
-
-
-def test_it_survives_saving(tmp_path: Path) -> None:
-    scenario = terraced()
-    path = tmp_path / "terraced.toml"
-    save_scenario(scenario, path)
-    assert path.read_text().count("carries = true") == 1
-    assert load_scenario(path) == scenario
-
-
-def test_what_carries_nothing_has_the_hash_of_before() -> None:
-    plain = {key: each for key, each in TERRACE.items() if key != "carries"}
-    said = terraced(plain | {"carries": False})
-    assert said.content_hash == terraced(plain).content_hash != terraced().content_hash
 
 
 @pytest.mark.parametrize(

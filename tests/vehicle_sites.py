@@ -3,6 +3,8 @@
 from typing import Any
 
 from blast_env.site import Scenario, VehicleSource
+from tests import builders
+from tests.builders import block, zone
 
 POSTS = tuple((row, 0) for row in (0, 3, 6, 9, 12, 15))
 """Posts across the whole site, a metre apart: too narrow for the vehicle of 2 m."""
@@ -20,30 +22,11 @@ def vehicle_document(**changes: Any) -> dict[str, Any]:
 
 def site_document(vehicle: dict[str, Any] | None = None, **changes: Any) -> dict[str, Any]:
     """A site of 14 m x 8 m, a strip of 4 x 16 cells across it, a hut in the east."""
-    return {
-        "schema_version": 2,
-        "name": "gate",
-        "site": {"width_m": 14.0, "height_m": 8.0, "air_height_m": 5.0},
-        "charge": [vehicle_document() if vehicle is None else vehicle],
-        "build_zone": {
-            "corner_m": [4.0, 0.0],
-            "rows": 16,
-            "columns": 4,
-            "stock": 16,
-            "height_m": 1.0,
-        },
-        "structures": [
-            {
-                "kind": "ModularObstacle",
-                "name": "hut",
-                "corner_m": [10.0, 2.0],
-                "rows": 8,
-                "columns": 4,
-                "height_m": 2.0,
-                "protected": True,
-            }
-        ],
-    } | changes
+    charge = vehicle_document() if vehicle is None else vehicle
+    hut = block("hut", 10.0, 2.0, 8, 4, height_m=2.0, protected=True)
+    strip = zone(4.0, 0.0, 16, 4, stock=16, height_m=1.0)
+    document = builders.site_document("gate", (14.0, 8.0, 5.0), charge, hut, build_zone=strip)
+    return document | changes
 
 
 def gate_site(vehicle: dict[str, Any] | None = None, **changes: Any) -> Scenario:

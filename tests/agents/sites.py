@@ -3,6 +3,8 @@
 from typing import Any
 
 from blast_env.site import Scenario
+from tests import builders
+from tests.builders import point, square
 
 SIDE_M = 40.0
 
@@ -13,20 +15,6 @@ def site(
     **zone: Any,
 ) -> Scenario:
     """Return a site of 40 m x 40 m with a building of 4 m x 4 m and a zone of 10 m x 10 m."""
-    document = {
-        "schema_version": 2,
-        "name": "site",
-        "site": {"width_m": SIDE_M, "height_m": SIDE_M},
-        "charge": [{"kind": "point", "position_m": charge_m, "tnt_kg": 100.0}],
-        "structures": [
-            {
-                "kind": "ConcreteSquare",
-                "name": "building",
-                "corner_m": building_m,
-                "side_modules": 8,
-                "protected": True,
-            }
-        ],
-        "build_zone": {"corner_m": (15.0, 15.0), "rows": 20, "columns": 20, "stock": 12} | zone,
-    }
-    return Scenario.from_document(document, "site")
+    building = square("building", *building_m, 8, protected=True)
+    cells = builders.zone(15.0, 15.0, 20, 20, stock=12) | zone
+    return builders.site("site", (SIDE_M, SIDE_M), point(*charge_m), building, build_zone=cells)

@@ -24,6 +24,7 @@ from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.sites import Visibility, generate_site
 from blast_env.sites.turning import turned
+from tests.builders import block, point, site, zone
 
 LENGTH_M = 10.0  # what the features of length are divided by
 ALONG, ASIDE, CUT, OPEN_CUT, COVERED = (
@@ -148,28 +149,9 @@ def test_what_modules_hide_is_what_lines_of_sight_say(seed: int) -> None:
 def test_a_place_counts_by_the_angle_under_which_it_sees_the_facade() -> None:
     """More of a blast meets the facade from nearby: a wall before that place hides the more."""
     points = ((2.25, 10.25), (35.25, 10.25))  # 7.75 m before the house, and 3 times that behind it
-    scenario = Scenario.from_document(
-        {
-            "schema_version": 2,
-            "name": "two_sides",
-            "site": {"width_m": 40.0, "height_m": 20.0},
-            "charge": [
-                {"kind": "point", "position_m": point_m, "tnt_kg": 100.0} for point_m in points
-            ],
-            "structures": [
-                {
-                    "kind": "ModularObstacle",
-                    "name": "house",
-                    "corner_m": (10.0, 8.0),
-                    "rows": 9,
-                    "columns": 4,
-                    "protected": True,
-                }
-            ],
-            "build_zone": {"corner_m": (5.0, 8.0), "rows": 9, "columns": 1, "stock": 9},
-        },
-        "two_sides",
-    )
+    house, cells = block("house", 10.0, 8.0, 9, 4, protected=True), zone(5.0, 8.0, 9, 1, stock=9)
+    charges = [point(*each) for each in points]
+    scenario = site("two_sides", (40.0, 20.0), charges, house, build_zone=cells)
     wall = LayoutState.of(scenario, list(scenario.zone.cells()))
     episode = GridObservation().episode(Observable(scenario, scenario.charge))
     unprotected, protected = (

@@ -9,6 +9,7 @@ from blast_agents.training import TrainingSettings, load_hyperparameters
 from blast_agents.training.hyperparameters import AnyHyperparameters
 
 from blast_env.site import Scenario, save_scenario
+from tests.builders import site, square, zone
 
 SMALL: dict[str, Any] = {
     "n_envs": 1,
@@ -24,27 +25,16 @@ STEPS = 3 * ROLLOUT
 
 def small_scenario(stock: int = 4) -> Scenario:
     """Return a site of 20 m x 14 m with a road, a building, and a zone of 8 x 6 cells."""
-    document = {
-        "schema_version": 2,
-        "name": "small",
-        "calibration": "ballistic_kb_100kg",
-        "site": {"width_m": 20.0, "height_m": 14.0},
-        "charge": [
-            {"kind": "segment", "start_m": (2.0, 5.0), "end_m": (2.0, 9.0), "tnt_kg": 100.0}
-        ],
-        "structures": [
-            {
-                "kind": "ConcreteSquare",
-                "name": "building",
-                "corner_m": (14.0, 5.0),
-                "side_modules": 8,
-                "protected": True,
-            }
-        ],
-        "build_zone": {"corner_m": (6.0, 5.0), "rows": 8, "columns": 6, "stock": stock},
-        "simulation": {"preset": "ballistic"},
-    }
-    return Scenario.from_document(document, "small")
+    road = {"kind": "segment", "start_m": (2.0, 5.0), "end_m": (2.0, 9.0), "tnt_kg": 100.0}
+    return site(
+        "small",
+        (20.0, 14.0),
+        road,
+        square("building", 14.0, 5.0, 8, protected=True),
+        build_zone=zone(6.0, 5.0, 8, 6, stock=stock),
+        calibration="ballistic_kb_100kg",
+        simulation={"preset": "ballistic"},
+    )
 
 
 def scenario_file(folder: Path) -> Path:

@@ -36,10 +36,11 @@ from blast_env.reading import Reading
 from blast_env.site import Scenario, load_scenario, save_scenario
 from tests.app.here import Here
 from tests.app.test_work import CELLS
+from tests.builders import block
 from tests.gas_sites import WALL, hut
 from tests.io.importing.maps import BLOCK
 from tests.scenarios import BALLISTIC_COURTYARD
-from tests.test_terraces import TERRACE, solid, terraced
+from tests.test_terraces import TERRACE, terraced
 
 Story = Callable[[User, Sessions], Awaitable[None]]
 
@@ -295,7 +296,7 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
 
 def test_a_terrace_and_a_canopy_survive_the_page(tmp_path: Path) -> None:
     """From a file, edited in the fields, and saved."""
-    canopy = solid("canopy", 2.0, 9.0, 2, 4, base_m=2.5, height_m=3.0)
+    canopy = block("canopy", 2.0, 9.0, 2, 4, base_m=2.5, height_m=3.0)
     site = terraced(TERRACE, canopy)
     path = tmp_path / "site.toml"
     save_scenario(site, path)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import pytest
 from typer.testing import CliRunner
 
@@ -117,39 +116,6 @@ def test_a_path_that_is_none_is_refused_by_every_writer() -> None:
         result.impulse("building", FIVE)
     with pytest.raises(BlastEnvError, match=r"^no structure 5; known: building"):
         result.impulse(FIVE)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (5, "^options is 5, must be a mapping"),
-        ({5: 1}, "^no option of reset 5; known"),
-        ({LONG: 1}, "^no option of reset 'xxx"),
-        (
-            {"charge_position_m": (ENORMOUS, 1)},
-            r"^charge_position_m is \(an integer of about 400 digits, 1\), must be a pair",
-        ),
-        ({"tnt_kg": ENORMOUS}, "^tnt_kg is an integer of about 400 digits, must be a finite"),
-        ({"tnt_kg": True}, "^tnt_kg is true, must be a number"),
-        ({"charge_height_m": [1.0]}, "^charge_height_m is an array, must be a number"),
-        ({"layout": 5}, "^layout is 5, must be a list"),
-        ({"blast_seed": 2**63}, "^blast_seed is 9223372036854775808, must be an integer"),
-    ],
-)
-def test_options_of_reset_are_named_with_their_values(options: Any, words: str) -> None:
-    env = gym.make("BlastBarrier-v0", scenario="courtyard", disable_env_checker=True).unwrapped
-    with pytest.raises(BlastEnvError, match=words):
-        env.reset(seed=0, options=options)
-
-
-def test_the_simulator_checks_its_arguments_when_it_is_made() -> None:
-    for wrong in ({"layout": 5}, {"engine": 5}, {"scenario": 5}, {"step_s": "a"}, {"step_s": 20}):
-        ((name, value),) = wrong.items()
-        with pytest.raises(BlastEnvError, match=f"^{name} is {value!r}, must be"):
-            gym.make("BlastSimulator-v0", **wrong)
-    env = gym.make("BlastSimulator-v0", scenario="free_field", disable_env_checker=True).unwrapped
-    with pytest.raises(BlastEnvError, match=r"^options is 5, must be a mapping"):
-        env.reset(seed=0, options=FIVE)
 
 
 @pytest.mark.parametrize("text", ["\x1b[31mred", "a\0b", "a\u202eb", "a\x85b", "a\ud800b"])

@@ -102,16 +102,6 @@ def test_no_word_of_a_table_is_cut(headers: list[list[str]], width: int, text_co
     assert {word for words in headers for word in words} <= shown
 
 
-def test_a_table_that_is_too_wide_goes_on_below_with_the_names_of_its_rows() -> None:
-    headers = ["name", *(f"column_{number:02}" for number in range(20))]
-    table = ResultTable.of("title", headers, [["this", *map(str, range(20))]])
-    console = Console(width=NARROW, file=StringIO(), color_system=None)
-    console.print(table)
-    shown = console.file.getvalue()  # type: ignore[attr-defined]
-    assert shown.count("name") == shown.count("this") > 1
-    assert all(f"column_{number:02}" in shown for number in range(20))
-
-
 @pytest.mark.parametrize("engine", ["event", "gas"])
 def test_the_loads_of_a_blast_are_readable_in_80_columns(engine: str, hut_file: Path) -> None:
     shown = run("simulate", hut_file, "--engine", engine).stdout
@@ -186,11 +176,6 @@ def test_each_command_says_engine_and_preset(site: Path, layout: Path) -> None:
     ):
         assert "engine event 1 (numba" in run(*arguments).stdout
         assert "preset ballistic" in " ".join(run(*arguments).stdout.split())
-
-
-def test_the_steps_of_the_event_engine_are_events(site: Path) -> None:
-    assert " events, " in run("simulate", site, "--engine", "event").stdout
-    assert " steps, " in run("simulate", site, "--engine", "pymunk").stdout
 
 
 # JSON.

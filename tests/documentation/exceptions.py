@@ -99,9 +99,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env report visitor_entrance --layout found/layout.json --out report.html"
     " --pdf report.pdf": ("--threats 1 --places 1 --stills 1 --no-items"),
     # docs/start.md
-    "blast-env search --engine gas --scenario depot.toml --threat hidden"
-    " --method population_annealing --budget 300 --start-from building/layout.json --processes 2"
-    " --cache blasts --out found": ("--budget 8 --held-out 1"),
     "blast-env report depot.toml --layout building/layout.json --limit control_room=600,170"
     " --threats 1 --places 1 --stills 2 --no-items --out report.html --pdf report.pdf": (
         "--stills 0"
@@ -177,18 +174,6 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env judge entry/genetic.json --cache blasts --out entry": "--cell 0.5",
     # docs/paper
     # docs/researchers
-    "blast-env train --algo self_labelling --engine gas --scenario hotel_forecourt --threat hidden"
-    " --run out/hotel": (
-        "--steps 20 --envs 1 --set cases=1 --set cases_per_round=1 --set samples=4"
-        " --set neighbours=8 --set borrowed=0 --set hidden_threats=2 --set first_updates=3"
-        " --set updates=2 --set evaluation_interval=4 --set evaluation_cases=2"
-    ),
-    "python -m studies.surrogate fit --data docs/data/close_site_blasts.parquet"
-    " --data out/hotel.parquet --out out/hotel.json": "--epochs 1",
-    "blast-env train --algo maskable_ppo --engine out/hotel.json --scenario hotel_forecourt"
-    " --threat hidden --start-from out/hotel --run out/hotel_ppo": (
-        f"{_TRAIN} --set hidden_threats=2"
-    ),
     "blast-env search --method genetic --budget 200 --seed 0 --charge 5,12 --out out/search": (
         "--budget 8 --held-out 1"
     ),
@@ -245,10 +230,7 @@ NOT_RUN: Final[dict[str, str]] = {
     " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
     """ --env-kwargs 'engine:'"'"'event'"'"'' 'reward:'"'"'relative'"'"'' realisations:1"""
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
-    "python -m rl_zoo3.enjoy --algo ppo --env BlastBarrier-v0 --gym-packages blast_env -f logs"
-    " --stochastic": "needs RL Zoo",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
-    "python ppo.py --env-id blast_env:BlastBarrier-v0 --total-timesteps 4096": "needs CleanRL",
 }
 """Commands that are parsed only, and why."""
 
@@ -262,16 +244,6 @@ CODE_OF_THE_BUILD: Final = {
 
 CODE_SHORTENED: Final = {
     ("README.md", 1): ("seeds=range(4)", "seeds=range(1), cell_m=0.5"),  # not on final cells
-    ("docs/researchers/search.md", 2): ("budget=40", "budget=8"),
     ("docs/researchers/sites.md", 1): ("held_out(100)", "held_out(5)"),
 }
 """Parts of blocks of Python that are replaced to take less time, by page and number."""
-
-CODE_NOT_RUN: Final = {
-    ("docs/researchers/libraries.md", 5): (
-        "needs what RL Zoo wrote; tests/agents/test_hyperparameters.py writes and reads the like"
-    ),
-    ("docs/researchers/libraries.md", 6): "needs SBX, and so JAX",
-    ("docs/researchers/libraries.md", 7): "needs PufferLib, which pip cannot build everywhere",
-}
-"""Blocks of Python, by their number on the page, that are compiled only, and why."""

@@ -14,6 +14,8 @@ from blast_env.particles.run import BlastRun
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.balls import Balls, CollisionType
 from blast_env.site.scene import Scene
+from tests import builders
+from tests.builders import block, point, site_document, square
 
 # Whatever the bundled scenarios use: other parameters would have no calibration.
 _MODEL = load_scenario("courtyard")
@@ -42,56 +44,19 @@ class ThinEngine(ParticleEngine):
 
 def small_document(**zone: Any) -> dict[str, Any]:
     """Return a document with two protected structures and another one, and a zone of 8 x 5."""
-    return {
-        "schema_version": 2,
-        "name": "small",
-        "calibration": _MODEL.calibration,
-        "simulation": _MODEL.simulation.model_dump(),
-        "site": {"width_m": 19.0, "height_m": 18.0},
-        "charge": [
-            {
-                "kind": "segment",
-                "start_m": (3.0, 6.0),
-                "end_m": (3.0, 12.0),
-                "tnt_kg": 100.0,
-                "weight": 2.0,
-            },
-            {"kind": "point", "position_m": (8.5, 16.0), "tnt_kg": 20.0},
-        ],
-        "structures": [
-            {
-                "kind": "ModularObstacle",
-                "name": "shed",
-                "corner_m": (11.0, 14.0),
-                "rows": 2,
-                "columns": 4,
-            },
-            {
-                "kind": "ModularObstacle",
-                "name": "house",
-                "corner_m": (14.0, 5.0),
-                "rows": 12,
-                "columns": 4,
-                "protected": True,
-                "weight": 2.0,
-            },
-            {
-                "kind": "ConcreteSquare",
-                "name": "store",
-                "corner_m": (12.0, 1.0),
-                "side_modules": 3,
-                "protected": True,
-            },
-        ],
-        "build_zone": {
-            "corner_m": (7.0, 7.0),
-            "rows": 8,
-            "columns": 5,
-            "stock": 3,
-            "keep_outs": [{"corner_m": (7.0, 9.0), "size_m": (1.0, 0.5), "reason": "hydrant"}],
-            **zone,
-        },
-    }
+    road = {"kind": "segment", "start_m": (3.0, 6.0), "end_m": (3.0, 12.0), "tnt_kg": 100.0}
+    hydrant = {"corner_m": (7.0, 9.0), "size_m": (1.0, 0.5), "reason": "hydrant"}
+    return site_document(
+        "small",
+        (19.0, 18.0),
+        [road | {"weight": 2.0}, point(8.5, 16.0, 20.0)],
+        block("shed", 11.0, 14.0, 2, 4),
+        block("house", 14.0, 5.0, 12, 4, protected=True, weight=2.0),
+        square("store", 12.0, 1.0, 3, protected=True),
+        build_zone=builders.zone(7.0, 7.0, 8, 5, stock=3, keep_outs=[hydrant]) | zone,
+        calibration=_MODEL.calibration,
+        simulation=_MODEL.simulation.model_dump(),
+    )
 
 
 def small_scenario(**zone: Any) -> Scenario:

@@ -5,9 +5,8 @@ from typing import Any
 
 import pytest
 
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
-from tests.envs.small import ThinEngine, make, play, same, small_scenario
+from blast_env.evaluation import BlastStore
+from tests.envs.small import make, play, same
 from tests.envs.test_scenario_source import Sites
 
 FINISH = 40
@@ -41,26 +40,9 @@ def test_a_second_environment_needs_no_blast_and_says_the_same(kind: str, tmp_pa
     assert (second_counts["blasts"], second_counts["cache_hit_rate"]) == (0, 1.0)
 
 
-def test_an_evaluator_finds_the_blasts_of_an_environment(tmp_path: Path) -> None:
-    env = make(cache=str(tmp_path))
-    info = play(env, seed=5)[-1][4]
-    evaluator = BlastEvaluator(small_scenario(), ThinEngine(), cache=BlastStore(tmp_path))
-    threat = LoadCase(info["charges"][0], info["blast_seeds"][0][0])
-    loads = evaluator.loads(info["layout"], threat)
-    assert evaluator.counts.blasts == 0
-    assert loads.protected_impulse_pa_s == info["impulse_pa_s"]
-
-
 def test_sites_that_the_memory_has_let_go_are_still_in_the_cache(tmp_path: Path) -> None:
     env = make(Sites(), cache=tmp_path)
     for seed in (*range(8), *range(8)):
         env.reset(seed=seed)
         info = env.step(FINISH)[4]
     assert info["cache_hit_rate"] >= 0.5
-
-
-def test_what_is_no_cache_is_named() -> None:
-    with pytest.raises(BlastEnvError, match="cache is 3, must be a folder or a BlastStore"):
-        make(cache=3)
-    with pytest.raises(BlastEnvError, match="argument 'cahce', did you mean 'cache'"):
-        make(cahce="folder")

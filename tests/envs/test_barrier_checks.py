@@ -1,6 +1,5 @@
 """Both libraries' checkers, on every id and every variant; warnings are errors."""
 
-import doctest
 from typing import Any
 
 import gymnasium as gym
@@ -75,9 +74,3 @@ def test_both_checkers_pass_on_every_action_space(action: str, invalid_action: s
     env = make(observation="dict", action=action, invalid_action=invalid_action)
     check_env(env, skip_render_check=True)
     check_env_for_agents(env, skip_render_check=True)
-
-
-def test_examples_in_the_environment_s_docstring() -> None:
-    failures, tried = doctest.testmod(barrier_env)
-    assert tried > 5
-    assert failures == 0

@@ -1,6 +1,5 @@
 """The environment on gas dynamics: the same rules, one realisation, no calibration."""
 
-import pickle
 from typing import Any
 
 import gymnasium as gym
@@ -34,16 +33,6 @@ def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
     picture = env.render()
     assert isinstance(picture, np.ndarray)
     assert picture.ndim == 3
-
-
-def test_it_pickles_after_a_blast() -> None:
-    env = make().unwrapped
-    finish = HUT.zone.rows * HUT.zone.columns
-    env.reset(seed=1)
-    env.step(finish)
-    copy = pickle.loads(pickle.dumps(env))
-    copy.reset(seed=1)
-    assert copy.step(finish)[4]["cache_hits"] > 0
 
 
 def test_more_realisations_are_refused() -> None:

@@ -43,18 +43,6 @@ def test_every_site_of_a_family_has_frames_of_one_size(family: str) -> None:
     assert len(sizes) == 1
 
 
-def test_the_blast_on_a_bundled_site_has_frames_of_the_size_that_placing_has() -> None:
-    env = gym.make(
-        "BlastBarrier-v0", scenario="perimeter_gate", render_mode="rgb_array", realisations=1
-    )
-    env.reset(seed=1)
-    placing = np.asarray(env.render()).shape
-    env.step(env.action_space.n - 1)  # type: ignore[attr-defined]
-    assert np.asarray(env.render()).shape == placing
-    film = env.unwrapped.blast_frames()  # type: ignore[attr-defined]
-    assert next(film).shape == placing
-
-
 def test_gymnasiums_wrappers_record_and_show_the_default_environment(tmp_path: Path) -> None:
     for wrapped in (
         RecordVideo(_finishing(), str(tmp_path / "films"), episode_trigger=lambda _: True),

@@ -52,16 +52,6 @@ def test_every_reset_draws_a_site_by_the_seed() -> None:
     assert len(set(hashes)) > 3
 
 
-def test_the_memory_does_not_grow_with_the_sites_but_the_counts_do() -> None:
-    env = make(Sites())
-    for seed in range(12):
-        env.reset(seed=seed)
-        info = env.step(FINISH)[4]
-        assert info["blasts"] == seed + 1  # the layout is the empty one: the same blast
-        assert info["cache_hits"] == 0
-    assert len(env.task.evaluators._kept) <= 4
-
-
 def test_a_site_that_comes_again_is_remembered() -> None:
     evaluators = Evaluators(ThinEngine())
     first = evaluators.of(site(0))

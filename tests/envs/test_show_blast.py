@@ -1,7 +1,6 @@
 """Watching the blast: steps that go on after the charge, a window that does not wait, films."""
 
 import pickle
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -9,13 +8,11 @@ import gymnasium as gym
 import numpy as np
 import pygame
 import pytest
-from gymnasium.wrappers import RecordVideo
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from tests.envs.small import make
 from tests.gas_sites import WALL, hut
-from tests.plots.test_side_by_side import frames_of
 
 pytestmark = pytest.mark.slow
 
@@ -118,22 +115,6 @@ def test_a_window_shows_the_film_step_by_step() -> None:
         pictures.append(pygame.surfarray.array3d(screen))
     assert (pictures[0] != pictures[-1]).any()
     env.close()
-
-
-@pytest.mark.usefixtures("short")
-def test_record_video_records_the_blast(tmp_path: Path) -> None:
-    env = RecordVideo(
-        make(render_mode="rgb_array", show_blast=True),
-        str(tmp_path / "films"),
-        episode_trigger=lambda _: True,
-    )
-    steps = finished(env)
-    env.stop_recording()  # type: ignore[no-untyped-call]
-    (path,) = (tmp_path / "films").glob("*.mp4")
-    frames = frames_of(path)
-    assert len(frames) == len(steps) + 2  # with that of `reset` and of the module
-    blast = frames[3:7].astype(int)
-    assert (np.abs(np.diff(blast, axis=0)) > 40).mean() > 0.001
 
 
 @pytest.mark.usefixtures("short")

@@ -69,17 +69,6 @@ def changed(folder: Path, content: bytes) -> None:
     store.put(key, content)
 
 
-def test_a_damaged_blast_is_simulated_again_and_kept_again(tmp_path: Path) -> None:
-    first = BlastEvaluator(COURTYARD, "event", cache=tmp_path).loads_of_many(PAIRS)
-    changed(tmp_path, b"12345678")
-    again = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
-    assert all(map(same, again.loads_of_many(PAIRS), first))
-    assert (again.counts.blasts, again.counts.cache_hits) == (1, 1)
-    third = BlastEvaluator(COURTYARD, "event", cache=tmp_path)
-    third.loads_of_many(PAIRS)
-    assert third.counts.cache_hit_rate == 1.0
-
-
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
     notes = tmp_path / "notes.txt"
     notes.write_text("mine")

@@ -1,19 +1,15 @@
 """The cache keeps what was asked for last, and no more than it may; what its keys tell apart."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from blast_env import Charge
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads
-from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine, PymunkEngine
-from blast_env.evaluation.store import BlastKey, BlastStore, calibration_digest, engine_text
-from blast_env.particles.calibration.model import scenario_calibration
-from blast_env.particles.run import BlastRun
-from blast_env.site.scene import Scene
+from blast_env.evaluation.engines.particles import EventEngine
+from blast_env.evaluation.store import BlastKey, BlastStore
 from tests.evaluation.cases import COURTYARD, FEW, THREATS
 
 
@@ -77,47 +73,6 @@ def test_threads_share_a_cache_of_few_loads() -> None:
     assert len(cache) <= 2
 
 
-def test_a_cache_of_size_zero_keeps_nothing() -> None:
-    assert len(filled(0, 2)) == 0
-
-
-def test_a_negative_size_is_refused() -> None:
-    with pytest.raises(BlastEnvError, match="cache_size is -1, must be at least 0"):
-        BlastStore(size=-1)
-
-
-@dataclass(frozen=True)
-class HalfEngine(ParticleEngine):
-    """Calls itself pymunk, as engines of tests and of users may."""
-
-    share: float = 0.5
-    name: str = PymunkEngine().name
-    version: str = PymunkEngine().version
-
-    def start(self, scene: Scene) -> BlastRun:
-        return PymunkEngine().start(scene)
-
-
-def test_engines_are_told_apart_by_class_version_and_fields() -> None:
-    """A library may change what it computes from one version to the next."""
-    engines = (
-        PymunkEngine(),
-        PymunkEngine(version="pymunk 6.0.0"),
-        EventEngine(),
-        HalfEngine(),
-        HalfEngine(share=0.4),
-    )
-    assert len({engine_text(engine) for engine in engines}) == len(engines)
-    assert engine_text(PymunkEngine()) == engine_text(PymunkEngine())
-
-
-def test_calibrations_of_one_name_are_told_apart() -> None:
-    """A calibration that was made anew gives other loads in psi*s."""
-    made = scenario_calibration(COURTYARD, "event")
-    again = made.model_copy(update={"coefficients": {"A": 1.0, "B": 1.0}})
-    assert calibration_digest(made) != calibration_digest(again)
-
-
 def test_the_version_of_the_code_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """What an older package computed must not pass for what this one would."""
     shared = BlastStore(size=10)
@@ -140,10 +95,3 @@ def test_the_version_of_the_engine_counts() -> None:
     for evaluator in evaluators:
         evaluator.loads(FEW, THREATS[0])
     assert [evaluator.counts.blasts for evaluator in evaluators] == [1, 1, 0]
-
-
-def test_the_hit_rate_is_the_share_that_needed_no_blast() -> None:
-    evaluator = BlastEvaluator(COURTYARD, "event")
-    assert evaluator.counts.cache_hit_rate == 0.0
-    evaluator.loads_of_many([(FEW, THREATS[0])] * 4)
-    assert evaluator.counts.cache_hit_rate == 0.75

@@ -18,6 +18,7 @@ from blast_env.evaluation import (
 )
 from blast_env.evaluation.engines.particles import PARTICLES_OVERRATE
 from blast_env.site import Scenario
+from tests.builders import block
 from tests.evaluation.cases import BEHIND_SHADOW, COURTYARD, FEW, SEEDS, SHADOW, THREATS, WALL
 from tests.scenarios import BALLISTIC_COURTYARD
 
@@ -93,13 +94,6 @@ def test_threats_may_be_given_instead_of_seeds(evaluator: BlastEvaluator) -> Non
     )
 
 
-def test_the_empty_site_is_simulated_once_for_all_layouts() -> None:
-    evaluator = BlastEvaluator(COURTYARD)
-    for layout in (FEW, FEW[:1], FEW[:2]):
-        evaluate_against(evaluator, layout, THREATS[:1])
-    assert evaluator.counts.blasts == 4
-
-
 def test_a_file_repeats_its_evaluation(tmp_path: Path) -> None:
     evaluation = evaluate_layout(BALLISTIC_COURTYARD, FEW, (0, 1), engine="event")
     path = evaluation.to_json(tmp_path / "evaluation.json")
@@ -155,10 +149,7 @@ def test_a_structure_that_nothing_reaches_has_nothing_to_reduce() -> None:
     sizes |= {"bottom": ((27.0, 9.0), 2, 8), "top": ((27.0, 20.0), 2, 8)}
     document["structures"] = [
         *document["structures"],
-        *(
-            {"kind": "ModularObstacle", "name": name, "corner_m": corner, "rows": r, "columns": c}
-            for name, (corner, r, c) in sizes.items()
-        ),
+        *(block(name, *corner, *size) for name, (corner, *size) in sizes.items()),
     ]
     yard = Scenario.from_document(document, "yard")
     threats = draw_threats(yard, [0])

@@ -7,15 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blast_env import Charge, load_scenario, simulate
+from blast_env import Charge, simulate
 from blast_env.calibration import CalibrationError
 from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, ParticleLoad
-from blast_env.evaluation.engines.particles import EventEngine, ParticleEngine
-from blast_env.geometry import Cell
-from blast_env.particles.run import BlastRun
 from blast_env.site import Scenario, ScenarioError
-from blast_env.site.scene import Scene
 from tests.evaluation.cases import COURTYARD, FEW, THREATS, WALL
 from tests.scenarios import BALLISTIC_COURTYARD
 
@@ -62,34 +58,6 @@ def test_protected_structures_count_by_their_weights_and_others_not_at_all() -> 
     assert not replace(loads, structures=(replace(load, in_range=False),)).in_range
 
 
-class WatchedEngine(ParticleEngine):
-    """Runs blasts and remembers the barriers' cells in their order."""
-
-    name = EventEngine().name
-    version = EventEngine().version
-
-    def __init__(self) -> None:
-        self.layouts: list[tuple[Cell, ...]] = []
-
-    def start(self, scene: Scene) -> BlastRun:
-        self.layouts += [each.cells for each in scene.structures if each.cells is not None]
-        return EventEngine().start(scene)
-
-
-def test_the_order_of_the_cells_changes_nothing() -> None:
-    """Without a cache each order is really simulated.
-
-    Few layouts are loaded differently in another order, so the engine's own input is looked at.
-    """
-    engine = WatchedEngine()
-    evaluator = BlastEvaluator(COURTYARD, engine, cache_size=0)
-    shuffled = [WALL[index] for index in np.random.default_rng(0).permutation(len(WALL))]
-    first = evaluator.loads(WALL, THREATS[1])
-    for layout in (shuffled, WALL[::-1]):
-        assert same(evaluator.loads(layout, THREATS[1]), first)
-    assert engine.layouts == [WALL] * 3
-
-
 def test_parallel_and_serial_are_the_same(evaluator: BlastEvaluator) -> None:
     pairs = [(layout, threat) for layout in (FEW, (), WALL) for threat in THREATS[:2]]
     parallel = BlastEvaluator(COURTYARD)
@@ -112,19 +80,6 @@ def test_equal_blasts_are_simulated_once() -> None:
     assert not same(first, unprotected)
     assert evaluator.loads((), threat) is unprotected
     assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (2, 2)
-
-
-def test_evicted_loads_are_simulated_again_with_the_same_result() -> None:
-    evaluator = BlastEvaluator(COURTYARD, cache_size=1)
-    first = evaluator.loads(FEW, THREATS[0])
-    evaluator.loads(FEW, THREATS[1])
-    assert same(evaluator.loads(FEW, THREATS[0]), first)
-    assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (3, 0)
-
-
-def test_an_engine_may_be_given_as_an_object(evaluator: BlastEvaluator) -> None:
-    by_object = BlastEvaluator(COURTYARD, engine=EventEngine())
-    assert same(by_object.loads(FEW, THREATS[0]), evaluator.loads(FEW, THREATS[0]))
 
 
 def test_loads_that_are_given_out_twice_cannot_be_changed(evaluator: BlastEvaluator) -> None:
@@ -172,15 +127,3 @@ def test_a_charge_in_a_building_is_refused_in_any_process(processes: int) -> Non
     inside = [LoadCase(Charge((29.0, 15.0), 100.0), seed) for seed in range(2)]
     with pytest.raises(ScenarioError, match="building"):
         BlastEvaluator(COURTYARD).loads_of_many([((), each) for each in inside], processes)
-
-
-def test_weights_and_all_structures_of_a_street_are_there() -> None:
-    """The protected block of the street junction counts twice; the others do not count."""
-    evaluator = BlastEvaluator(load_scenario("street_junction"))
-    loads = evaluator.loads((), LoadCase(Charge((10.0, 20.0), 100.0), 0))
-    assert [load.protected for load in loads.structures] == [False, False, False, True]
-    assert loads.protected_impulse_pa_s == 2.0 * loads.structures[3].impulse_pa_s > 0.0
-    assert loads.module_impulse.shape == (4 * 20 * 20,)
-    counted = loads.structures[3]
-    assert isinstance(counted, ParticleLoad)
-    assert loads.module_impulse[-400:].sum() == counted.impulse_sim

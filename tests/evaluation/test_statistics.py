@@ -33,12 +33,6 @@ def test_cvar_of_five_values_by_hand(level: float, expected: float) -> None:
     assert conditional_value_at_risk(values, level) == pytest.approx(expected)
 
 
-def test_cvar_of_sixteen_values_is_the_three_worst_and_a_fifth_of_the_fourth() -> None:
-    values = np.arange(1.0, 17.0)
-    expected = (16.0 + 15.0 + 14.0 + 0.2 * 13.0) / 3.2
-    assert conditional_value_at_risk(values, 0.8) == pytest.approx(expected)
-
-
 @given(IMPULSES, LEVELS, LEVELS)
 def test_cvar_lies_between_mean_and_maximum_and_grows_with_the_level(
     values: np.ndarray, one: float, other: float

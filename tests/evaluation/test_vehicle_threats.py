@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     BlastEvaluator,
     Evaluation,
@@ -69,14 +68,6 @@ def test_more_threats_than_places_meet_the_worst_ones_again_and_cost_nothing() -
     assert (impulses[[0, 1, 0, 1, 0]] == impulses).all()
 
 
-def test_layouts_that_leave_the_vehicle_where_it_is_share_no_blast() -> None:
-    """The key of a blast has the place and the layout: both count."""
-    evaluator = BlastEvaluator(SITE, GAS)
-    threat = draw_threats(SITE, [0])[0]
-    evaluator.loads_of_many([(POSTS, threat), (POSTS[::-1], threat), ((), threat)])
-    assert (evaluator.counts.blasts, evaluator.counts.cache_hits) == (2, 1)
-
-
 def test_particles_judge_a_vehicle_too() -> None:
     threat = LoadCase(VehicleCharge(SOURCE), 3)
     evaluator = BlastEvaluator(SITE, "event")
@@ -99,8 +90,3 @@ def test_a_search_meets_the_worst_places_first() -> None:
     assert 0 < len(vehicles) < 12
     assert [each.charge for each in threats[: len(vehicles)]] == vehicles
     assert [each.rank for each in vehicles] == list(range(len(vehicles)))
-
-
-def test_a_threat_needs_a_sound_seed() -> None:
-    with pytest.raises(BlastEnvError, match="seed is -1, must be an integer from 0"):
-        LoadCase(VehicleCharge(SOURCE), -1)

@@ -12,9 +12,10 @@ from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import FaceLoads
 from blast_env.gas.settings import GasSettings
 from blast_env.layout.build_scene import build_site
-from blast_env.site import Scenario
+from tests import builders
+from tests.builders import block, point
 from tests.gas.flows import blast, check_nothing_is_lost
-from tests.test_terraces import WALL, solid, terraced
+from tests.test_terraces import WALL, terraced
 
 NEAR = GasSettings(border_m=0.0)
 """Open borders 2 m beside the site."""
@@ -53,16 +54,11 @@ def loads_on(
     air_m: float = 7.0,
 ) -> NDArray[np.float64]:
     """Return impulse and peak on each face of a building (2, n), of 5 kg on a site 30 m long."""
-    *place_m, height_m = charge_m
-    source = {"kind": "point", "position_m": place_m, "tnt_kg": 5.0, "height_m": height_m}
-    document = {
-        "schema_version": 2,
-        "name": "step",
-        "site": {"width_m": 30.0, "height_m": 16.0, "air_height_m": air_m},
-        "charge": [source],
-        "structures": [building, *(each | {"carries": True} for each in terraces)],
-    }
-    site = build_site(Scenario.from_document(document, "step"))
+    x_m, y_m, height_m = charge_m
+    source = point(x_m, y_m, 5.0, height_m=height_m)
+    grounds = (each | {"carries": True} for each in terraces)
+    scenario = builders.site("step", (30.0, 16.0, air_m), source, building, *grounds)
+    site = build_site(scenario)
     run = GasRun(GasSettings(border_m=0.0, until=until_s), site)
     run.advance(np.inf)
     own = run.table.structure == 0
@@ -73,8 +69,8 @@ def loads_on(
 
 def test_a_far_terrace_is_felt_by_nothing_that_counts() -> None:
     """Its edge is 18 m from the charge, and 12 m behind the hut; its echo comes in the suction."""
-    hut = solid("hut", 8.0, 7.0, 4, 4, height_m=2.5, protected=True)
-    terrace = solid("terrace", 22.0, 0.0, 32, 16, height_m=1.0)
+    hut = block("hut", 8.0, 7.0, 4, 4, height_m=2.5, protected=True)
+    terrace = block("terrace", 22.0, 0.0, 32, 16, height_m=1.0)
     flat, stepped = (
         loads_on(hut, (4.0, 8.0, 0.0), *terraces, until_s=0.1) for terraces in ((), (terrace,))
     )
@@ -88,14 +84,14 @@ def test_on_a_terrace_far_from_its_edge_it_is_as_on_the_ground() -> None:
 
     def hall(base_m: float) -> dict[str, Any]:
         ends = {"base_m": base_m, "height_m": base_m + 2.5}
-        return solid("hall", 15.0, 6.0, 8, 6, protected=True, **ends)
+        return block("hall", 15.0, 6.0, 8, 6, protected=True, **ends)
 
     flat = loads_on(hall(0.0), (12.0, 8.0, 1.5), until_s=until_s)
     wide, narrow = (
         loads_on(
             hall(high_m),
             (12.0, 8.0, 1.5 + high_m),
-            solid("terrace", left_m, 0.0, 32, round(2.0 * (right_m - left_m)), height_m=high_m),
+            block("terrace", left_m, 0.0, 32, round(2.0 * (right_m - left_m)), height_m=high_m),
             until_s=until_s,
             air_m=7.0 + high_m,
         )

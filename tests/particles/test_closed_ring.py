@@ -1,12 +1,11 @@
 """Nothing gets out of a closed ring of modules, however hard the balls inside press on it."""
 
-from typing import Any
-
 import pytest
 
 from blast_env.evaluation.engines import simulate
 from blast_env.site import Scenario
 from blast_env.units import MODULE_SIDE_M
+from tests.builders import block, point, site
 
 
 def ring(cavity_modules: int, thickness: int, shift_m: float = 0.0) -> Scenario:
@@ -28,33 +27,11 @@ def ring(cavity_modules: int, thickness: int, shift_m: float = 0.0) -> Scenario:
         ("right", far, near, cavity_modules, thickness),
         ("target", target_m, corner, side, 2),
     ]
-    structures: list[dict[str, Any]] = [
-        {
-            "kind": "ModularObstacle",
-            "name": name,
-            "corner_m": (x_m, y_m),
-            "rows": rows,
-            "columns": columns,
-            "protected": name == "target",
-        }
-        for name, x_m, y_m, rows, columns in walls
-    ]
+    structures = [block(*wall, protected=wall[0] == "target") for wall in walls]
     middle_m = corner + side * MODULE_SIDE_M / 2.0
-    site_m = {"width_m": target_m + 4.0, "height_m": 2.0 * corner + side * MODULE_SIDE_M}
-    return Scenario.from_document(
-        {
-            "schema_version": 2,
-            "name": "ring",
-            "site": site_m,
-            "charge": [{"kind": "point", "position_m": (middle_m, middle_m), "tnt_kg": 100.0}],
-            "structures": structures,
-            "simulation": {
-                "preset": "ballistic",
-                "overrides": {"stepping": {"time_limit_s": 0.25}},
-            },
-        },
-        "ring",
-    )
+    size_m = (target_m + 4.0, 2.0 * corner + side * MODULE_SIDE_M)
+    model = {"preset": "ballistic", "overrides": {"stepping": {"time_limit_s": 0.25}}}
+    return site("ring", size_m, point(middle_m, middle_m), *structures, simulation=model)
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "event"])

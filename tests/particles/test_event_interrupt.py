@@ -9,34 +9,17 @@ import pytest
 from blast_env.evaluation.engines import Blast
 from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.particles.event.engine import EventRun
-from blast_env.site import Scenario
 from blast_env.site.scene import Scene
+from tests.builders import point, site, square
 
 
 def touching_air() -> Scene:
     """Return air whose balls touch each other: a hundred thousand events in one moment."""
-    document = {
-        "schema_version": 2,
-        "name": "touching_air",
-        "site": {"width_m": 20.0, "height_m": 20.0},
-        "charge": [{"kind": "point", "position_m": (5.0, 5.0), "tnt_kg": 100.0}],
-        "structures": [
-            {
-                "kind": "ConcreteSquare",
-                "name": "house",
-                "corner_m": (8.0, 4.0),
-                "side_modules": 4,
-                "protected": True,
-            }
-        ],
-        "simulation": {
-            "preset": "ballistic",
-            "overrides": {
-                "air": {"spacing_units": 2.0, "radius_units": 1.0, "elasticity": 1.0, "jitter": 0.0}
-            },
-        },
-    }
-    return Blast(Scenario.from_document(document, "touching_air"), (), 0, "event").scene
+    air = {"spacing_units": 2.0, "radius_units": 1.0, "elasticity": 1.0, "jitter": 0.0}
+    house = square("house", 8.0, 4.0, 4, protected=True)
+    model = {"preset": "ballistic", "overrides": {"air": air}}
+    scenario = site("touching_air", (20.0, 20.0), point(5.0, 5.0), house, simulation=model)
+    return Blast(scenario, (), 0, "event").scene
 
 
 def outcome(run: EventRun) -> tuple[float, int, bytes, bytes]:

@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import PathPatch
@@ -22,22 +20,20 @@ from blast_env.gas.probes import GroundMap
 from blast_env.particles.calibration.references import kingery_bulmash
 from blast_env.plots.film import plan_until
 from blast_env.plots.gas import facades, full_load, gauge_history
-from blast_env.plots.ground_map import ground_map, ground_recorders, ground_values, map_levels
-from blast_env.plots.plan import STRUCTURE, barrier_features
+from blast_env.plots.ground_map import ground_map, ground_recorders, ground_values
+from blast_env.plots.plan import barrier_features
 from blast_env.plots.pressure_film import record_planes, write_pressure_film
 from blast_env.plots.pressure_frames import (
     PressurePainter,
     PressureShot,
-    Smooth,
     VerticalSection,
     default_section,
 )
 from blast_env.plots.site_plan import draw_features, legend_of
-from blast_env.plots.style import unit_interval
 from blast_env.site import Scenario
 from tests.catalogue_sites import WALL as PIECES
 from tests.catalogue_sites import yard
-from tests.gas_sites import WALL, column, hut, site_document
+from tests.gas_sites import WALL, hut
 
 HEIGHT_M, CUT = 0.75, VerticalSection("y", 4.25)
 
@@ -128,15 +124,6 @@ def test_maps_show_the_ground_of_the_site_on_one_scale(
     assert_all_is_on_the_page(figure)
 
 
-def test_maps_of_their_own_can_have_the_scale_of_another(
-    unprotected: GasResult, protected: GasResult
-) -> None:
-    levels = map_levels(unprotected, "impulse")
-    for result in (unprotected, protected):
-        (image,) = images_of(ground_map(result, "impulse", levels=levels))
-        assert image.get_clim() == (levels[0], levels[-1])
-
-
 def test_walls_of_their_own_can_have_the_scale_of_another(
     unprotected: GasResult, protected: GasResult
 ) -> None:
@@ -150,12 +137,6 @@ def test_walls_of_their_own_can_have_the_scale_of_another(
     loads = loads[np.isfinite(loads)]
     assert np.mean(loads > full) <= 0.01  # the cells before the charge alone
     assert full <= 1.3 * loads.max()
-
-
-def test_solids_are_no_ground(protected: GasResult) -> None:
-    values = values_of(images_of(ground_map(protected))[0])
-    assert np.isnan(values).sum() == 4 * 4 + 6
-    assert np.isnan(values[6:10, 12:16]).all()
 
 
 @pytest.mark.usefixtures("laid_out")
@@ -224,14 +205,6 @@ def test_a_building_of_two_parts_is_unfolded_as_one(
     assert len(values_of(images_of(facades(halves, "north_half"))[0])[0]) == part["rows"]
 
 
-def test_neighbouring_walls_share_a_corner(protected: GasResult) -> None:
-    """As one walks round: the west wall's right end is the south wall's left end."""
-    panels = facades(protected).axes[:4]
-    assert [axes.get_xlabel() for axes in panels] == ["y (m)", "x (m)", "y (m)", "x (m)"]
-    ends = [axes.get_xlim() for axes in panels]
-    assert ends == [(5.0, 3.0), (6.0, 8.0), (3.0, 5.0), (8.0, 6.0)]
-
-
 @pytest.mark.usefixtures("laid_out")
 def test_walls_with_and_without_a_barrier_have_one_scale(
     unprotected: GasResult, protected: GasResult
@@ -251,19 +224,6 @@ def test_walls_with_and_without_a_barrier_have_one_scale(
     assert figure.axes[0].get_ylabel() == "no barrier\nz (m)"
     assert figure.axes[4].get_ylabel() == "barrier of 6 modules\nz (m)"
     assert_all_is_on_the_page(figure)
-
-
-def test_words_of_a_barrier_keep_each_number_with_its_item() -> None:
-    empty, built = (
-        GasBlast(yard(), layout, engine=GasEngine(margin_m=1.0, until=0.005)).run()
-        for layout in ((), PIECES)
-    )
-    words = facades(built, beside=empty).axes[4].get_ylabel().splitlines()
-    assert [each.replace("\N{NO-BREAK SPACE}", " ") for each in words] == [
-        "barrier of 3 pieces",
-        "(2 wall, 1 post)",
-        "z (m)",
-    ]
 
 
 def test_a_wall_that_does_not_count_says_so(unprotected: GasResult) -> None:
@@ -318,30 +278,12 @@ def test_the_free_field_is_kingery_bulmashs_at_the_gauges_distance(unprotected: 
 # Films.
 
 
-def test_pixels_go_over_evenly_but_not_through_walls() -> None:
-    air = np.array([[True], [True], [False], [True], [True]])
-    pixels = Smooth(air)(np.array([[1.0], [3.0], [np.nan], [-5.0], [-5.0]]))[:, 0]
-    assert pixels.reshape(5, -1).mean(axis=1)[3:].tolist() == [-5.0, -5.0]
-    assert (pixels.reshape(5, -1)[1] > 2.0 - 1e-12).all()
-    assert (np.diff(pixels.reshape(5, -1)[:2].ravel()) >= 0.0).all()
-    assert pixels.reshape(5, -1)[2].tolist() == [0.0] * (len(pixels) // 5)
-
-
 def test_pictures_are_those_of_the_gas(shots: list[PressureShot]) -> None:
     shot = shots[1]
     frame = shot.planes[0].frames[3]
     np.testing.assert_array_equal(shot.at(frame.time_s, 0), frame.overpressure_pa)
     assert shot.at(0.5 * shot.opening.end_s, 0) is None
     assert (shot.layer_m(0), shot.layer_m(1)) == (HEIGHT_M, 4.25)
-
-
-def test_colours_are_those_of_the_scale(shots: list[PressureShot]) -> None:
-    painter = PressurePainter(shots, 200.0, 640)
-    pressure = np.linspace(-250.0, 250.0, 501)
-    expected = colormaps["RdBu_r"](painter.scale(pressure), bytes=True).astype(int)
-    assert np.abs(painter.colours(pressure).astype(int) - expected).max() <= 8  # of neighbours
-    assert (painter.scale.vmin, painter.scale.vmax) == (-200.0, 200.0)
-    assert painter.sheet.figure.axes[-1].get_xlabel().startswith("overpressure (kPa)")
 
 
 @pytest.mark.usefixtures("laid_out")
@@ -370,22 +312,6 @@ def test_the_blast_goes_out_from_the_charge(shots: list[PressureShot]) -> None:
     frames = [painter.paint(share * end_s).astype(int) for share in (0.1, 0.5, 1.0, 1.5)]
     red = [(frame[..., 0] - frame[..., 2] > 60).sum() for frame in frames]
     assert all(before < after for before, after in pairwise(red))
-
-
-def test_modules_of_a_polygon_have_one_outline_in_plan_and_section() -> None:
-    """A cross of three rectangles, and the upright rectangle of a section through all of them."""
-    silo = column("silo", 8.0, 1.5, 2.0)
-    scenario = hut(structures=[*site_document()["structures"], silo | {"height_m": 3.0}])
-    short = GasBlast(scenario, (), engine=GasEngine(margin_m=1.0, until=4e-3))
-    shot = record_planes(short, HEIGHT_M, VerticalSection("x", 8.25))
-    corners = []
-    for axes in PressurePainter([shot], 200.0, 480).sheet.figure.axes[:2]:
-        solids = [each for each in axes.patches if isinstance(each, PathPatch)]
-        solids = [
-            each for each in solids if each.get_edgecolor() == to_rgba(unit_interval(STRUCTURE))
-        ]
-        corners.append([len(np.asarray(each.get_path().vertices)) - 1 for each in solids])
-    assert corners == [[12], [4]]
 
 
 def test_the_section_points_to_what_is_protected(blast: GasBlast) -> None:

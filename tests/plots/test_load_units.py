@@ -1,7 +1,6 @@
 """Loads of particles in Pa s where a calibration gives them, on one scale for several blasts."""
 
 import matplotlib
-import numpy as np
 import pytest
 
 from blast_env import simulate
@@ -9,8 +8,6 @@ from blast_env.calibration import LoadUnit
 from blast_env.evaluation.engines import BlastResult
 from blast_env.particles.calibration.model import seen_width_m
 from blast_env.plots.figures import common_scale, heat_map, impulse_over_time
-from blast_env.plots.film import scale_end
-from blast_env.plots.frames import ONE_SEED, FramePainter
 from blast_env.plots.style import nice_ceiling
 from blast_env.units import MODULE_SIDE_M
 from tests.design.search_cases import small_scenario
@@ -71,28 +68,6 @@ def test_maps_without_and_with_a_barrier_have_one_scale_in_pa_s(
     assert all("Pa s" in texts(figure) for figure in figures)
     assert f"{protected.impulse('building').pa_s:,.0f} Pa s from" in texts(figures[1])
     assert "Pa s" in texts(impulse_over_time(unprotected))
-
-
-def test_the_scale_of_a_film_ends_at_a_nice_number_of_pa_s(unprotected: BlastResult) -> None:
-    unit = unprotected.load_unit
-    full = scale_end([unprotected], unit)
-    assert full is not None
-    assert unit.factor * full == pytest.approx(nice_ceiling(unit.factor * full))
-
-
-def test_frames_say_what_has_come_so_far_and_what_one_seed_is(unprotected: BlastResult) -> None:
-    """The line with the loads changes from frame to frame; the site below it is the same."""
-    unit = unprotected.load_unit
-    painter = FramePainter(unprotected.blast, unit=unit)
-    balls = unprotected.final_balls
-    begun = painter.paint(balls, unprotected.blast.scene.obstacles(), 0.0)
-    ended = painter.paint(balls, unprotected.obstacles, 0.0)
-    site = unprotected.blast.scene.site_m
-    top = painter.sheet.pixel(site.left, site.top)[1] - 4
-    changed = np.argwhere((begun[:top] != ended[:top]).any(axis=2))
-    assert len(changed) > 0
-    assert changed[:, 1].min() > painter.size_px[0] / 2  # on the right
-    assert "mean over seeds" in ONE_SEED
 
 
 def test_films_beside_each_other_say_each_blast_s_own_load(

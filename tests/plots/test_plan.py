@@ -124,18 +124,6 @@ def test_no_label_of_a_crowded_site_lies_on_another_in_a_figure() -> None:
         assert overlapping(boxes) == 0
 
 
-def test_no_label_of_a_crowded_site_lies_on_another_on_the_page() -> None:
-    site = office_park()
-    svg = plan_svg(PixelView.of(site, 900, 640), site, (), None)
-    found = re.findall(r'<text x="(\S+)" y="(\S+)" font-size="(\d+)"[^>]*>([^<]*)<', svg)
-    boxes = []
-    for x, y, size, text in found:
-        half, high = 0.25 * float(size) * len(text), 0.8 * float(size)  # letters at their least
-        boxes.append(Rectangle(float(x) - half, -float(y), float(x) + half, high - float(y)))
-    assert len(boxes) > 12
-    assert overlapping(boxes) == 0
-
-
 def places_of_texts(
     owns: list[Rectangle], size: tuple[float, float], within: Rectangle, *, inside: bool
 ) -> list[Rectangle]:

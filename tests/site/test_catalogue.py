@@ -39,34 +39,6 @@ def changed(index: int, **keys: Any) -> list[Document]:
     return [{**each, **(keys if number == index else {})} for number, each in enumerate(ITEMS)]
 
 
-@pytest.mark.parametrize(
-    "keys",
-    [
-        {"name": "slab"},
-        {"length_modules": 4},
-        {"thickness_modules": 2},
-        {"height_m": 2.5},
-        {"cost": 5.0},
-        {"stock": 2},
-        {"rotatable": False},
-        {"stops_vehicles": False},
-    ],
-    ids=lambda keys: str(next(iter(keys))),
-)
-def test_everything_but_words_counts_in_the_hash(keys: Document) -> None:
-    assert yard(items=changed(0, **keys)).content_hash != yard().content_hash
-
-
-def test_words_and_defaults_do_not_count_in_the_hash() -> None:
-    same = yard(
-        items=changed(0, description="other words", rotatable=True, stops_vehicles=True),
-        stock=9,
-        module_cost=1.0,
-    )
-    assert same.content_hash == yard().content_hash
-    assert yard(stock=8).content_hash != yard().content_hash
-
-
 TWO_COSTS = {**AREA, "module_cost": 2.0, "cost_factor": 2.0}
 BAD: list[tuple[Document, str]] = [
     ({"items": changed(1, name="wall")}, "items[1].name: is 'wall', already the name of build_zo"),

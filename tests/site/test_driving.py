@@ -335,17 +335,6 @@ def test_a_rating_of_what_stops_nothing_is_refused() -> None:
         gate_site(build_zone=zone)
 
 
-def test_words_of_a_test_and_of_a_slow_area_count_for_no_hash() -> None:
-    table = {"corner_m": [1.0, 0.0], "size_m": [2.0, 8.0], "speed_km_h": 15.0}
-    hashes = {
-        rated_site(rating, slow=[table | {"reason": reason}]).content_hash
-        for rating in ("V/7200[N2A]/64/90:0.0", {"mass_kg": 7200.0, "speed_km_h": 64.0})
-        for reason in ("speed table", "hump")
-    }
-    assert len(hashes) == 1
-    assert rated_site("V/7200[N2A]/48/90:0.0").content_hash not in hashes
-
-
 def test_a_gate_with_a_rating_gives_way_to_what_is_faster() -> None:
     gate = {"corner_m": [4.0, 3.0], "size_m": [0.5, 2.0], "crash_rating": "V/7200[N2A]/32/90:0"}
     way = {"width_m": 2.0, "between": "left_right", "gate": gate}

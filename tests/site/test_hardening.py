@@ -154,17 +154,6 @@ def test_the_bill_has_measures_and_plans_have_not() -> None:
     assert len(list(barrier_features(plan.scenario, plan.layout))) == len(WALL)
 
 
-def test_a_probability_of_the_target_counts_for_no_hash() -> None:
-    """No load depends on it: it is for judgements."""
-    found = document(target="medium")
-    found["objective"]["target_probability"] = 0.95
-    probable = Scenario.from_document(found, "yard")
-    assert (
-        probable.content_hash
-        == Scenario.from_document(document(target="medium"), "yard").content_hash
-    )
-
-
 def test_hash_is_as_ever_where_nothing_of_it_is_used() -> None:
     unprotected = document()
     del unprotected["build_zone"]["hardening"]
@@ -172,20 +161,6 @@ def test_hash_is_as_ever_where_nothing_of_it_is_used() -> None:
     plain = Scenario.from_document(yard_document(), "yard")
     assert with_facade.content_hash == plain.content_hash
     assert glazed_yard().content_hash != plain.content_hash  # there is more to be built
-
-
-def test_facades_count_for_the_hash_where_their_response_does() -> None:
-    one = glazed_yard(charges="mean")
-    other = document(charges="mean")
-    other["structures"][0]["facade"] = {**FACADE, "wall": "brick_215", "glazing": "window_film_6"}
-    other["structures"][0]["facade"] |= {"bay_m": 3.0}
-    thicker = document(charges="mean")
-    thicker["components"] = {"pane": {**PANE, "thickness_mm": 5.56}}
-    renamed = document(charges="mean")
-    renamed["components"] = {"pane": {**PANE, "title": "another name"}}
-    hashes = [Scenario.from_document(each, "x").content_hash for each in (other, thicker, renamed)]
-    assert one.content_hash not in hashes[:2]
-    assert one.content_hash == hashes[2]
 
 
 @pytest.mark.parametrize(

@@ -24,10 +24,11 @@ from blast_env.layout import LayoutState, usable_cells
 from blast_env.layout.build_scene import build_scene, vehicle_reach, worst_places
 from blast_env.plots.plan import Kinds, site_features
 from blast_env.plots.site_picture import site_picture
-from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
+from blast_env.site import Scenario, ScenarioError
 from blast_env.site.scene import Charge
 from blast_env.site.worst_places import stand_off_m
 from blast_env.sites.turning import turned
+from tests.builders import block
 from tests.gas_sites import site_document
 from tests.vehicle_sites import gate_site, vehicle_of
 
@@ -82,21 +83,11 @@ def test_errors_name_value_bound_and_place(changes: dict[str, Any], key: str, wo
 def test_overlaps_are_of_modules_not_of_rectangles_around() -> None:
     """A hut in the corner of an L-shaped building stands free."""
     document = with_polygon(outline_m=[(6, 2), (9, 2), (9, 3), (7, 3), (7, 6), (6, 6)])
-    hut = {"kind": "ModularObstacle", "name": "hut", "rows": 2, "columns": 2, "height_m": 2.0}
-    document["structures"].append(hut | {"corner_m": [8.0, 4.0]})
+    document["structures"].append(block("hut", 8.0, 4.0, 2, 2, height_m=2.0))
     Scenario.from_document(document, "free")
     document["structures"][1]["corner_m"] = [6.5, 4.0]
     with pytest.raises(ScenarioError, match="overlaps"):
         Scenario.from_document(document, "not free")
-
-
-def test_files_hold_it(tmp_path: Path) -> None:
-    scenario = museum(courtyards_m=[COURT])
-    path = tmp_path / "museum.toml"
-    save_scenario(scenario, path)
-    again = load_scenario(path)
-    assert again == scenario
-    assert again.content_hash == scenario.content_hash != museum().content_hash
 
 
 def test_legality_and_clearance_keep_to_the_walls() -> None:

@@ -21,10 +21,10 @@ from blast_env.layout.build_scene import build_site, worst_places
 from blast_env.layout.placement import load_relevant
 from blast_env.plots.plan import Kinds, site_features
 from blast_env.site import Scenario, ScenarioError
+from tests.builders import block
 from tests.catalogue_sites import WALL, yard_document
 
-FENCE = {"kind": "ModularObstacle", "name": "fence", "rows": 8, "columns": 1}
-FENCE |= {"corner_m": [3.0, 4.0], "height_m": 2.0}
+FENCE = block("fence", 3.0, 4.0, 8, 1, height_m=2.0)
 AWAY = Removal.named("no_fence")
 SHORT = GasEngine(border_m=0.0)
 

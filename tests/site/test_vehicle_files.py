@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
-from blast_env.site import ScenarioError, parse_scenario, save_scenario
+from blast_env.site import ScenarioError
 from blast_env.site.sections import ChargeSource, VehicleSource
+from tests.builders import block
 from tests.vehicle_sites import gate_site, site_document, vehicle_document
 
 
@@ -18,11 +19,6 @@ def problems(vehicle: dict[str, Any] | None = None, **changes: Any) -> list[str]
 
 def entry(start_m: list[float], end_m: list[float]) -> dict[str, Any]:
     return {"entries": [{"start_m": start_m, "end_m": end_m}]}
-
-
-def wall(name: str, corner_m: list[float], rows: int, columns: int) -> dict[str, Any]:
-    kind = {"kind": "ModularObstacle", "name": name}
-    return kind | {"corner_m": corner_m, "rows": rows, "columns": columns}
 
 
 HUT = site_document()["structures"][0]
@@ -62,11 +58,11 @@ def test_a_vehicle_that_gets_nowhere_is_refused(changes: dict[str, Any], expecte
 
 
 def test_walls_with_gaps_narrower_than_the_vehicle_let_it_no_further_than_its_entry() -> None:
-    walls = [wall("low", [2.0, 0.0], 7, 1), wall("high", [2.0, 4.5], 7, 1)]
+    walls = [block("low", 2.0, 0.0, 7, 1), block("high", 2.0, 4.5, 7, 1)]
     assert problems(structures=[HUT, *walls])[0].startswith(
         "charge[0]: the vehicle comes no nearer to a protected structure than 9 m"
     )
-    walls[1] = wall("high", [2.0, 5.5], 5, 1)
+    walls[1] = block("high", 2.0, 5.5, 5, 1)
     assert gate_site(structures=[HUT, *walls])
 
 
@@ -128,35 +124,6 @@ def test_a_gate_that_does_not_fit_its_way_is_refused(gate: dict[str, Any], messa
     way = {"width_m": 2.0, "between": "left_right", "gate": gate}
     zone = site_document()["build_zone"] | {"access_way": way}
     assert problems(build_zone=zone) == [f"build_zone.access_way.gate: {message}"]
-
-
-def test_a_file_of_a_vehicle_comes_back_equal(tmp_path: Any) -> None:
-    ditch = {"corner_m": [6.0, 0.0], "size_m": [1.0, 1.0], "reason": "a ditch"}
-    ground = {"corner_m": [0.0, 0.0], "size_m": [14.0, 8.0]}
-    scenario = gate_site(vehicle_document(keep_outs=[ditch], drivable=[ground], apart_m=3.0))
-    path = tmp_path / "gate.toml"
-    save_scenario(scenario, path)
-    again = parse_scenario(path.read_text(encoding="utf-8"), "gate")
-    assert again == scenario
-    assert again.content_hash == scenario.content_hash
-
-
-def test_the_hash_counts_what_a_vehicle_does_but_no_words() -> None:
-    def hash_with(changes: dict[str, Any]) -> str:
-        return gate_site(vehicle_document(**changes)).content_hash
-
-    def pond(reason: str) -> list[dict[str, Any]]:
-        return [{"corner_m": [6.0, 0.0], "size_m": [1.0, 1.0], "reason": reason}]
-
-    assert hash_with({"keep_outs": pond("a pond")}) == hash_with({"keep_outs": pond("a lake")})
-    changed: list[dict[str, Any]] = [
-        {},
-        {"width_m": 2.5},
-        {"places": 2},
-        {"apart_m": 3.0},
-        {"keep_outs": pond("a pond")},
-    ]
-    assert len({hash_with(each) for each in changed}) == len(changed)
 
 
 def test_the_page_on_vehicles_names_every_key() -> None:

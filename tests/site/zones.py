@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from blast_env.geometry import Cell, Piece, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.site import BuildZone, Scenario, ScenarioError
-from tests.site.documents import Document
+from tests import builders
+from tests.builders import Document, block, point, site_document
 
 CORNER_M = (10.0, 10.0)
 """Lower left corner of the zone."""
@@ -26,9 +27,7 @@ TERRACES = ((4, 3), (8, 2), (3, 8))
 
 def structure(name: str, x_m: float, y_m: float, rows: int, columns: int) -> Document:
     """An unprotected structure, its corner so far from the zone's corner."""
-    corner_m = [CORNER_M[0] + x_m, CORNER_M[1] + y_m]
-    shape = {"corner_m": corner_m, "rows": rows, "columns": columns}
-    return {"kind": "ModularObstacle", "name": name, **shape}
+    return block(name, CORNER_M[0] + x_m, CORNER_M[1] + y_m, rows, columns)
 
 
 def area(x_m: float, y_m: float, width_m: float, height_m: float, **keys: Any) -> Document:
@@ -40,14 +39,9 @@ def area(x_m: float, y_m: float, width_m: float, height_m: float, **keys: Any) -
 def zone_document(*structures: Document, **zone: Any) -> Document:
     """A zone of 8 x 8 cells and 10 modules, unless said otherwise; all else is far away."""
     protected = {**structure("protected", 20.0, 20.0, 2, 2), "protected": True}
-    return {
-        "schema_version": 2,
-        "name": "zone",
-        "site": {"width_m": 40.0, "height_m": 40.0},
-        "charge": [{"kind": "point", "position_m": [2.0, 2.0], "tnt_kg": 100.0}],
-        "structures": [protected, *structures],
-        "build_zone": {"corner_m": list(CORNER_M), "rows": 8, "columns": 8, "stock": 10, **zone},
-    }
+    cells = builders.zone(*CORNER_M, 8, 8, stock=10) | zone
+    charge = point(2.0, 2.0)
+    return site_document("zone", (40.0, 40.0), charge, protected, *structures, build_zone=cells)
 
 
 def zone_scenario(*structures: Document, **zone: Any) -> Scenario:

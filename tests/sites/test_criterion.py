@@ -5,7 +5,8 @@ import pytest
 from blast_env.site import load_scenario
 from blast_env.sites import Objection, VisibilityCriterion, criterion
 from blast_env.sites.criterion import Visibility
-from tests.sites.cases import block, yard
+from tests.builders import block
+from tests.sites.cases import yard
 
 ANY = VisibilityCriterion(0.0, 0.0, 1.0, 0.0)
 

@@ -11,7 +11,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, load_scenario
 from blast_env.sites import Visibility, visibility_layout
-from tests.sites.cases import COLUMNS, ROWS, block, yard, yard_document
+from tests.builders import block
+from tests.sites.cases import COLUMNS, ROWS, yard, yard_document
 
 CELLS = st.tuples(st.integers(0, ROWS - 1), st.integers(0, COLUMNS - 1))
 YARD_LINES = Visibility.of(yard())

@@ -2,19 +2,16 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from typer import Typer
 from typer.testing import CliRunner, Result
 
 from blast_env import Scenario, simulate
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.layout.build_scene import draw_charge
 from studies import bench
-from studies.bench import SiteCost, blast_cost, environment_cost, site_cost, street
-from tests.envs.small import ThinEngine, small_document
-from tests.gas_sites import hut
+from studies.bench import SiteCost, blast_cost, site_cost, street
+from tests.envs.small import small_document
 
 
 def run(*arguments: str) -> Result:
@@ -36,30 +33,6 @@ def test_a_blast_is_timed_with_the_steps_that_it_has() -> None:
     assert cost.cpu_s > 0.0
 
 
-def test_a_blast_of_gas_counts_its_cells() -> None:
-    cost = blast_cost(hut(), "gas", repeats=1, memory=False)
-    assert cost.cell_updates is not None
-    assert cost.cell_updates > 1000 * cost.steps
-
-
-def test_memory_is_that_of_a_process_of_its_own() -> None:
-    assert 50.0 < bench.peak_memory_mb(small(), "event") < 1000.0
-
-
-def test_an_episode_is_its_placements_and_its_blast() -> None:
-    chosen = {"scenario": small(), "engine": ThinEngine()}
-    cost = environment_cost(chosen, episodes=1, environments=3, memory=False)
-    assert cost.steps == 3  # the stock
-    assert 0.0 < cost.placing_s < cost.episode_s
-    assert cost.blast_s + cost.placing_s == pytest.approx(cost.episode_s)
-    assert cost.batch_steps_per_s > 0.0
-
-
-def test_a_scenario_without_a_build_zone_has_no_environment() -> None:
-    with pytest.raises(BlastEnvError, match="build zone"):
-        environment_cost({"scenario": "free_field", "engine": "event"}, 1, 3)
-
-
 def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("studies.bench.load_scenario", lambda _: small())
     options = ("--engine", "event", "--repeats", "1", "--no-memory")
@@ -71,17 +44,6 @@ def test_the_command_prints_a_row_a_scenario_and_engine(monkeypatch: pytest.Monk
     refused = run("--engine", "steam")
     assert refused.exit_code == 2
     assert "steam" in refused.output
-
-
-def test_a_street_keeps_its_proportions() -> None:
-    """In whole modules; so does the cube root of the charge."""
-    long, short = street(100.0), street(50.0)
-    assert [each.name for each in long.structures] == [each.name for each in short.structures]
-    for one, other in zip(long.structures, short.structures, strict=True):
-        near, far = np.array(other.rectangle_m), np.array(one.rectangle_m)
-        assert near == pytest.approx(far / 2.0, abs=0.75)
-    heavy_kg, light_kg = (draw_charge(each, 0).tnt_kg for each in (long, short))
-    assert heavy_kg == pytest.approx(8.0 * light_kg)
 
 
 @pytest.fixture(scope="module")
@@ -111,19 +73,3 @@ def test_the_command_prints_a_row_for_each_site_and_way_of_growing(
     rows = [line.split()[:2] for line in result.output.splitlines()]
     assert ["street_20_m", "coarse"] in rows
     assert ["visitor_entrance", "coarse"] in rows
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--site", "small"), "small: is 'small', there is no such bundled scenario"),
-        (("--cells", "fine"), "--cells needs --site"),
-        (("--site", "large", "--cells", "big"), "cells is 'big', must be"),
-        (("--site", "large", "--length", "2"), "--length is 2, must be 20 to 200"),
-        (("--length", "50"), "--length needs --site large"),
-    ],
-)
-def test_wrong_options_of_large_sites_are_named(options: tuple[str, ...], words: str) -> None:
-    refused = run(*options)
-    assert refused.exit_code == 2
-    assert words in " ".join(refused.output.split())

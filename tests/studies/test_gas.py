@@ -7,15 +7,14 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.layout.build_scene import draw_charge
 from blast_env.particles.run import EndReason
-from blast_env.site import Scenario, load_scenario
-from studies.gas.cells import CellLoads, cell_loads, difference
+from blast_env.site import Scenario
+from studies.gas.cells import CellLoads, difference
 from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending, sites
-from studies.gas.loads import impulse_until, protected_impulse_pa_s, with_heights, yard
+from studies.gas.loads import impulse_until, yard
 from studies.gas.reference import free_field, wide_wall
-from tests.gas_sites import glazed_hut, hut
+from tests.gas_sites import glazed_hut
 
 WALL = tuple((row, 4) for row in range(4, 12))
 
@@ -34,28 +33,6 @@ def test_waves_are_held_against_the_curves() -> None:
     assert wave.impulse == pytest.approx(1.0, abs=0.10)
     assert (wall.arrival, wave.arrival) == pytest.approx((1.0, 1.0), abs=0.05)
     assert max(wall.peak, wave.peak) < 0.7
-
-
-def test_heights_are_given_to_everything() -> None:
-    courtyard = load_scenario("courtyard")
-    tall = with_heights(courtyard, 5.0, 2.0, 14.0)
-    assert [each.height_m for each in tall.structures] == [5.0]
-    assert tall.zone.height_m == 2.0
-    assert tall.air_height_m == 14.0
-    assert draw_charge(tall, 3) == draw_charge(courtyard, 3)
-    assert courtyard.structures[0].height_m is None
-
-
-def test_the_load_is_the_mean_by_weight_of_the_protected(site: Scenario) -> None:
-    document = site.model_dump()
-    (first,) = document["structures"]
-    other = {**first, "name": "other", "corner_m": (8.0, 9.0), "rows": 2, "weight": 3.0}
-    aside = {**first, "name": "aside", "corner_m": (8.0, 1.0), "rows": 2, "protected": False}
-    document["structures"] = [first, other, aside]
-    result = GasBlast(Scenario.from_document(document, "three")).run()
-    loads = {name: result.impulse(name).pa_s for name in ("building", "other")}
-    expected = (loads["building"] + 3.0 * loads["other"]) / 4.0
-    assert protected_impulse_pa_s(result) == pytest.approx(expected)
 
 
 def test_a_run_misses_next_to_nothing(site: Scenario) -> None:
@@ -90,18 +67,6 @@ def test_borders_farther_away_change_loads_little(site: Scenario) -> None:
     )
     assert default == pytest.approx(wide, rel=0.01)
     assert near == pytest.approx(wide, rel=0.01)
-
-
-def test_loads_of_layouts_are_timed(site: Scenario) -> None:
-    found = cell_loads(site, [WALL], draw_charge(site, 0), GasEngine(), until_s=0.03)
-    assert 0.0 < found.reduction[0] < 0.4
-    assert found.cpu_s > 0.0
-
-
-def test_without_a_time_loads_are_those_of_the_end() -> None:
-    site = hut()
-    at_end = cell_loads(site, [], draw_charge(site, 0), GasEngine())
-    assert at_end.unprotected_pa_s == protected_impulse_pa_s(GasBlast(site).run())
 
 
 def test_differences_of_cells_by_hand() -> None:

@@ -9,7 +9,7 @@ import blast_env
 from blast_env.cli import app
 from blast_env.evaluation.engines import default_engine
 from blast_env.site import load_scenario, save_scenario
-from tests.gas_sites import WALL, glazed_hut, hut
+from tests.gas_sites import hut
 
 
 @pytest.fixture
@@ -46,14 +46,3 @@ def test_particles_that_are_asked_for_say_what_they_leave_aside(site: Path) -> N
     assert result.stdout.startswith("engine event")
     for note in hut().height_notes:
         assert note in " ".join(result.stdout.split())
-
-
-def test_each_result_names_its_engine_first(tmp_path: Path) -> None:
-    site = tmp_path / "glazed_hut.toml"
-    save_scenario(glazed_hut(), site)
-    layout = blast_env.write_layout(tmp_path / "wall.json", glazed_hut(), WALL)
-    coarse = ("--cell", "0.5")
-    judged = run("evaluate", "--layout", layout, "--scenario", site, "--seeds", "1", *coarse)
-    assert judged.stdout.startswith("engine gas")
-    found = run("search", "--method", "random", "--scenario", site, "--budget", "2")
-    assert found.stdout.startswith("engine gas")

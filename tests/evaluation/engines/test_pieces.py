@@ -8,7 +8,6 @@ import pytest
 import blast_env
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasResult
-from blast_env.site import ScenarioError
 from tests.catalogue_sites import ITEMS, WALL, yard
 from tests.gas_sites import WALL as MODULES
 from tests.gas_sites import hut, net_on_modules
@@ -87,17 +86,3 @@ def test_modules_are_pieces_and_walls_as_high_as_the_air_are_none() -> None:
     assert len(endless.pieces) == 0
     with pytest.raises(BlastEnvError, match="no piece"):
         endless.piece_history("x4.250_y2.750")
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"mass_kg": -1.0}, r"items\[0\].mass_kg: is -1.0: Input should be greater"),
-        ({"base_width_m": 0.0}, r"items\[0\].base_width_m: is 0.0: Input should be greater"),
-        ({"friction": 3.0}, r"items\[0\].friction: .*is 3.0: Input should be less"),
-        ({"anchorage_n": "strong"}, r"items\[0\].anchorage_n"),
-    ],
-)
-def test_wrong_values_are_named(keys: dict[str, Any], words: str) -> None:
-    with pytest.raises(ScenarioError, match=words):
-        yard(items=[ITEMS[0] | keys, *ITEMS[1:]])

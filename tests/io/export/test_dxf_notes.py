@@ -206,9 +206,3 @@ def test_the_clearance_is_a_dashed_line_at_its_distance_from_every_structure(
         assert (min(x), max(x)) == pytest.approx(
             structure.rectangle_m.grown(CLEARANCE_M)[0::2]
         )  # the line goes all the way round
-
-
-def test_without_a_clearance_the_layer_is_empty(tmp_path: Path) -> None:
-    document = drawn(LayoutPlan(JUNCTION, ()), tmp_path)
-    assert "CLEARANCE" in document.layers
-    assert not document.modelspace().query('*[layer=="CLEARANCE"]')

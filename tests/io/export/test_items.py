@@ -7,14 +7,13 @@ from typing import Any
 
 import openpyxl
 import pandas as pd
-import pytest
 from ezdxf.entities.lwpolyline import LWPolyline
 from ezdxf.filemanagement import readfile
 
 from blast_env import load_scenario
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.bill import BILL_COLUMNS, PIECE_COLUMNS
-from blast_env.layout import LayoutState, load_layout
+from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import build_site
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
@@ -124,14 +123,6 @@ def test_dxf_has_pieces_as_high_as_they_are_with_their_names(tmp_path: Path) -> 
     lines = " ".join(notes.plain_text(split=True))  # type: ignore[attr-defined]
     assert "wall: 2 of a stock of 3, 1.5 m x 0.5 m, 2 m high" in lines
     assert "Budget: 20, of which the pieces take 13" in lines
-
-
-@pytest.mark.parametrize("suffix", [".json", ".bill.csv"])
-def test_what_is_written_has_no_stray_files(tmp_path: Path, suffix: str) -> None:
-    path = export_layout(plan(), tmp_path / f"layout{suffix}")
-    assert [each.name for each in tmp_path.iterdir()] == [path.name]
-    if suffix == ".json":
-        assert load_layout(path, yard()) == WALL
 
 
 def test_a_description_that_looks_like_a_formula_is_a_text_in_the_bill(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from functools import partial
-from itertools import combinations, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError
-from blast_env.io.imported_site import imported_plan
 from blast_env.io.importing import ImportedSite, ImportOptions, import_site
 from blast_env.io.importing.ledger import Deed, Ledger, LedgerEntry
 from blast_env.plots.plan import site_features
@@ -392,21 +391,6 @@ def retitled(scenario: Scenario) -> Scenario:
     document = scenario.model_dump()
     document["structures"][0]["title"] = "other"
     return Scenario.from_document(document, "retitled")
-
-
-@pytest.mark.usefixtures("laid_out")
-def test_labels_of_real_names_do_not_lie_on_each_other(tmp_path: Path) -> None:
-    names = [f"Государственное бюджетное учреждение культуры № {k}" for k in range(8)]
-    row = [
-        outline(rectangle(12 * (k % 4), 14 * (k // 4), 10, 8), name=each, height=6.0)
-        for k, each in enumerate(names)
-    ]
-    site = imported(written(tmp_path, *row, PLACE), protect=(names[0],))
-    axes = imported_plan(site).axes[0]
-    boxes = [text.get_window_extent() for text in axes.texts if "\n" in text.get_text()]
-    assert len(boxes) == len(names)
-    for one, other in combinations(boxes, 2):
-        assert not one.overlaps(other)
 
 
 # Drawings.

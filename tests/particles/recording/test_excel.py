@@ -1,8 +1,6 @@
 from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
 
-import pandas as pd
 import pytest
 
 from blast_env.evaluation.engines import BlastResult, simulate
@@ -10,17 +8,12 @@ from blast_env.particles.tables import (
     COLLISION_COLUMNS,
     MODULE_COLUMNS,
     STRUCTURE_COLUMNS,
-    RunRecord,
 )
 from blast_env.particles.workbook import (
     EXCEL_ROWS,
-    MOST_PRINTED_ROWS,
-    SheetTable,
     record_cells,
-    write_tables,
     write_workbook,
 )
-from blast_env.tables import Column
 from tests.design.search_cases import small_scenario
 from tests.particles.recording import workbooks
 from tests.particles.recording.conftest import SEED
@@ -37,11 +30,6 @@ def workbook(blast: BlastResult, tmp_path_factory: pytest.TempPathFactory) -> An
 
 def run_record(sheet: Any) -> dict[str, Any]:
     return dict(workbooks.rows(sheet)[1:])
-
-
-def test_sheets(workbook: Any) -> None:
-    names = ["Run", "Structures", "Modules", "Collisions", "Columns"]
-    assert workbook.sheetnames == names
 
 
 @pytest.mark.parametrize(("sheet", "attribute"), TABLES)
@@ -108,29 +96,6 @@ def test_headings_are_frozen_and_tables_have_filters(workbook: Any) -> None:
             assert sheet.auto_filter.ref == sheet.dimensions
 
 
-def test_numbers_have_the_format_of_their_unit(workbook: Any) -> None:
-    headings, first = workbook["Collisions"]["1:2"]
-    formats = {
-        heading.value: cell.number_format for heading, cell in zip(headings, first, strict=True)
-    }
-    assert formats["time (s)"] == "0.000000"
-    assert formats["impulse, m|v| (sim)"] == "#,##0.00"
-    assert formats["particle id"] == "0"
-
-
-def test_no_number_is_wider_than_its_column(workbook: Any) -> None:
-    for sheet in (workbook["Structures"], workbook["Modules"], workbook["Collisions"]):
-        for column in sheet.iter_cols(min_row=2):
-            numbers = [cell for cell in column if isinstance(cell.value, int | float)]
-            shown = [len(f"{cell.value:,.{_decimals(cell)}f}") for cell in numbers]
-            if shown:
-                assert max(shown) < sheet.column_dimensions[numbers[0].column_letter].width
-
-
-def _decimals(cell: Any) -> int:
-    return len(cell.number_format.partition(".")[2])
-
-
 def test_a_blast_without_a_hit_has_empty_tables(quiet_blast: BlastResult, tmp_path: Path) -> None:
     workbook = workbooks.load(quiet_blast.to_excel(tmp_path / "quiet.xlsx"))
     assert workbook["Collisions"].max_row == 1
@@ -166,23 +131,6 @@ def test_a_limit_that_excel_cannot_have_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=f"is {limit}, must be between 2 and {EXCEL_ROWS}"):
         write_workbook(blast, tmp_path / "blast.xlsx", limit)
-
-
-def test_a_long_table_prints_on_few_pages(tmp_path: Path) -> None:
-    """Thousands of collisions would be hundreds of pages; the sheet has them all the same."""
-    table = pd.DataFrame({"number": range(3000)})
-    record: RunRecord = {"scenario": "a", "engine": "b", "blast-env version": "c"}
-    columns = (Column("number", "", "a number"),)
-    path = write_tables(record, [SheetTable("Long", table, columns)], tmp_path / "a.xlsx")
-    with ZipFile(path) as file:
-        names = file.read("xl/workbook.xml").decode()
-        sheet = file.read("xl/worksheets/sheet2.xml").decode()
-    assert f"Long!$A$1:$A${MOST_PRINTED_ROWS + 1}" in names
-    assert "Long!$1:$1" in names  # the headings come again on every page
-    assert 'orientation="landscape"' in sheet
-    assert 'fitToHeight="0"' in sheet
-    assert sheet.count("<row ") == 3001
-    assert "of 3,000 rows" in sheet
 
 
 @pytest.fixture(scope="module")
