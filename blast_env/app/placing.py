@@ -85,7 +85,7 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
             item.name,
             f"{item.name}, {item.length_modules * MODULE_SIDE_M:g} x"
             f" {item.thickness_modules * MODULE_SIDE_M:g} m, {item.height_m:g} m high,"
-            f" cost {item.cost:g}",
+            f" {zone.priced(item.cost)}",
             len(item.orientations) > 1,
             left,
         )
@@ -96,15 +96,17 @@ def palette(scenario: Scenario, layout: Layout) -> tuple[Placeable, ...]:
 def measures(scenario: Scenario, layout: Layout) -> tuple[Measurable, ...]:
     """Return the measures that a layout may take; none without a build zone."""
     zone = scenario.build_zone
+    if zone is None:
+        return ()
     known = {**catalogue(), **scenario.components}
     return tuple(
         Measurable(
             each.name,
-            f"{each.name}, cost {each.cost:g}",
+            f"{each.name}, {zone.priced(each.cost)}",
             _words_of(each, known),
             Measure.named(each.name) in layout,
         )
-        for each in (() if zone is None else zone.measures)
+        for each in zone.measures
     )
 
 
@@ -191,11 +193,12 @@ def counted(scenario: Scenario, layout: Layout) -> str:
         return "no build zone"
     placement = LayoutState.of(scenario.without_budget, layout)
     what = "pieces" if zone.items else "modules"
-    words = f"{len(layout)} of {zone.stock} {what}, cost {placement.cost:g}"
+    words = f"{len(layout)} of {zone.stock} {what}, "
     if zone.budget is None:
-        return words
+        return words + zone.priced(placement.cost)
+    words += f"{placement.cost:,.10g} of {zone.priced(zone.budget)}"
     over = placement.cost - zone.budget
-    return f"{words} of {zone.budget:g}" + (f": {over:g} over the budget" if over > 0.0 else "")
+    return words + (f": {over:,.10g} over the budget" if over > 0.0 else "")
 
 
 def cost_of(scenario: Scenario, layout: Layout) -> float:

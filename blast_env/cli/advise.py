@@ -140,4 +140,5 @@ def _draw(advice: Advised) -> "Figure":
     count = len(judge.problem.threats)
     title = f"{scenario.name}: cost of each higher level, worst of {count} charges"
     engines = judge.problem.evaluator.engine.words, judge.engine.words
-    return cost_level_figure(tried, pairs, judge.target, title, engines)
+    unit = scenario.zone.cost_unit
+    return cost_level_figure(tried, pairs, judge.target, title, engines, unit)

@@ -174,6 +174,7 @@ class BuildingResponse:
         )
 
 
+_NONE: Final = "\N{EN DASH}"
 _AMBIENT_PA: Final = 101_325.0
 
 
@@ -220,10 +221,11 @@ class BuildingSummary(NamedTuple):
         level: Level of protection in words, with that on the cells where it is higher.
         broken: Expected number of broken panes.
         panes: Number of its panes.
-        condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
+        condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933; a dash
+            without panes.
         failed: Number of wall panels with hazardous damage or worse.
         panels: Number of its wall panels.
-        damage: Damage of the worst panel.
+        damage: Damage of the worst panel; a dash without panels.
     """
 
     level: str
@@ -366,15 +368,18 @@ class Consequences:
     def summary(self, building: str) -> BuildingSummary:
         """Return the response of a building under the worst charge, number by number."""
         found = [each.facade for each in self.of(building)]
+        walled = len(found[0].walled)
         hazardous = [[each >= DamageLevel.HAZARDOUS for each in one.walls.levels] for one in found]
         return BuildingSummary(
             level=self.level_words(building),
             broken=max(each.broken_panes for each in found),
             panes=found[0].panes,
-            condition=max(each.worst_condition for each in found).words,
+            condition=max(each.worst_condition for each in found).words
+            if found[0].panes
+            else _NONE,
             failed=max(map(sum, hazardous)),
-            panels=len(found[0].walled),
-            damage=max(each.worst_damage for each in found).name.lower(),
+            panels=walled,
+            damage=max(each.worst_damage for each in found).name.lower() if walled else _NONE,
         )
 
     def worst_damage(self, scenario: Scenario) -> float:

@@ -30,6 +30,7 @@ _LEVEL_WORDS: Final = {
 }
 _NOTHING: Final = "#d4d8dd"
 _GAP_M: Final = 2.0
+_WIDTH_IN: Final = 10.0
 
 
 def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> Figure:
@@ -40,14 +41,16 @@ def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> 
             in all rows.
         title: Title of the picture.
     """
-    height = 1.6 + 2.5 * len(rows)
-    figure = Figure(figsize=(10.0, height), layout="constrained")
+    figure = Figure(layout="constrained")
     axes = figure.subplots(len(rows), 1, squeeze=False)[:, 0]
     figure.suptitle(title)
     for plot, (words, response) in zip(axes, rows, strict=True):
         _draw(plot, response.facade)
         level = response.facade.level_of_protection.label
         plot.set_title(f"{words}: level of protection {level}", fontsize=10, loc="left")
+    (left, right), (_, top) = axes[0].get_xlim(), axes[0].get_ylim()
+    row_in = min(2.5, 1.0 + _WIDTH_IN * top / (right - left))
+    figure.set_size_inches(_WIDTH_IN, 1.6 + row_in * len(rows))
     handles = [
         Patch(facecolor=LEVEL_COLOURS[level], edgecolor="0.4", label=words)
         for level, words in _LEVEL_WORDS.items()
@@ -65,7 +68,7 @@ def facade_picture(rows: Sequence[tuple[str, BuildingResponse]], title: str) -> 
 
 def _draw(plot: Axes, facade: FacadeResponse) -> None:
     """Draw the walls side by side, seen from outside."""
-    begin, ticks = 0.0, []
+    begin, ticks = 0.0, list[tuple[float, str]]()
     places = dict.fromkeys(_place_of(each.bay) for each in facade.bays)
     top_m = max(each.bay.top_m for each in facade.bays)
     for structure, wall, line_number in places:
@@ -85,12 +88,13 @@ def _draw(plot: Axes, facade: FacadeResponse) -> None:
             colour = _NOTHING if level is None else LEVEL_COLOURS[level]
             _add(plot, left_m, bay.floor_m, bay.width_m, bay.height_m, colour)
             _add_panes(plot, left_m, facade, index)
-        ticks.append((begin + 0.5 * (high - low), f"{structure}, {wall}"))
+        lower = "\n\n" * (len(ticks) % 2)  # labels of narrow walls would lie on each other
+        ticks.append((begin + 0.5 * (high - low), f"{lower}{structure}\n{wall}"))
         begin += high - low + _GAP_M
     plot.set_xlim(-0.5, begin - _GAP_M + 0.5)
     plot.set_ylim(0.0, 1.05 * top_m)
     plot.set_aspect("equal")
-    plot.set_xticks([place for place, _ in ticks], [words for _, words in ticks])
+    plot.set_xticks([place for place, _ in ticks], [words for _, words in ticks], fontsize=8)
     plot.set_ylabel("height (m)")
     plot.spines[["top", "right"]].set_visible(False)
 

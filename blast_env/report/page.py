@@ -134,11 +134,24 @@ def report_html(study: Study, commands: list[str]) -> str:
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),
         "money": study.scenario.zone.priced,
+        "sum": "{:,.10g}".format,
+        "wide_first": lambda pictures: sorted(pictures, key=lambda each: _steepness(each[1])),
         "picture": lambda png: f"data:image/png;base64,{b64encode(png).decode()}",
     }
+    environment.tests["narrow"] = lambda png: _steepness(png) > _NARROW
     code = _template_code(environment)
     template = environment.template_class.from_code(environment, code, environment.globals)
     return template.render(_context(study, commands))
+
+
+_NARROW: Final = 0.7
+"""Height of a picture, as a share of its width, from which two fit beside each other."""
+
+
+def _steepness(png: bytes) -> float:
+    """Return the height of a picture as a share of its width."""
+    width, height = (int.from_bytes(png[start : start + 4]) for start in (16, 20))
+    return height / max(width, 1)
 
 
 _COMPILED: Final[dict[str, CodeType]] = {}

@@ -132,7 +132,7 @@ class BuildZone(Section):
         module_cost: Cost of a module outside all cost areas, without a catalogue.
         cost_areas: Areas with another cost; the highest one counts.
         budget: Largest total cost of a layout; unlimited unless given.
-        currency: Unit of all costs, as `EUR`.
+        currency: Unit of all costs, as `EUR`; see `cost_unit`.
         access_way: A way across the zone that must stay open, if there is one.
         height_m: Height of the modules, without a catalogue; the height of the air unless given.
     """
@@ -170,8 +170,13 @@ class BuildZone(Section):
         return {**given, "stock": min(max(pieces, 1), MOST_STOCK)}
 
     def priced(self, cost: float) -> str:
-        """Return a cost with its currency: `12,000 EUR`."""
-        return f"{cost:,.10g} {self.currency}".rstrip()
+        """Return a cost with its unit: `12,000 EUR`."""
+        return f"{cost:,.10g} {self.cost_unit}"
+
+    @property
+    def cost_unit(self) -> str:
+        """The unit of costs: the currency, or `cost units` without one."""
+        return self.currency or "cost units"
 
     @property
     def catalogue(self) -> Catalogue:
@@ -475,6 +480,16 @@ def usable_cells(surroundings: Surroundings) -> BoolArray:
     for _, blocked in _blocked(surroundings, surroundings.zone.boxes):
         usable &= ~blocked
     return usable
+
+
+def reasons_against(surroundings: Surroundings, cells: BoolArray) -> dict[str, int]:
+    """Return the first reason against the use of each cell of a mask, with the number of cells."""
+    left, found = cells.copy(), {}
+    for reason, blocked in _blocked(surroundings, surroundings.zone.boxes):
+        if count := int((left & blocked).sum()):
+            found[reason] = count
+        left &= ~blocked
+    return found
 
 
 def reason_against(surroundings: Surroundings, cell: Cell) -> str | None:

@@ -325,7 +325,7 @@ def test_the_verdict_comes_first_and_says_what_it_rests_on(study: Study, page: s
     first = page[page.index("<h3>Verdict") : page.index("<h2>")]
     assert f">{verdict.word}<" in first
     assert f"<td>{behind.broken:.1f} of 8</td>" in first
-    assert '<td class="l">4, for 4 modules</td>' in first
+    assert '<td class="l">4 cost units, for 4 modules</td>' in first
     assert f"level {study.target.label!r}".replace("'", "&#39;") in first
     assert "driven by" in first
     assert "with it the level is kept at the same place" in first

@@ -170,7 +170,7 @@ class Advised:
                 (
                     each.kind,
                     layout_words(each.layout),
-                    f"{LayoutState(scenario, each.layout).cost:g}",
+                    f"{LayoutState(scenario, each.layout).cost:,.10g}",
                     str(each.blasts),
                     min(seen.level(building) for building in seen.buildings).label,
                     "yes" if each.passes else "no",
@@ -179,7 +179,9 @@ class Advised:
                     probability_text(judge.shares[each.layout], DRAWS),
                 )
             )
-        title = f"{scenario.name}: budget {scenario.zone.budget:g}, required level {target.label!r}"
+        zone = scenario.zone
+        budget = "no limit" if zone.budget is None else zone.priced(zone.budget)
+        title = f"{scenario.name}: budget {budget}, required level {target.label!r}"
         yield AnswerTable.of(title, _HEADERS, rows, 2)
         yield (
             f"passes: by the search; judged: {judge.engine.words}; level, sharp peaks: the same "
