@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.engines import Engine, find_engine
 from blast_env.evaluation.engines.contract import (
     CALIBRATED_ENGINES,
@@ -43,6 +44,11 @@ COARSE: Final = "coarse.json"
 _PLUS_MINUS: Final = "\N{PLUS-MINUS SIGN}"
 _DASH: Final = "\N{EN DASH}"
 TOGETHER: Final = "all protected"
+_HEADERS: Final = (
+    *("layout", "threat", "structure", "impulse (Pa\N{NO-BREAK SPACE}s)", "peak (kPa)", "counts: "),
+    *("reduction", "cost", "engine", "standing of the load"),
+)
+_LOAD, _COST = _HEADERS.index("counts: "), _HEADERS.index("cost")
 FILM: Final = "film.json"
 MOST_BYTES: Final = 50_000_000
 """Largest size of a file of the work folder."""
@@ -147,36 +153,6 @@ class Picture(Kept):
 
     file: str
     label: str
-
-
-class BuildingVerdict(Kept):
-    """The response of a building with a facade to a blast.
-
-    Attributes:
-        building: Its name.
-        level: Level of protection that it reaches, from 0, below standards, to 4, high.
-        level_on_cells: The same by the clipped peaks on the cells alone.
-        panes: Number of its panes.
-        broken: Expected number of broken panes.
-        condition: Performance condition of its worst pane, GSA, and its rating, ISO 16933.
-        damage: Damage of its worst wall panel; empty where it has none.
-        total_damage: Damage of all its components, added up.
-        impulse_pa_s: Mean impulse on its bays.
-        likely: Probability of the level or a higher one.
-        standing: Standing of the load that decides, with its reason.
-    """
-
-    building: str
-    level: int
-    level_on_cells: int
-    panes: int
-    broken: float
-    condition: str
-    damage: str
-    total_damage: float
-    impulse_pa_s: float
-    likely: float
-    standing: str
 
 
 class BlastRecord(Kept):
@@ -304,68 +280,12 @@ def blast_key(scenario: Scenario, layout: Layout, charge: Charge, engine: Engine
     return sha256(repr(depends).encode()).hexdigest()[:24]
 
 
-class Row(Kept):
-    """A row of the comparison.
-
-    Attributes:
-        layout: Name of the layout, or "no barrier".
-        threat: Name of the threat, or "all" of so many.
-        structure: Name of the structure, or "all protected".
-        impulse: Impulse in Pa s, with its interval where there is one.
-        peak: Peak in kPa.
-        load: Load by the site's objective, with its unit.
-        cost: Cost of the layout.
-        reduction: Reduction of the load that counts, against no barrier under the same threat.
-        engine: The engine in words.
-        standing: Standing of the load, with its reason.
-    """
-
-    layout: str
-    threat: str
-    structure: str
-    impulse: str
-    peak: str
-    load: str
-    cost: str
-    reduction: str
-    engine: str
-    standing: str
-
-
-class VerdictRow(Kept):
-    """A row of the table of buildings: a layout under one threat, or under the worst of them.
-
-    Attributes:
-        layout: Name of the layout, or "no barrier".
-        threat: Name of the threat, or "worst of" so many.
-        building: Name of the building.
-        level: Level of protection that it reaches.
-        likely: Probability of that level or a higher one; a dash below all of them.
-        panes: Expected number of broken panes, and the number of panes.
-        condition: Performance condition of the worst pane, GSA, and its rating, ISO 16933.
-        damage: Damage of the worst wall panel.
-        standing: Standing of the load that decides, with its reason.
-        flags: Reasons to distrust its loads; a dash if there are none.
-    """
-
-    layout: str
-    threat: str
-    building: str
-    level: str
-    likely: str
-    panes: str
-    condition: str
-    damage: str
-    standing: str
-    flags: str
-
-
 def comparison(
     records: Sequence[tuple[str, float, BlastRecord]],
     without: Mapping[str, BlastRecord],
     scenario: Scenario,
     coarse: Mapping[str, CoarseLoads] = MappingProxyType({}),
-) -> list[Row]:
+) -> AnswerTable:
     """Return the comparison of layouts, one row per layout, threat and structure.
 
     With several threats, the last rows hold the load by the site's objective over all of them, for
@@ -379,7 +299,7 @@ def comparison(
     """
     objective = scenario.objective
     errors = _errors(records, without, objective, coarse)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, cost, record in records:
         unprotected, error = without.get(record.threat), errors.get(name)
         for title, names in _shown(record):
@@ -393,22 +313,30 @@ def comparison(
             load_off = nan if error is None else error.of_load(load_of)
             low_high = record.intervals.get(title)
             rows.append(
-                Row(
-                    layout=name,
-                    threat=record.threat,
-                    structure=scenario.title_of(title) if title else TOGETHER,
-                    impulse=_number(impulse_pa_s)
+                (
+                    name,
+                    record.threat,
+                    scenario.title_of(title) if title else TOGETHER,
+                    _number(impulse_pa_s)
                     + _interval(low_high)
                     + _error(impulse_off * impulse_pa_s),
-                    peak=_number(only(loads, names).protected_peak_pa / PA_PER_KPA),
-                    load=load_text(objective, load) + _error(load_off * load),
-                    cost=f"{cost:g}",
-                    reduction=_percent(share, off),
-                    engine=record.engine.label,
-                    standing=_standing(loads, names),
+                    _number(only(loads, names).protected_peak_pa / PA_PER_KPA),
+                    load_text(objective, load) + _error(load_off * load),
+                    _percent(share, off),
+                    f"{cost:,.10g}",
+                    record.engine.label,
+                    _standing(loads, names),
                 )
             )
-    return rows + list(_all_threats(records, objective, errors))
+    rows += _all_threats(records, objective, errors)
+    headers = [*_HEADERS]
+    headers[_LOAD] += objective.noun + (f" ({objective.unit})" if objective.unit else "")
+    if scenario.build_zone is not None:
+        headers[_COST] += f" ({scenario.zone.cost_unit})"
+    table = [tuple(headers), *rows]
+    if objective.quantity == "impulse":  # it is the load
+        table = [row[:_LOAD] + row[_LOAD + 1 :] for row in table]
+    return AnswerTable.of("", table[0], table[1:], 3)
 
 
 def _load(objective: ObjectiveSection, names: tuple[str, ...], loads: BlastLoads) -> float:
@@ -480,7 +408,7 @@ def _all_threats(
     records: Sequence[tuple[str, float, BlastRecord]],
     objective: ObjectiveSection,
     errors: Mapping[str, CellErrors],
-) -> Iterator[Row]:
+) -> Iterator[tuple[str, ...]]:
     """Yield the load over all threats, one row per layout blasted under all of them."""
     threats = dict.fromkeys(record.threat for _, _, record in records)
     if len(threats) < 2:
@@ -503,21 +431,18 @@ def _all_threats(
             off = error.of_reduction(load_of)
         without = next((loads[each] for each in whole if not whole[each][-1][1].layout), nan)
         share = reductions(loads[name], without).item() if last.layout else nan
-        yield Row(
-            layout=name,
-            threat=f"all {len(threats)}: {objective.charges}",
-            structure=TOGETHER,
-            impulse=(
-                _number(loads[name]) + _error(load_off)
-                if objective.quantity == "impulse"
-                else _DASH
-            ),
-            peak=_DASH,
-            load=load_text(objective, loads[name]) + _error(load_off),
-            cost=f"{cost:g}",
-            reduction=_percent(share, off),
-            engine=last.engine.label,
-            standing=worst_standing(
+        impulse = _number(loads[name]) + _error(load_off)
+        yield (
+            name,
+            f"all {len(threats)}: {objective.charges}",
+            TOGETHER,
+            impulse if objective.quantity == "impulse" else _DASH,
+            _DASH,
+            load_text(objective, loads[name]) + _error(load_off),
+            _percent(share, off),
+            f"{cost:,.10g}",
+            last.engine.label,
+            worst_standing(
                 load.stood for _, each in own for load in only(blast_loads(each), ()).protected
             ).words,
         )

@@ -18,23 +18,20 @@ from blast_env.app.jobs import Workers, jobs_of, settle
 from blast_env.app.offers import title_of
 from blast_env.app.records import (
     BlastRecord,
-    BuildingVerdict,
     DesignSettings,
     EngineRecord,
-    Row,
-    VerdictRow,
     blast_key,
     comparison,
     read_kept,
 )
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import (
+    Judged,
     draw_damage,
     facades_digest,
     picture_name,
     stored_consequences,
-    verdict_rows,
-    verdicts_of,
+    verdict_table,
 )
 from blast_env.app.work import (
     Answer,
@@ -53,6 +50,7 @@ from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.capacity import MOST_BLASTS
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.probability import Uncertainty
@@ -106,9 +104,7 @@ class Session:
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
-    _verdicts: dict[tuple[str, str], tuple[BuildingVerdict, ...]] = field(
-        default_factory=dict, init=False
-    )
+    _judged: dict[tuple[str, str], tuple[Judged, ...]] = field(default_factory=dict, init=False)
 
     @classmethod
     def opened(cls, folder: DesignFolder, work: WorkFolder, workers: Workers) -> "Session":
@@ -505,7 +501,7 @@ class Session:
         charge = charge_against(self.scenario, layout, threat.charge)
         return blast_key(self.scenario.without_budget, layout, charge, self.engine)
 
-    def comparison(self) -> list[Row]:
+    def comparison(self) -> AnswerTable:
         """Return the table of all blasts of the current design."""
         records: list[tuple[str, float, BlastRecord]] = []
         without: dict[str, BlastRecord] = {}
@@ -524,30 +520,27 @@ class Session:
         }
         return comparison(records, without, self.scenario, coarse)
 
-    def verdicts(self) -> list[VerdictRow]:
+    def verdicts(self) -> AnswerTable:
         """Return the verdicts on the buildings in all blasts of the current design."""
         found = [
-            (each.name, record, self.verdicts_on(each, threat))
+            (each.name, record, self.judged(each, threat))
             for threat in self.chosen_threats()
             for each in self.shown(threat)
             if (record := self.folder.record_of(each.key)) is not None
         ]
-        titled = self.scenario.title_of
-        return [
-            row.model_copy(update={"building": titled(row.building)}) for row in verdict_rows(found)
-        ]
+        return verdict_table(self.scenario, found)
 
-    def verdicts_on(self, shown: Shown, threat: LoadCase) -> tuple[BuildingVerdict, ...]:
-        """Return the verdicts of a blast on the buildings with their current facades."""
+    def judged(self, shown: Shown, threat: LoadCase) -> tuple[Judged, ...]:
+        """Return the response of the buildings with their current facades to a blast."""
         if not any(each.facade for each in self.scenario.structures):
             return ()
         known = shown.key, facades_digest(self.scenario, shown.layout)
-        if known not in self._verdicts:
+        if known not in self._judged:
             read = self._facades(shown, threat)
             if read is None:
                 return ()
-            self._verdicts[known] = verdicts_of(read)
-        return self._verdicts[known]
+            self._judged[known] = tuple(map(Judged.of, read.responses))
+        return self._judged[known]
 
     def damage_picture(self, shown: Shown, number: int) -> str:
         """Return the name of the picture of a building's damage; see `damage_file`."""

@@ -3,28 +3,37 @@
 Other windows and hardening measures need no new blast: the loads stay the same.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
 
-from blast_env.app.records import BlastRecord, BuildingVerdict, VerdictRow
-from blast_env.evaluation.consequences import BuildingResponse, Consequences, by_building
+from blast_env.app.records import BlastRecord
+from blast_env.evaluation.answers import AnswerTable
+from blast_env.evaluation.consequences import (
+    BuildingResponse,
+    BuildingSummary,
+    Consequences,
+    by_building,
+)
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.probability import Uncertainty, level_probability, probability_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import build_site
 from blast_env.layout.placement import load_relevant
-from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import peak_factor, respond
 from blast_env.site import AnyCharge, Scenario
 
 _BAYS: Final = "bays.npz"
+_HEADERS: Final = (
+    *("layout", "threat", "building", "level of protection", "its probability", "panes broken"),
+    *("worst pane (GSA, ISO)", "worst wall panel", "standing of the load", "flags"),
+)
 _DASH: Final = "\N{EN DASH}"
 _NAME: Final = "damage_{}_{}.png"
 _DRAWS: Final = 200  # of the uncertain quantities: the table must come at once
@@ -78,9 +87,44 @@ def stored_consequences(
     return Consequences(tuple(by_building(scenario, found, site, factor)))
 
 
-def verdicts_of(found: Consequences) -> tuple[BuildingVerdict, ...]:
-    """Return the verdict on each building, in numbers."""
-    return tuple(map(_verdict, found.responses))
+class Judged(NamedTuple):
+    """The response of a building to a blast, without the histories on its bays.
+
+    Attributes:
+        building: Its name.
+        summary: Its response.
+        severity: Severity of the response.
+        likely: Probability of its level or a higher one; a dash below all of them.
+        standing: Standing of the load that decides, with its reason.
+    """
+
+    building: str
+    summary: BuildingSummary
+    severity: Severity
+    likely: str
+    standing: str
+
+    @classmethod
+    def of(cls, response: BuildingResponse) -> "Judged":
+        """Return the response without histories."""
+        alone, level = Consequences((response,)), response.facade.level_of_protection
+        draws = level_probability(alone, Uncertainty(), _DRAWS)
+        return cls(
+            response.building,
+            alone.summary(response.building),
+            response.severity,
+            probability_text(draws.of(level), _DRAWS) if level else _DASH,
+            alone.standing(response.building).words,
+        )
+
+    def row(self, layout: str, threat: str, title: str, flags: Iterable[str]) -> tuple[str, ...]:
+        """Return the row of the table."""
+        whole = self.summary
+        panes = f"{whole.broken:.1f} of {whole.panes}"
+        return (
+            *(layout, threat, title, whole.level, self.likely, panes, whole.condition),
+            *(whole.damage, self.standing, "; ".join(flags) or _DASH),
+        )
 
 
 def draw_damage(building: BuildingResponse, path: Path) -> None:
@@ -113,65 +157,26 @@ def picture_name(number: int, digest: str) -> str:
     return _NAME.format(number, digest)
 
 
-def _verdict(building: BuildingResponse) -> BuildingVerdict:
-    facade = building.facade
-    draws = level_probability(Consequences((building,)), Uncertainty(), _DRAWS)
-    return BuildingVerdict(
-        building=building.building,
-        level=facade.level_of_protection,
-        level_on_cells=building.on_cells.level_of_protection,
-        panes=facade.panes,
-        broken=facade.broken_panes,
-        condition=facade.worst_condition.words,
-        damage=facade.worst_damage.name.lower() if len(facade.walled) else "",
-        total_damage=building.severity.damage,
-        impulse_pa_s=building.severity.load,
-        likely=draws.of(facade.level_of_protection),
-        standing=building.standings[building.deciding_bay].words,
-    )
-
-
-def verdict_rows(
-    records: Sequence[tuple[str, BlastRecord, Sequence[BuildingVerdict]]],
-) -> Iterator[VerdictRow]:
-    """Yield the rows of the buildings; with several threats, the worst of them first.
+def verdict_table(
+    scenario: Scenario, records: Sequence[tuple[str, BlastRecord, Sequence[Judged]]]
+) -> AnswerTable:
+    """Return the table of buildings; with several threats, the worst of them first.
 
     Args:
-        records: Name of the layout, the blast, and the verdicts on it.
+        scenario: The site.
+        records: Name of the layout, the blast, and the responses to it.
     """
-    found: dict[tuple[str, str], list[tuple[str, BuildingVerdict, tuple[str, ...]]]] = {}
-    for name, record, verdicts in records:
-        for verdict in verdicts:
-            flags = tuple(why for building, why in record.unchecked if building == verdict.building)
-            key = name, verdict.building
-            found.setdefault(key, []).append((record.threat, verdict, flags))
-    for (name, _), own in found.items():
+    found: dict[tuple[str, str], list[tuple[str, Judged, tuple[str, ...]]]] = {}
+    for name, record, responses in records:
+        for each in responses:
+            flags = tuple(why for building, why in record.unchecked if building == each.building)
+            found.setdefault((name, each.building), []).append((record.threat, each, flags))
+    rows = []
+    for (name, building), own in found.items():
+        title = scenario.title_of(building)
         if len(own) > 1:
-            worst = governing((each for _, each, _ in own), _severity)
-            flags = tuple(dict.fromkeys(flag for *_, each in own for flag in each))
-            yield _verdict_row(name, f"worst of {len(own)}", worst, flags)
-        yield from (_verdict_row(name, *each) for each in own)
-
-
-def _severity(verdict: BuildingVerdict) -> Severity:
-    return Severity(4 - verdict.level, verdict.total_damage, verdict.impulse_pa_s)
-
-
-def _verdict_row(
-    layout: str, threat: str, verdict: BuildingVerdict, flags: tuple[str, ...]
-) -> VerdictRow:
-    level = LevelOfProtection(verdict.level).label
-    if verdict.level_on_cells > verdict.level:
-        level += f"; {LevelOfProtection(verdict.level_on_cells).label} on the cells"
-    return VerdictRow(
-        layout=layout,
-        threat=threat,
-        building=verdict.building,
-        level=level,
-        likely=probability_text(verdict.likely, _DRAWS) if verdict.level else _DASH,
-        panes=f"{verdict.broken:.1f} of {verdict.panes}" if verdict.panes else _DASH,
-        condition=verdict.condition if verdict.panes else _DASH,
-        damage=verdict.damage or _DASH,
-        standing=verdict.standing,
-        flags="; ".join(flags) or _DASH,
-    )
+            worst = governing((each for _, each, _ in own), lambda each: each.severity)
+            every = dict.fromkeys(flag for *_, flags in own for flag in flags)
+            rows.append(worst.row(name, f"worst of {len(own)}", title, every))
+        rows += [each.row(name, threat, title, flags) for threat, each, flags in own]
+    return AnswerTable.of("", _HEADERS, rows, len(_HEADERS))

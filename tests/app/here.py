@@ -1,7 +1,16 @@
-"""The page's work without processes of its own."""
+"""The page's work without processes of its own, and the rows of its tables."""
+
+from types import SimpleNamespace
 
 from blast_env.app.jobs import Workers
 from blast_env.app.worker import do
+from blast_env.evaluation.answers import AnswerTable
+
+
+def rows_of(table: AnswerTable) -> list[SimpleNamespace]:
+    """Return the rows by headers without units: `its_probability`."""
+    names = [each.partition(" (")[0].partition(":")[0].replace(" ", "_") for each in table.headers]
+    return [SimpleNamespace(**dict(zip(names, row, strict=True))) for row in table.rows]
 
 
 class Here(Workers):

@@ -17,7 +17,7 @@ from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Layout, Measure, Piece
 from blast_env.site import Scenario, ScenarioError
-from tests.app.here import Here
+from tests.app.here import Here, rows_of
 from tests.app.test_page import opened, play
 from tests.gas_sites import glazed_hut, hut
 
@@ -54,28 +54,26 @@ def blasted(tmp_path_factory: pytest.TempPathFactory) -> Session:
 
 def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> None:
     (threat,) = blasted.chosen_threats()
-    unprotected, before = blasted.verdicts()
+    unprotected, before = rows_of(blasted.verdicts())
     there = blasted.folder.blasts_there()
     blasted.harden("glass", taken=True)
-    _, after = blasted.verdicts()
+    _, after = rows_of(blasted.verdicts())
     found = consequences(blasted.scenario, (*WALL, GLASS), [threat.charge], find_engine("gas"))
     facade = found.responses[0].facade
-    assert after.panes == f"{facade.broken_panes:.1f} of {facade.panes}"
-    assert after.condition == facade.worst_condition.words
-    on_cells = found.responses[0].on_cells.level_of_protection
-    words = facade.level_of_protection.label
-    if on_cells != facade.level_of_protection:
-        words += f"; {on_cells.label} on the cells"
-    assert after.level == words != before.level
-    assert before.likely == "\N{EN DASH}" or 0.0 < float(before.likely.split()[-1]) <= 1.0
-    assert after.standing.startswith("approximate (3.4 cells per m/kg^(1/3)")
-    assert after.damage == before.damage  # its walls are as they were
-    assert blasted.verdicts()[0] == unprotected
-    assert {row.cost for row in blasted.comparison()} == {"0", "70"}
+    assert after.panes_broken == f"{facade.broken_panes:.1f} of {facade.panes}"
+    assert after.worst_pane == facade.worst_condition.words
+    words = found.level_words(found.buildings[0])
+    assert after.level_of_protection == words != before.level_of_protection
+    likely = before.its_probability
+    assert likely == "\N{EN DASH}" or 0.0 < float(likely.split()[-1]) <= 1.0
+    assert after.standing_of_the_load.startswith("approximate (3.4 cells per m/kg^(1/3)")
+    assert after.worst_wall_panel == before.worst_wall_panel  # its walls are as they were
+    assert rows_of(blasted.verdicts())[0] == unprotected
+    assert {row.cost for row in rows_of(blasted.comparison())} == {"0", "70"}
     assert blasted.cost([0]) == ()
     assert blasted.folder.blasts_there() == there
     blasted.undo()
-    assert blasted.verdicts() == [unprotected, before]
+    assert rows_of(blasted.verdicts()) == [unprotected, before]
 
 
 def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Session) -> None:
@@ -83,9 +81,9 @@ def test_a_measure_alone_is_shown_with_the_blast_without_a_barrier(blasted: Sess
     (threat,) = blasted.chosen_threats()
     unprotected, own = blasted.shown(threat)
     assert own.key == unprotected.key
-    assert [row.layout for row in blasted.verdicts()] == ["no barrier", own.name]
-    (without,), (with_glass,) = (blasted.verdicts_on(each, threat) for each in (unprotected, own))
-    assert with_glass.broken < without.broken
+    assert [row.layout for row in rows_of(blasted.verdicts())] == ["no barrier", own.name]
+    (without,), (with_glass,) = (blasted.judged(each, threat) for each in (unprotected, own))
+    assert with_glass.summary.broken < without.summary.broken
     blasted.undo()
 
 
@@ -95,15 +93,16 @@ def test_other_windows_need_no_blast_and_other_bays_do(blasted: Session) -> None
     facade = {"bay_m": 1.0, "glazing": "window_laminated_6", "wall": "brick_215"}
     with pytest.raises(ScenarioError, match="must fit"):  # the catalogue's are larger
         edits.with_values(blasted.scenario, house, {"facade": facade})
-    before = blasted.verdicts()
+    before = rows_of(blasted.verdicts())
     facade |= {"glazing": "small_window", "wall": "concrete_200"}
     blasted.put_site("walls", edits.with_values(blasted.scenario, house, {"facade": facade}))
-    assert [row.panes for row in blasted.verdicts()] == [row.panes for row in before]
-    assert [row.damage for row in blasted.verdicts()] != [row.damage for row in before]
+    after = rows_of(blasted.verdicts())
+    assert [row.panes_broken for row in after] == [row.panes_broken for row in before]
+    assert [row.worst_wall_panel for row in after] != [row.worst_wall_panel for row in before]
     assert blasted.cost([0]) == ()
     facade["bay_m"] = 2.0
     blasted.put_site("bays", edits.with_values(blasted.scenario, house, {"facade": facade}))
-    assert blasted.verdicts() == []
+    assert not blasted.verdicts().rows
     assert len(blasted.cost([0])) == 2
     blasted.undo()
     blasted.undo()
@@ -131,8 +130,8 @@ def test_a_damaged_file_of_histories_gives_no_verdict(blasted: Session) -> None:
     path = blasted.folder.blast_of(own.key) / "bays.npz"
     whole = path.read_bytes()
     path.write_bytes(whole[:-100])
-    blasted._verdicts.clear()
-    assert [row.layout for row in blasted.verdicts()] == ["no barrier"]
+    blasted._judged.clear()
+    assert [row.layout for row in rows_of(blasted.verdicts())] == ["no barrier"]
     path.write_bytes(whole)
 
 
@@ -143,7 +142,7 @@ def test_a_layout_over_the_budget_can_be_looked_at_but_not_reported(blasted: Ses
     blasted.harden("panels", taken=True)
     assert len(blasted.design.layout) == len(WALL) + 2
     words = placing.counted(blasted.scenario, blasted.design.layout)
-    assert words.endswith("cost 115 of 100: 15 over the budget")
+    assert words.endswith("115 of 100 cost units: 15 over the budget")
     assert [each.key for each in blasted.shown(threat)] == before  # no load depends on costs
     with pytest.raises(LayoutError, match="budget"):
         blasted.report(Path("a.html"))
@@ -175,15 +174,15 @@ def test_a_switch_on_the_page_takes_a_measure(tmp_path: Path) -> None:
             switches = user.find(kind=ui.switch).elements
             return next(each for each in switches if getattr(each, "text", "") == words)
 
-        switch("glass, cost 50").value = True
+        switch("glass, 50 cost units").value = True
         assert session.design.layout == (GLASS,)
-        await user.should_see("cost 50 of 100")
-        switch("panels, cost 45").value = True
+        await user.should_see("50 of 100 cost units")
+        switch("panels, 45 cost units").value = True
         assert len(session.design.layout) == 2
         session.undo()
-        assert not switch("panels, cost 45").value
+        assert not switch("panels, 45 cost units").value
         session.put("wall", session.design.with_layout((GLASS, *WALL)))
-        switch("panels, cost 45").value = True
+        switch("panels, 45 cost units").value = True
         await user.should_see("15 over the budget")
 
     play(tmp_path, story)

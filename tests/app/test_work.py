@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
 from types import SimpleNamespace
@@ -29,7 +30,7 @@ from blast_env.app.records import (
 )
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of, usual_threats
-from blast_env.app.verdicts import verdict_rows
+from blast_env.app.verdicts import verdict_table
 from blast_env.app.work import ReportChoice, Status, read_status, write_status
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, StructureLoad, evaluate_layout
@@ -41,7 +42,7 @@ from blast_env.report import StudyOptions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
 from blast_env.site.scene import Charge
-from tests.app.here import Here
+from tests.app.here import Here, rows_of
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.scenarios import BALLISTIC_COURTYARD
 from tests.vehicle_sites import gate_site, vehicle_document
@@ -100,7 +101,7 @@ def test_a_particle_blast_has_a_film_and_the_loads_of_the_library(particles: Ses
 
 
 def test_the_table_holds_layouts_against_no_barrier(particles: Session) -> None:
-    rows = particles.comparison()
+    rows = rows_of(particles.comparison())
     assert [(row.layout, row.structure) for row in rows] == [
         ("no barrier", "all protected"),
         ("no barrier", "building"),
@@ -149,8 +150,10 @@ def test_the_table_counts_what_the_site_s_objective_says() -> None:
     own = {"near": blast("near", WALL, 200.0, 50.0), "far": blast("far", WALL, 100.0, 100.0)}
     records = [("no barrier", 0.0, each) for each in unprotected.values()]
     records += [("A", 6.0, each) for each in own.values()]
-    rows = {(row.layout, row.threat): row for row in comparison(records, unprotected, site)}
-    counted = {key: float(row.load) for key, row in rows.items()}
+    rows = {
+        (row.layout, row.threat): row for row in rows_of(comparison(records, unprotected, site))
+    }
+    counted = {key: float(row.counts) for key, row in rows.items()}
     assert counted[("no barrier", "near")] == 2.0 * 2.0 + 3.0 * 2.0
     assert counted[("A", "near")] == 2.0 + 3.0
     assert counted[("A", "far")] == 1.0 + 6.0
@@ -173,7 +176,7 @@ def test_a_building_of_several_parts_is_one_row(tmp_path: Path) -> None:
     session.engine = EngineRecord(name="gas", cell_m=0.5)
     session.put("wall", session.design.with_layout(WALL))
     session.blast([0])
-    rows = session.comparison()
+    rows = rows_of(session.comparison())
     assert [row.structure for row in rows] == ["all protected", "house"] * 2
     result = GasBlast(site, WALL).run()
     ((impulse_pa_s, peak_pa),) = result.buildings[["impulse_pa_s", "peak_pa"]].to_numpy()
@@ -198,7 +201,7 @@ def test_particles_show_a_film_and_say_that_peaks_need_gas(tmp_path: Path) -> No
 def test_an_edit_takes_results_away_and_undo_brings_them_back(particles: Session) -> None:
     before = particles.comparison()
     particles.put("less", particles.design.with_layout(CELLS[:5]))
-    assert len(particles.comparison()) == 2  # no barrier alone
+    assert len(particles.comparison().rows) == 2  # no barrier alone
     particles.undo()
     assert particles.comparison() == before
 
@@ -231,17 +234,17 @@ def test_a_gas_blast_has_pictures_gauges_and_the_loads_of_the_library(gas: Sessi
 
 def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None:
     (threat,) = gas.chosen_threats()
-    rows = gas.verdicts()
+    rows = rows_of(gas.verdicts())
     assert [(row.layout, row.threat, row.building) for row in rows] == [
         ("no barrier", threat.name, "hut"),
         ("A", threat.name, "hut"),
     ]
     found = consequences(glazed_hut(), WALL, [threat.charge], find_engine("gas"))
     (facade,) = (each.facade for each in found.of("hut"))
-    assert rows[1].level.partition(";")[0] == found.level("hut").label
-    assert rows[1].panes == f"{facade.broken_panes:.1f} of {facade.panes}"
-    assert rows[1].condition == facade.worst_condition.words
-    assert rows[1].damage == facade.worst_damage.name.lower()
+    assert rows[1].level_of_protection == found.level_words("hut")
+    assert rows[1].panes_broken == f"{facade.broken_panes:.1f} of {facade.panes}"
+    assert rows[1].worst_pane == facade.worst_condition.words
+    assert rows[1].worst_wall_panel == facade.worst_damage.name.lower()
     assert "cells per m/kg^(1/3)" in rows[1].flags
     assert rows[1].flags == dict(found.unchecked)["hut"]
 
@@ -251,16 +254,21 @@ def test_of_several_threats_the_worst_comes_first(gas: Session) -> None:
     own = gas.shown(threat)[1]
     record = gas.folder.record_of(own.key)
     assert record is not None
-    (verdict,) = gas.verdicts_on(own, threat)
-    milder = verdict.model_copy(update={"level": 4, "level_on_cells": 4, "broken": 0.0})
+    (judged,) = gas.judged(own, threat)
+    good = judged.summary._replace(level="high", broken=0.0)
+    milder = judged._replace(summary=good, severity=replace(judged.severity, lost_levels=0))
     other = record.model_copy(update={"threat": "other"})
-    rows = [*verdict_rows([("A", other, [milder]), ("A", record, [verdict])])]
+    site = gas.scenario
+    rows = rows_of(verdict_table(site, [("A", other, [milder]), ("A", record, [judged])]))
     assert [row.threat for row in rows] == ["worst of 2", "other", threat.name]
-    assert rows[0].level == rows[2].level != rows[1].level == "high"
-    fewer = verdict.model_copy(update={"total_damage": 0.0, "broken": 0.0})
-    rows = [*verdict_rows([("A", other, [fewer]), ("A", record, [verdict])])]
-    assert rows[0].level == rows[1].level
-    assert rows[0].panes == rows[2].panes != rows[1].panes
+    levels = [row.level_of_protection for row in rows]
+    assert levels[0] == levels[2] != levels[1] == "high"
+    fewer = judged._replace(
+        summary=judged.summary._replace(broken=0.0), severity=replace(judged.severity, damage=0.0)
+    )
+    rows = rows_of(verdict_table(site, [("A", other, [fewer]), ("A", record, [judged])]))
+    assert rows[0].level_of_protection == rows[1].level_of_protection
+    assert rows[0].panes_broken == rows[2].panes_broken != rows[1].panes_broken
 
 
 def test_what_is_there_is_not_run_again(gas: Session) -> None:
@@ -378,7 +386,7 @@ def test_a_blast_is_a_final_statement_with_the_error_of_its_cells(tmp_path: Path
     (threat,) = session.chosen_threats()
     expected = evaluate_layout(hut(), WALL, threats=[LoadCase(threat.charge, 0)])
     found = expected.to_dict()["result"]["grid_error"]
-    rows = session.comparison()
+    rows = rows_of(session.comparison())
     assert all(row.impulse.count("\N{PLUS-MINUS SIGN}") == 1 for row in rows)
     unprotected, *_, protected = rows
     assert unprotected.impulse.endswith(f"\N{PLUS-MINUS SIGN} {found['unprotected_load']:.2g}")
@@ -402,7 +410,7 @@ def test_of_several_threats_the_worst_one_gives_the_error(tmp_path: Path) -> Non
     assert state_of(session).state == "done", state_of(session).text
     there = session.folder.coarse_there()
     assert there == {session.key((), threats_of(session.scenario)[2])}  # nearest to the hut
-    rows = session.comparison()
+    rows = rows_of(session.comparison())
     assert [row.threat.split(":")[0] for row in rows] == [start, start, end, end, "all 2"]
     assert all("\N{PLUS-MINUS SIGN}" in row.impulse for row in rows)
 

@@ -17,6 +17,7 @@ from blast_env.gas.oblique_walls import stepped_buildings
 from blast_env.report.loads import measure, targets_of
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
+from tests.app.here import rows_of
 from tests.gas_sites import site_document
 
 CHARGE = Charge((2.0, 4.0), 5.0)
@@ -105,7 +106,8 @@ def test_the_page(hall: Scenario, result: GasResult, load_pa_s: float) -> None:
         seconds=0.0,
         repeat={},
     )
-    together, building = comparison([("no barrier", 0.0, record)], {"T1": record}, hall)
+    table = comparison([("no barrier", 0.0, record)], {"T1": record}, hall)
+    together, building = rows_of(table)
     assert building.structure == "hall"
     for row in (together, building):
         assert float(row.impulse.replace(",", "")) == pytest.approx(load_pa_s, rel=5e-3)

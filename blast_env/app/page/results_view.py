@@ -6,46 +6,16 @@ from typing import Any, Final
 
 from nicegui import ui
 
-from blast_env.app.records import (
-    TOGETHER,
-    BlastRecord,
-    Row,
-    VerdictRow,
-    frames_in,
-)
+from blast_env.app.page.tables import cells, columns_of, text_table
+from blast_env.app.records import TOGETHER, BlastRecord, frames_in
 from blast_env.app.session import BARE, Session, Shown
 from blast_env.evaluation import LoadCase
-from blast_env.site import ObjectiveSection
 
 _FILM: Final = "film"
 _GAUGES: Final = "gauges"
 _NOTHING: Final = "No results yet for the current layouts: press Blast."
 _RUNNING: Final = "Running: the panel Work shows the progress."
 _DAMAGE: Final = "damage of "
-_COLUMNS: Final = (
-    ("layout", "layout", "left"),
-    ("threat", "threat", "left"),
-    ("structure", "structure", "left"),
-    ("impulse", "impulse (Pa\N{NO-BREAK SPACE}s)", "right"),
-    ("peak", "peak (kPa)", "right"),
-    ("load", "", "right"),  # load by the site's objective, which also gives the heading
-    ("reduction", "reduction", "right"),
-    ("cost", "cost", "right"),
-    ("engine", "engine", "left"),
-    ("standing", "standing of the load", "left"),
-)
-_VERDICT_COLUMNS: Final = (
-    ("layout", "layout", "left"),
-    ("threat", "threat", "left"),
-    ("building", "building", "left"),
-    ("level", "level of protection", "left"),
-    ("likely", "its probability", "left"),
-    ("panes", "panes broken", "right"),
-    ("condition", "worst pane (GSA, ISO)", "left"),
-    ("damage", "worst wall panel", "left"),
-    ("standing", "standing of the load", "left"),
-    ("flags", "flags", "left"),
-)
 # Okabe and Ito, with dashes, so that colour is not the only difference between lines.
 _LINES: Final = (
     ("#000000", "solid"),
@@ -89,7 +59,7 @@ class ResultsView:
         self._with_bare = True
         self._large = False
         self._state: object = None
-        self._loads: dict[tuple[str, str], str] = {}
+        self._loads: dict[tuple[str, ...], str] = {}
         self._build()
 
     def _build(self) -> None:
@@ -106,12 +76,7 @@ class ResultsView:
             large.on_value_change(lambda e: self._set("_large", e.value))
         with ui.element("div").classes("be-results"):
             self._empty = ui.label().classes("be-quiet")
-            verdict_columns = [
-                {"name": name, "field": name, "label": label, "align": align}
-                for name, label, align in _VERDICT_COLUMNS
-            ]
-            self._verdicts = ui.table(columns=verdict_columns, rows=[], row_key="id")
-            self._verdicts.props("dense flat bordered").classes("be-verdicts w-full mb-2")
+            self._verdicts = text_table()
             self._sharp = ui.label(
                 "The level rests on peaks corrected for clipping by the cells. Where the level on "
                 "the cells is higher, use smaller cells."
@@ -123,9 +88,7 @@ class ResultsView:
                 "For damage of windows and walls, give structures windows or wall panels (on the "
                 "left), and blast with gas dynamics."
             ).classes("be-quiet")
-            columns = _columns(self._session.scenario.objective)
-            self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full mt-2")
-            self._table.props("dense flat bordered")
+            self._table = text_table().classes("mt-2")
             self._errors = ui.label(
                 "\N{PLUS-MINUS SIGN}: error of the cells, from the worst charge of each layout on "
                 "cells twice as large; of reductions in percentage points."
@@ -157,23 +120,24 @@ class ResultsView:
             return
         self._state = state
         found = [*self._found(there, threat)]
-        rows = session.comparison()
+        compared, verdicts = session.comparison(), session.verdicts()
+        at = next((k for k, each in enumerate(compared.headers) if "counts" in each), None)
         self._loads = {
-            (each.layout, each.threat): each.load for each in rows if each.structure == TOGETHER
+            row[:2]: f"{row[3]} Pa s" if at is None else row[at]
+            for row in compared.rows
+            if row[2] == TOGETHER
         }
         records = [each.record for each in found if each.record is not None]
         self._offer(found)
         self._show_cards([each for each in found if self._with_bare or each.shown.name != BARE])
         self._show_chart(threat)
-        verdicts = session.verdicts()
-        self._verdicts.rows = [_row(each, k) for k, each in enumerate(verdicts)]
-        self._verdicts.visible = bool(verdicts)
-        self._sharp.visible = any("; " in each.level for each in verdicts)
-        self._unglazed.visible = bool(found) and not verdicts
-        self._table.columns = _columns(session.scenario.objective)
-        self._table.rows = [_row(each, k) for k, each in enumerate(rows)]
-        self._table.visible = bool(rows)
-        self._errors.visible = any("\N{PLUS-MINUS SIGN}" in each.impulse for each in rows)
+        self._sharp.visible = any("on the cells" in row[3] for row in verdicts.rows)
+        self._unglazed.visible = bool(found) and not verdicts.rows
+        for element, table, after in ((self._verdicts, verdicts, 0), (self._table, compared, 2)):
+            element.columns = columns_of(table.headers, table.text_columns, after)
+            element.rows = cells(table.rows)
+            element.visible = bool(table.rows)
+        self._errors.visible = any("\N{PLUS-MINUS SIGN}" in row[3] for row in compared.rows)
         self._empty.visible = not found
         self._empty.text = _RUNNING if running else _NOTHING
         self._show_notes(records)
@@ -189,7 +153,7 @@ class ResultsView:
             damage = {
                 f"{_DAMAGE}{session.scenario.title_of(verdict.building)}": f"/damage/{where}/"
                 + session.damage_picture(each, number)
-                for number, verdict in enumerate(session.verdicts_on(each, threat))
+                for number, verdict in enumerate(session.judged(each, threat))
             }
             pictures = () if record is None else record.pictures
             others = {own.label: f"/blasts/{where}/{own.file}" for own in pictures}
@@ -219,7 +183,7 @@ class ResultsView:
         with ui.element("figure").classes("be-card m-0"):
             with ui.row().classes("w-full items-center no-wrap"):
                 title = name if name == BARE else f"layout {name}"
-                ui.label(title).style("font-weight: 600")
+                ui.label(title).style("font-weight: 600; white-space: nowrap")
                 ui.space()
                 ui.label(self._summary(name, found.record)).classes("be-quiet")
             if self._what == _FILM:
@@ -262,20 +226,6 @@ class ResultsView:
         with self._notes:
             for note in dict.fromkeys(note for each in records for note in each.notes):
                 ui.label(f"note: {note}").classes("be-quiet")
-
-
-def _columns(objective: ObjectiveSection) -> list[dict[str, str]]:
-    """Return the columns of the table; the counted load has one unless it is the impulse."""
-    counts = f"counts: {objective.noun}" + (f" ({objective.unit})" if objective.unit else "")
-    return [
-        {"name": name, "field": name, "label": label or counts, "align": align}
-        for name, label, align in _COLUMNS
-        if label or objective.quantity != "impulse"
-    ]
-
-
-def _row(row: Row | VerdictRow, number: int) -> dict[str, Any]:
-    return {"id": number, **row.model_dump()}
 
 
 def _chart(gauge: str, waves: Any) -> dict[str, Any]:

@@ -5,23 +5,31 @@ from collections.abc import Iterable, Sequence
 from nicegui import ui
 
 
-def text_table(headers: Sequence[str], texts: int | None = None) -> ui.table:
-    """Return an empty table of texts.
+def columns_of(
+    headers: Sequence[str], texts: int | None = None, after: int = 0
+) -> list[dict[str, str]]:
+    """Return the columns of a table of texts.
 
     Args:
         headers: The headers.
         texts: Number of leading text columns; the others are aligned to the right. `None` for all.
+        after: Number of text columns at the end.
     """
-    columns = [
+    numbers = range(len(headers) if texts is None else texts, len(headers) - after)
+    return [
         {
             "name": str(number),
             "field": str(number),
             "label": label,
-            "align": "left" if texts is None or number < texts else "right",
+            "align": "right" if number in numbers else "left",
         }
         for number, label in enumerate(headers)
     ]
-    table = ui.table(columns=columns, rows=[], row_key="id")
+
+
+def text_table(headers: Sequence[str] = (), texts: int | None = None) -> ui.table:
+    """Return an empty table of texts; see `columns_of`."""
+    table = ui.table(columns=columns_of(headers, texts), rows=[], row_key="id")
     return table.props("dense flat bordered").classes("be-verdicts w-full mb-2")
 
 
