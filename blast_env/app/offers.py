@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from blast_env.design.search import Need, ProposerKind, RuleProposer, find_proposer, proposers
-from blast_env.design.search.registry import proposer_row
+from blast_env.design.search.registry import proposer_row, why_nothing
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
@@ -54,8 +54,8 @@ def title_of(name: str) -> str:
     return known[name].title if name in known else name.rpartition("/")[2]
 
 
-def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Layout:
-    """Return the layout of a rule.
+def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> tuple[Layout, str]:
+    """Return the layout of a rule; if it is empty, also the reason.
 
     Args:
         name: The rule.
@@ -64,7 +64,7 @@ def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Lay
 
     Raises:
         UnknownNameError: If there is no such rule for the scenario; the message names the nearest.
-        BlastEnvError: If the rule finds nothing to build, or there are no charges.
+        BlastEnvError: If there are no charges.
     """
     known = rules(scenario)
     if name not in known:
@@ -75,6 +75,7 @@ def proposed(name: str, scenario: Scenario, charges: Sequence[AnyCharge]) -> Lay
     assert isinstance(rule, RuleProposer)
     known_charge = charges[0] if len(charges) == 1 else None
     sources = tuple(source_of(each) for each in charges)
-    if Need.VEHICLE in proposer_row(name).needs:  # it plans for all vehicles of the site
-        return rule.rule(scenario, known_charge)
-    return rule.rule(scenario.model_copy(update={"charge": sources}), known_charge)
+    if Need.VEHICLE not in proposer_row(name).needs:  # else it plans for all vehicles of the site
+        scenario = scenario.model_copy(update={"charge": sources})
+    layout = rule.rule(scenario, known_charge)
+    return layout, "" if layout else why_nothing(scenario, known_charge)

@@ -122,7 +122,7 @@ def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[L
         agent = load_agent(task.proposer)
         return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None)), ""
     if task.proposer != PACKAGED:
-        return proposed(task.proposer, scenario, known), ""
+        return proposed(task.proposer, scenario, known)
     case = LoadCaseSet(
         scenario, tuple(LoadCase(each, SeedRange.SEARCH.value.start) for each in known)
     )

@@ -331,6 +331,8 @@ def print_search(run: SearchRun, checked: Evaluation | None) -> None:
             "no threat is held out: with this engine a charge is one blast, and the search used "
             "every charge; `evaluate` takes other charges"
         )
+    if result.by and not result.layout:
+        print_line(f"nothing is placed: {result.by}")
     print_line(
         f"{layout_counts(result.layout, of=problem.stock)}; {result.blasts} of {result.budget} "
         f"blasts spent, {run.cache_hits} of the loads asked for known already; "
@@ -457,7 +459,7 @@ def _proposal_words(scenario: Scenario, result: SearchResult) -> str:
     if not result.layout:
         return "nothing is proposed"
     placement = LayoutState.of(scenario, result.layout)
-    cost = "" if scenario.zone.budget is None else f", cost {placement.cost:g}"
+    cost = "" if scenario.zone.budget is None else f", {scenario.zone.priced(placement.cost)}"
     gain = result.expectation
     return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
 

@@ -85,6 +85,41 @@ def line_of_sight_wall(
     return wall_added_to(placement, _place_m(placement, charge), share, kind).layout
 
 
+def why_no_wall(scenario: AnyScenario, charge: AnyCharge | None) -> str:
+    """Return the reason why `line_of_sight_wall` has no place; empty if it has one."""
+    placement = LayoutState.empty(scenario)
+    place_m = _place_m(placement, charge)
+    if _View.of(placement, place_m).between.any():
+        return ""
+    x_m, y_m = place_m
+    several = charge is None and len(placement.scenario.charge) > 1
+    way = (
+        f"between {'the mean place of the charges' if several else 'the charge'}, "
+        f"({x_m:.1f}, {y_m:.1f}) m, and the protected structures"
+    )
+    cells = _between(placement.scenario, place_m)
+    if not cells.any():
+        around = (
+            f"; that place lies within the bounds of {each.name}"
+            for each in placement.scenario.structures
+            if each.protected and each.rectangle_m.distance_to(place_m) <= 0.0
+        )
+        why = next(around, "")
+        return f"the build zone has no cell {way}{why}{': choose one charge' if several else ''}"
+    reasons = placement.reasons_against(cells)
+    free = np.argwhere(cells & placement.usable)
+    text = f"of {cells.sum()} cells {way}, {cells.sum() - len(free)} are not usable"
+    if reasons:
+        most = max(reasons, key=reasons.__getitem__)
+        text += f" ({reasons[most]}: each {most})"
+    if not len(free):
+        return text
+    row, column = free[0].tolist()
+    against = placement.explain(placement.catalogue.element_at(0, row, column))
+    why = against or "it would reach beyond them"
+    return f"{text}; on {len(free)} no item can stand: e.g. {why}"
+
+
 def _place_m(placement: LayoutState, charge: AnyCharge | None) -> PointM:
     """Return the place of a charge: the mean of its possible places."""
     sources = placement.scenario.charge if charge is None else (source_of(charge),)
@@ -328,20 +363,9 @@ class _View:
     def of(cls, placement: LayoutState, charge_m: PointM) -> "_View":
         scenario = placement.scenario
         x_m, y_m = scenario.zone.centres_m
-        target_x_m, target_y_m = _protected_middle_m(scenario)
-        along_x, along_y = target_x_m - charge_m[0], target_y_m - charge_m[1]
-        distance_m = hypot(along_x, along_y)
-        if distance_m < _TOLERANCE_M:
-            raise BlastEnvError(
-                f"charge is at {charge_m}, the middle of the protected structures of "
-                f"{scenario.name}: there is no line of sight"
-            )
-        along_x, along_y = along_x / distance_m, along_y / distance_m
+        along_x, along_y, _ = _line_of_sight(scenario, charge_m)
         depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
-        between = placement.usable & (depth_m > 0.0) & (depth_m < distance_m)
-        protected = [each.rectangle_m for each in scenario.structures if each.protected]
-        for rectangle in protected:
-            between &= ~rectangle.meets_segments(charge_m, x_m, y_m)
+        between = placement.usable & _between(scenario, charge_m)
         aside_m = (y_m - charge_m[1]) * along_x - (x_m - charge_m[0]) * along_y
         variants = placement.catalogue.variants
         up_m, right_m = _centres_off_m(variants)
@@ -399,6 +423,35 @@ class _View:
         if reach_m <= end.reach_m:  # the piece is at the other end
             return end
         return _End(end.side, reach_m, abs(float(self.depth_m[place]) - wall_m))
+
+
+def _line_of_sight(scenario: Scenario, charge_m: PointM) -> tuple[float, float, float]:
+    """Return the direction from a charge to the centre of the protected structures; its length, m.
+
+    Raises:
+        BlastEnvError: If the charge is there.
+    """
+    target_x_m, target_y_m = _protected_middle_m(scenario)
+    along_x, along_y = target_x_m - charge_m[0], target_y_m - charge_m[1]
+    distance_m = hypot(along_x, along_y)
+    if distance_m < _TOLERANCE_M:
+        raise BlastEnvError(
+            f"charge is at {charge_m}, the middle of the protected structures of "
+            f"{scenario.name}: there is no line of sight"
+        )
+    return along_x / distance_m, along_y / distance_m, distance_m
+
+
+def _between(scenario: Scenario, charge_m: PointM) -> BoolArray:
+    """Return the cells, usable or not, between a charge and the protected structures."""
+    x_m, y_m = scenario.zone.centres_m
+    along_x, along_y, distance_m = _line_of_sight(scenario, charge_m)
+    depth_m = (x_m - charge_m[0]) * along_x + (y_m - charge_m[1]) * along_y
+    between: BoolArray = (depth_m > 0.0) & (depth_m < distance_m)
+    for each in scenario.structures:
+        if each.protected:
+            between &= ~each.rectangle_m.meets_segments(charge_m, x_m, y_m)
+    return between
 
 
 def _centres_off_m(variants: Sequence[Variant]) -> tuple[FloatArray, FloatArray]:

@@ -25,6 +25,7 @@ from blast_env.site.zone import (
     Surroundings,
     empty_zone,
     reason_against,
+    reasons_against,
 )
 
 
@@ -140,6 +141,10 @@ class LayoutState:
             return reason
         reason = self._reason_against_cost(element) or self._reason_against_closing(element)
         return None if reason is None else f"{element_text(element)} {reason}"
+
+    def reasons_against(self, cells: BoolArray) -> dict[str, int]:
+        """Return the reasons why cells of a mask are not usable, with the number of cells."""
+        return reasons_against(self._surroundings, cells)
 
     def explain_vehicles(self) -> tuple[str, ...]:
         """Return a sentence per vehicle with its stand-off, way and speeds against the layout."""

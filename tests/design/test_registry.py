@@ -110,7 +110,7 @@ def test_the_page_offers_both() -> None:
     assert offered["search one_after_another"] == "search: one after another"
     charge = Charge((2.0, 4.0), 5.0)
     expected = fill_from_the_corner(hut(), charge)
-    assert offers.proposed("corner", hut(), [charge]) == expected
+    assert offers.proposed("corner", hut(), [charge]) == (expected, "")
 
 
 def test_help_names_all_of_them() -> None:

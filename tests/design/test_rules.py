@@ -1,5 +1,6 @@
 """The hand-made walls: across the line of sight, where they are asked for, and always legal."""
 
+import re
 from itertools import pairwise
 from math import atan2, pi
 
@@ -16,6 +17,7 @@ from blast_env.design.rules import (
     line_of_sight_wall,
     wall_near_building,
     wall_near_charge,
+    why_no_wall,
 )
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout
@@ -237,7 +239,27 @@ def test_between_two_buildings_the_wall_stays_on_the_side_of_the_charge() -> Non
 
 def test_behind_the_building_there_is_no_wall() -> None:
     scenario = site(charge_m=(38.0, 20.0))
-    assert line_of_sight_wall(scenario, Charge((38.0, 20.0), 100.0)) == ()
+    charge = Charge((38.0, 20.0), 100.0)
+    assert line_of_sight_wall(scenario, charge) == ()
+    way = "between the charge, (38.0, 20.0) m, and the protected structures"
+    assert why_no_wall(scenario, charge) == f"the build zone has no cell {way}"
+    both = [PointSource(position_m=(x_m, 21.0), tnt_kg=1.0) for x_m in (22.0, 40.0)]
+    reason = why_no_wall(scenario.model_copy(update={"charge": tuple(both)}), None)
+    assert "the mean place of the charges, (31.0, 21.0) m" in reason
+    assert reason.endswith("lies within the bounds of building: choose one charge")
+
+
+def test_the_reason_for_no_wall_names_what_takes_its_place() -> None:
+    assert why_no_wall(site(), WEST) == ""
+    trees = {"corner_m": [0.0, 0.0], "size_m": [32.0, 40.0], "reason": "trees"}
+    reason = why_no_wall(site(keep_outs=[trees], columns=40), WEST)
+    numbers = re.findall(r"of (\d+) cells .*, (\d+) are not usable \((\d+): each", reason)
+    assert len(set(*numbers)) == 1
+    assert reason.endswith("must stay empty: trees)")
+    rock = trees | {"reason": "rock", "module_cost": 2.0}
+    dear = why_no_wall(site(budget=1.0, cost_areas=[rock], columns=40), WEST)
+    assert "0 are not usable; on" in dear
+    assert "costs 2, but only 1 of the budget" in dear
 
 
 def test_the_wall_turns_to_the_building_that_counts_most() -> None:

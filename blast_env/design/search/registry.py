@@ -222,7 +222,15 @@ class RuleProposer:
                 sight.
         """
         layout = tuple(sorted(self.rule(problem.scenario, problem.known_charge)))
-        return SearchResult(layout, self.name, budget=budget, seed=seed)
+        by = "" if layout else why_nothing(problem.scenario, problem.known_charge)
+        return SearchResult(layout, self.name, by, budget=budget, seed=seed)
+
+
+def why_nothing(scenario: AnyScenario, charge: AnyCharge | None) -> str:
+    """Return the reason why a rule places nothing."""
+    from blast_env.design.rules import why_no_wall  # only for rules
+
+    return why_no_wall(scenario, charge) or "no place is legal and of use for it"
 
 
 def layouts_by_rule(scenario: AnyScenario, charge: AnyCharge | None = None) -> dict[str, Layout]:
