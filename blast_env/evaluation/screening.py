@@ -17,7 +17,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.places import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -326,7 +326,8 @@ def facades_for(scenario: Scenario, glazing: str | None, wall: str | None) -> Sc
 
     Raises:
         BlastEnvError: If a component is given, but each protected structure has a facade.
-        ScenarioError: If a structure has no height, or a component does not exist or fit.
+        UnknownNameError: If a component does not exist.
+        ScenarioError: If a structure has no height, or a component does not fit.
     """
     facade = {key: name for key, name in (("glazing", glazing), ("wall", wall)) if name}
     if not facade:
@@ -338,6 +339,11 @@ def facades_for(scenario: Scenario, glazing: str | None, wall: str | None) -> Sc
         raise BlastEnvError(
             f"{given}: each protected structure of {scenario.name} has a facade already"
         )
+    known = {**catalogue(), **scenario.components}
+    for kind, name in facade.items():  # here, once for all structures
+        names = [each for each, component in known.items() if component.kind == kind]
+        if name not in names:
+            raise UnknownNameError(kind, name, names)
     for structure in without:
         structure["facade"] = facade
     return Scenario.from_document(document, scenario.name)

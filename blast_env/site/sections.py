@@ -438,6 +438,24 @@ class FacadeSection(Section):
     wall: Name | None = None
     parts: Annotated[tuple[FacadePart, ...], Field(max_length=100)] = ()
 
+    def of_side(self, side: WallName) -> FacadePart:
+        """Return the part that is all bays of a side; an empty one if there is none."""
+        own = (each for each in self.parts if each.walls == (side,) and each.storeys is None)
+        return next(own, FacadePart(walls=(side,)))
+
+    def with_side(self, side: WallName, **names: str | None) -> Self:
+        """Return the facade with other components in all bays of a side.
+
+        Args:
+            side: The side.
+            names: Names of components by `glazing` or `wall`; `None`: that of the facade.
+        """
+        before = self.of_side(side)
+        own = before.model_copy(update=names)
+        parts = [each for each in self.parts if each != before]
+        parts += [own] if own.glazing or own.wall else []
+        return self.model_copy(update={"parts": tuple(parts)})
+
     def names(self) -> Iterator[tuple[str, str]]:
         """Yield the key and the name of each component."""
         for key in ("glazing", "wall"):

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from blast_env.app import edits, placing
-from blast_env.app.editor import Editor, Tool
+from blast_env.app.editor import Editor, Tool, reason_of
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
-from blast_env.app.page.fields import change_of, fields_of
+from blast_env.app.page.fields import change_of, fields_of, value_of
 from blast_env.app.plan import PixelView, overlay_svg, plan_svg
 from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
@@ -20,7 +20,7 @@ from blast_env.app.threats import threats_of
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from blast_env.plots.plan import STRUCTURE
-from blast_env.site import ScenarioError, load_scenario
+from blast_env.site import Scenario, ScenarioError, load_scenario
 from tests.gas_sites import WALL, column, hut, site_document
 from tests.vehicle_sites import POSTS, gate_site
 
@@ -111,11 +111,37 @@ def test_a_facade_is_that_of_the_whole_building(tmp_path: Path) -> None:
     assert [each.facade is not None for each in after.structures] == [True, True, False]
     (width,) = (each for each in fields_of(after, thing) if each.key == "pane_width_m")
     after = edits.with_values(after, thing, change_of(edits.section_of(after, thing), width, 0.8))
+    with pytest.raises(ScenarioError, match="must fit") as caught:
+        edits.with_values(after, thing, change_of(edits.section_of(after, thing), width, 1.5))
+    assert len(caught.value.problems) > 1
+    assert reason_of(caught.value).count("must fit") == 1  # one message on the page
     panes = {(each.glazing.width_m, each.glazing.height_m) for each in after.bays if each.glazing}
     assert panes == {(0.8, 1.0)}
     assert {each.bay.structure for each in after.bays} == {"west", "east"}
     labels = [words for thing, words in edits.things(after) if thing.kind is ThingKind.STRUCTURE]
     assert labels[:2] == ["Town Hall, protected", "Town Hall: east, protected"]
+
+
+def test_a_side_of_a_building_has_components_of_its_own() -> None:
+    (west,) = site_document()["structures"]
+    site = hut(structures=[west | {"facade": {"wall": "brick_215"}}])
+    thing = SiteThing(ThingKind.STRUCTURE, 0)
+
+    def put(site: Scenario, typed: str | None) -> Scenario:
+        (panels,) = (each for each in fields_of(site, thing, "west") if each.label == "wall panels")
+        section = edits.section_of(site, thing)
+        after = edits.with_values(site, thing, change_of(section, panels, typed))
+        assert value_of(edits.section_of(after, thing), panels) == typed
+        return after
+
+    def walls(site: Scenario) -> dict[str, str | None]:
+        return {each.bay.wall: each.wall for each in site.named_bays()}
+
+    assert set(walls(site).values()) == {"brick_215"}
+    stronger = put(put(site, "concrete_150"), "concrete_200")
+    others = {side: "brick_215" for side in walls(site) if side != "west"}
+    assert walls(stronger) == others | {"west": "concrete_200"}
+    assert put(stronger, None) == site
 
 
 def test_a_blank_site_can_be_edited_at_once() -> None:

@@ -54,6 +54,18 @@ def test_report_as_json_has_the_same(tmp_path: Path) -> None:
     assert report["georeference"]["kind"] == "map"
 
 
+def test_one_wrong_option_is_one_error_however_many_buildings_it_concerns(tmp_path: Path) -> None:
+    both = ("--protect", "Town Hall", "--protect", "Baker", "--out", tmp_path / "block.toml")
+    code, _, error = run(BLOCK, *both, "--glazing", "window_anealed_6")
+    assert code == 2
+    assert error.count("window_anealed_6") == 1
+    assert error.startswith(
+        "error: no glazing 'window_anealed_6', did you mean 'window_annealed_6'"
+    )
+    code, _, error = run(BLOCK, *both, "--tnt-kg", "-5")
+    assert (code, error) == (2, "error: --tnt-kg is -5, must be 0.01 to 100000\n")
+
+
 def test_protected_buildings_have_the_windows_and_walls_that_are_asked_for(tmp_path: Path) -> None:
     out = tmp_path / "block.toml"
     filled = ("--glazing", "window_annealed_6", "--wall", "brick_215")

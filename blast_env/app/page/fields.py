@@ -5,9 +5,10 @@ from typing import Any, Final, Literal, NamedTuple
 
 from blast_env.app.edits import Document, SiteThing, ThingKind, section_of
 from blast_env.site import Scenario
-from blast_env.site.scene import WALLS
+from blast_env.site.scene import WALLS, WallName
+from blast_env.site.sections import FacadeSection
 
-Form = Literal["number", "integer", "text", "switch", "walls", "side", "glazing", "wall"]
+Form = Literal["number", "integer", "text", "switch", "walls", "side", "of", "glazing", "wall"]
 
 
 class FormField(NamedTuple):
@@ -21,6 +22,7 @@ class FormField(NamedTuple):
         optional: Whether it may be empty: then the default of the file format holds.
         inside: Key of the subtable that holds the key, if there is one.
         hint: Its effect, if the label does not explain it.
+        side: Side of the building to which a component belongs; `None` for the whole building.
     """
 
     label: str
@@ -30,6 +32,7 @@ class FormField(NamedTuple):
     optional: bool = False
     inside: str = ""
     hint: str = ""
+    side: WallName | None = None
 
 
 _CORNER: Final = (
@@ -139,6 +142,7 @@ _OF_STRUCTURES: Final[Mapping[str, tuple[FormField, ...]]] = {
 _LAST_OF_STRUCTURE: Final = (
     FormField("weight", "weight"),
     FormField("assessed walls", "faces", "walls"),
+    FormField("windows and walls of", "side", "of"),
     FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
     FormField("width of a pane (m)", "pane_width_m", optional=True, inside="facade", hint=_PANES),
     FormField("height of a pane (m)", "pane_height_m", optional=True, inside="facade", hint=_PANES),
@@ -162,14 +166,20 @@ _LAST_OF_STRUCTURE: Final = (
 )
 
 
-def fields_of(scenario: Scenario, thing: SiteThing) -> tuple[FormField, ...]:
-    """Return the fields of a thing."""
+def fields_of(
+    scenario: Scenario, thing: SiteThing, side: WallName | None = None
+) -> tuple[FormField, ...]:
+    """Return the fields of a thing; its components are those of a side, if one is given."""
     kind = section_of(scenario, thing).get("kind", "")
     if thing.kind is ThingKind.CHARGE:
         return (*_OF_CHARGES, *_OF_CHARGE[kind])
     if thing.kind is ThingKind.STRUCTURE:
         name = FormField("name", "name", "text")
-        return (name, *_OF_STRUCTURE, *_OF_STRUCTURES[kind], *_LAST_OF_STRUCTURE)
+        last = (
+            each._replace(side=side if each.form in _FILLINGS else None)
+            for each in _LAST_OF_STRUCTURE
+        )
+        return (name, *_OF_STRUCTURE, *_OF_STRUCTURES[kind], *last)
     return _FIELDS[thing.kind]
 
 
@@ -177,6 +187,8 @@ def value_of(section: Document, field: FormField) -> Any:
     """Return the value of a field, `None` if the file has none."""
     if field.inside:
         section = section.get(field.inside) or {}
+    if field.side is not None:
+        return getattr(FacadeSection.model_validate(section).of_side(field.side), field.key)
     value = section.get(field.key)
     if field.form == "walls":
         return list(value or WALLS)
@@ -196,9 +208,13 @@ def change_of(section: Document, field: FormField, typed: Any) -> dict[str, Any]
         return {field.key: value}
     table = {**(section.get(field.inside) or {}), field.key: value}
     if field.inside == "facade":
+        if field.side is not None:
+            before = FacadeSection.model_validate(section.get(field.inside) or {})
+            after = before.with_side(field.side, **{field.key: value})
+            table = after.model_dump(mode="json", exclude_none=True)
         table = {key: each for key, each in table.items() if each is not None}
-        is_empty = field.key in _FILLINGS and not table.keys() & _FILLINGS
-        return {field.inside: None if is_empty else table}
+        is_empty = not (table.keys() & _FILLINGS or table.get("parts"))
+        return {field.inside: None if field.key in _FILLINGS and is_empty else table}
     if value is None:
         return {field.inside: None}
     return {field.inside: {"width_m": 3.0, "between": "left_right"} | table}

@@ -24,6 +24,7 @@ _CELLS: Final[dict[tuple[Cells, Cells], str]] = {
     (0.5, 0.25): "0.5 and 0.25 m: with the error of the cells",
     (0.5, 0.5): "0.5 m only: much quicker",
     ("coarse", "fine"): "coarse and fine: growing cells, for sites of 40 m and more",
+    ("coarse", "coarse"): "coarse only: growing cells, much quicker",
 }
 _LEVELS: Final = {
     int(level): f"level of protection: {level.label}"

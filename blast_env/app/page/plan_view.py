@@ -33,6 +33,11 @@ _ARROWS: Final = {
 
 _ZOOM: Final = 1.25
 _RIGHT_BUTTON: Final = 2
+# The scene draws 15 times a second for as long as the page lives; each draw keeps a core busy.
+_DRAW_IF_SEEN: Final = """() => {
+  const view = getElement(%d), draw = view.renderer.render.bind(view.renderer);
+  view.renderer.render = (...what) => { if (view.$el.offsetParent !== null) draw(...what); };
+}"""
 
 
 class PlanPanel:
@@ -255,6 +260,7 @@ class SolidView:
         self._scene = ui.scene(
             width=WIDTH_PX, height=HEIGHT_PX, grid=False, background_color="#eef2f6", fps=15
         ).classes("w-full")
+        self._scene.on("init", js_handler=_DRAW_IF_SEEN % self._scene.id)
         ui.label("Drag to rotate, wheel to zoom, right button to pan.").classes("be-quiet")
         self._see_through = ui.label(
             "Transparent: no height given, up to the top of the air."

@@ -54,6 +54,7 @@ class ScreeningView:
             self._said = ui.label().classes("be-quiet").props('aria-live="polite"')
             self._threats = text_table(THREAT_HEADERS)
             self._picture = ui.element("img").props('alt="stand-offs as rings"').classes("w-full")
+            self._threats.visible = self._picture.visible = False
             self._stand_offs = ui.column().classes("w-full gap-1")
             ui.label(f"{LEFT_OUT}; presets: {PRESETS_SOURCE}").classes("be-quiet")
 

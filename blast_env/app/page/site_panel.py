@@ -13,9 +13,10 @@ from blast_env.app.page.fields import FormField, change_of, fields_of, value_of
 from blast_env.app.page.numbers import NumberField
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario
-from blast_env.site.scene import WALLS
+from blast_env.site.scene import WALLS, WallName
 
 _SIDES: Final = {"left_right": "left and right", "bottom_top": "bottom and top"}
+_PARTS: Final = {"": "the whole building"} | {wall: f"its {wall} side" for wall in WALLS}
 _SITE: Final = SiteThing(ThingKind.SITE)
 _ADDED: Final = {
     ThingKind.ITEM: "add an item to the catalogue of barriers",
@@ -36,6 +37,7 @@ class SitePanel:
         self._after = after
         self._fields: tuple[FormField, ...] = ()
         self._inputs: list[Any] = []
+        self._side: WallName | None = None
         self._filling = False
         self._build()
 
@@ -66,7 +68,7 @@ class SitePanel:
         self._name.value = scenario.name
         options = {_id(each): words for each, words in edits.things(scenario)}
         self._chooser.set_options(options, value=_id(thing))
-        fields = fields_of(scenario, thing)
+        fields = fields_of(scenario, thing, self._side)
         if fields != self._fields:
             self._fields = fields
             self._form.clear()
@@ -74,7 +76,7 @@ class SitePanel:
                 self._inputs = [self._input(each) for each in fields]
         section = edits.section_of(scenario, thing)
         for field, element in zip(self._fields, self._inputs, strict=True):
-            value = value_of(section, field)
+            value: Any = value_of(section, field) if field.form != "of" else self._side or ""
             if isinstance(element, NumberField):
                 element.show(value)
             else:
@@ -99,6 +101,8 @@ class SitePanel:
             element = ui.select([*WALLS], label=field.label, multiple=True)
         elif field.form == "side":
             element = ui.select(_SIDES, label=field.label, clearable=True)
+        elif field.form == "of":
+            element = ui.select(_PARTS, label=field.label)
         elif field.form in ("glazing", "wall"):
             element = ui.select(self._components(field.form), label=field.label, clearable=True)
         elif field.form == "text":
@@ -117,6 +121,7 @@ class SitePanel:
             element.on_value_change(lambda e: self._put(field, e.value))
         if field.optional:
             empty = "none" if field.form in ("glazing", "wall") else "by rule"
+            empty = empty if field.side is None else "as the building"
             element.props(f'placeholder="{empty}" clearable stack-label')
         element.props("dense outlined").classes("w-full")
         return element.tooltip(field.hint) if field.hint else element
@@ -127,6 +132,10 @@ class SitePanel:
 
     def _put(self, field: FormField, typed: Any) -> None:
         if self._filling:
+            return
+        if field.form == "of":
+            self._side = typed or None
+            self.refresh()
             return
         scenario = self._editor.session.scenario
         thing = self._editor.selected or _SITE
@@ -149,7 +158,7 @@ class SitePanel:
         if self._filling or not event.value:
             return
         kind, _, number = str(event.value).rpartition(" ")
-        self._editor.selected = SiteThing(ThingKind(kind), int(number))
+        self._editor.selected, self._side = SiteThing(ThingKind(kind), int(number)), None
         self._after()
 
     def _add(self, kind: ThingKind) -> None:

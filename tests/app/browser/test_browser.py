@@ -84,7 +84,7 @@ class Server:
     def stop(self, kind: signal.Signals = signal.SIGTERM) -> None:
         if self.process is not None:
             self.process.send_signal(kind)
-            self.process.wait(20)
+            self.process.wait(60)
             if self.process.stdout is not None:
                 self.process.stdout.close()
             self.process = None
@@ -116,6 +116,10 @@ class Page:
     def all(self, css: str) -> list[Any]:
         found: list[Any] = self.driver.find_elements(By.CSS_SELECTOR, css)
         return found
+
+    def upload(self, path: Path) -> None:
+        """Give the start page a file."""
+        self.until(lambda: self.all("input[type=file]"))[0].send_keys(str(path))
 
     def button(self, words: str) -> Any:
         def find() -> Any:
@@ -286,6 +290,50 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     assert not page.faults()
 
 
+PLACES = """
+const places = [".be-plan", ".be-status"].map((css) => {
+  const { x, y, width, height } = document.querySelector(css).getBoundingClientRect();
+  return [x, y, width, height];
+});
+return [...places, document.documentElement.scrollHeight];
+"""
+
+
+def test_the_plan_and_what_is_below_it_stay_in_place_when_a_message_comes(page: Page) -> None:
+    courtyard = load_scenario("courtyard")
+    page.begin("courtyard")
+    page.button("Place").click()
+    before = page.driver.execute_script(PLACES)
+    page.drag(courtyard, (15.25, 15.0), hold=False)
+    page.sees("the path from the road to the door must stay open")
+    assert page.driver.execute_script(PLACES) == before
+    page.drag(courtyard, (15.25, 15.0))  # pressed: it stays as a message
+    assert "the path from the road to the door must stay open" in page.text()
+    assert page.driver.execute_script(PLACES) == before
+
+
+def test_the_view_in_3d_is_drawn_only_while_it_is_seen(page: Page) -> None:
+    page.begin("courtyard")
+    page.button("3-D").click()
+    page.until(lambda: page.all(".nicegui-scene:not([data-initializing])"))
+    keep = "const at = document.querySelector('.nicegui-scene');"
+    keep += "window.scene3d = getElement(Number(at.id.slice(1)))"
+    page.driver.execute_script(keep)
+
+    def drawn() -> int:
+        return int(page.driver.execute_script("return scene3d.renderer.info.render.frame"))
+
+    begun = drawn()
+    page.until(lambda: drawn() > begun + 3)
+    page.button("Plan").click()
+    page.until(lambda: not page.all(".nicegui-scene"))
+    hidden = drawn()
+    sleep(2.0)
+    assert drawn() == hidden
+    page.button("3-D").click()
+    page.until(lambda: drawn() > hidden + 3)
+
+
 FILM_CLOCK = """
 window.filmSeconds = null;
 document.addEventListener("click", () => { window.pressedMs = performance.now(); }, true);
@@ -320,14 +368,13 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     save_scenario(site, tmp_path / "courtyard_high.toml")
     page.open()
     (tmp_path / "broken.toml").write_text("schema_version = 1\nname = 3\n")
-    upload = page.until(lambda: page.all("input[type=file]"))[0]
-    upload.send_keys(str(tmp_path / "broken.toml"))
+    page.upload(tmp_path / "broken.toml")
     page.sees("This could not be done")
     sleep(0.5)  # until it does not shine through any more
     page.shoot("broken_file")
     page.button("close").click()
     sleep(0.5)
-    page.all("input[type=file]")[0].send_keys(str(tmp_path / "courtyard_high.toml"))
+    page.upload(tmp_path / "courtyard_high.toml")
     page.until(lambda: "/design/" in page.driver.current_url)
     page.until(lambda: page.all(".be-plan svg text"))
     page.button("Place").click()
@@ -469,7 +516,7 @@ def test_from_a_map_extract_to_the_report(page: Page, tmp_path: Path) -> None:
         stages.append(f"{monotonic() - began_s:.0f} s: {stage}")
 
     page.open()
-    page.all("input[type=file]")[0].send_keys(str(DATA / "pump_house.geojson"))
+    page.upload(DATA / "pump_house.geojson")
     page.sees("protected buildings")
     page.fill("protected buildings", "Pump House")
     page.fill("stock of modules", "8")
@@ -516,7 +563,7 @@ def test_from_a_public_extract_to_the_verdict(page: Page) -> None:
 
     PICTURES.mkdir(parents=True, exist_ok=True)
     page.open()
-    page.all("input[type=file]")[0].send_keys(str(DATA / "car_park.osm"))
+    page.upload(DATA / "car_park.osm")
     page.sees("protected buildings")
     for label in ("middle of the site", "or the building nearest to"):
         page.fill(label, "26.944, 60.5227")
@@ -591,11 +638,12 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
         (PICTURES / "site_of_100_m.txt").write_text("\n".join(stages) + "\n")
 
     def verdicts() -> list[str]:
-        return [each.text for each in page.all(".be-verdicts tbody tr")]
+        table = page.all(".be-results .q-table")[0]
+        return [each.text for each in table.find_elements(By.CSS_SELECTOR, "tbody tr")]
 
     save_scenario(large_site(), tmp_path / "office_park.toml")
     page.open()
-    page.all("input[type=file]")[0].send_keys(str(tmp_path / "office_park.toml"))
+    page.upload(tmp_path / "office_park.toml")
     page.until(lambda: "/design/" in page.driver.current_url)
     page.until(lambda: page.all(".be-plan svg text"))
     reached("the site of the file")
@@ -604,7 +652,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     page.choose("windows", "window, 6 mm annealed")
     page.until(lambda: any("6 mm annealed" in each.text for each in page.all(".q-select")))
     page.button("measure").click()
-    page.sees("glass1, cost 1000")
+    page.sees("glass1, 1,000 cost units")
     page.shoot("large_measure")
     reached("its windows, and better glass as a measure")
     page.choose("by", "rule: wall near the building")
@@ -613,6 +661,8 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     page.until(lambda: re.search(r"[1-9]\d* of 13 pieces", page.text()))
     page.shoot("large_plan")
     reached("a layout by rule")
+    page.sees("4 blasts of gas: about")  # two layouts; each on two sizes of cells
+    page.choose("engine", "gas, coarse growing cells")
     page.sees("2 blasts of gas: about")
     page.button("Blast").click()
     page.until(lambda: re.search(r", [\d.]+ (s|min) left", page.text()), 300.0)
@@ -635,10 +685,12 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     sleep(0.5)
     page.button("report on this layout (.pdf)").click()
     page.sees("cells of gas dynamics")
-    for words in ("0.5 and 0.25 m", "0.5 m alone"):  # Escape would close the dialog
+    dialog = page.until(lambda: page.all(".q-dialog"))[0]
+    before = dialog.text
+    for words in ("coarse and fine", "coarse only"):  # Escape would close the dialog
         page.until(partial(page.showing, words)).click()
-    next(each for each in page.all(".q-toggle") if "worth" in each.text).click()
-    page.until(lambda: re.search(r"\b\d\d? blasts of gas: about", page.text()))
+    next(each for each in page.all(".q-toggle") if "contribution" in each.text).click()
+    page.until(lambda: dialog.text != before and "blasts of gas: about" in dialog.text)
     page.shoot("large_report_cost")
     page.button("begin").click()
     page.until(lambda: re.search(r", [\d.]+ (s|min) left", page.text()), 900.0)
@@ -648,7 +700,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     (report,) = page.until(lambda: [*(tmp_path / "downloads").glob("*.pdf")])
     assert report.read_bytes().startswith(b"%PDF")
     shutil.copy(report, PICTURES / "large_report.pdf")
-    reached("the report with cells of 0.5 m")
+    reached("the report with coarse cells")
     assert not page.faults()
 
 
@@ -657,7 +709,7 @@ def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -
     document["site"] |= {"width_m": 700.0, "height_m": 700.0, "air_height_m": 100.0}
     save_scenario(Scenario.from_document(document, "wide"), tmp_path / "wide.toml")
     page.open()
-    page.all("input[type=file]")[0].send_keys(str(tmp_path / "wide.toml"))
+    page.upload(tmp_path / "wide.toml")
     page.until(lambda: "/design/" in page.driver.current_url)
     page.button("Blast").click()
     page.sees("GiB, must be at most 8: take larger cells", 120.0)
