@@ -10,9 +10,10 @@ import numpy as np
 import typer
 
 from blast_env.arrays import FloatArray
-from blast_env.cli.options import ClusterAddress, running_on
-from blast_env.cli.output import print_line, progress_bar, user_errors
+from blast_env.cli.options import CacheOption, ClusterAddress, resume_words, running_on
+from blast_env.cli.output import print_line, progress_bar, resumable, user_errors
 from blast_env.design.rules import random_layout, wall_near_building, wall_near_charge
+from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import draw_charge
@@ -96,18 +97,19 @@ def endings(
         int, typer.Option(min=0, help="Generated sites of each family, beside the bundled ones.")
     ] = 17,
     times: Annotated[float, typer.Option(min=1.0, help="Length of the longer runs.")] = 4.0,
+    cache: CacheOption = None,
     processes: Processes = 1,
     cluster: ClusterAddress = None,
 ) -> None:
     """Print the loads that runs miss, against longer runs, for two layouts per site."""
-    with user_errors(), running_on(cluster):
+    with user_errors(), running_on(cluster), resumable(resume_words(cache)):
         jobs = {
             (title, name): GasBlast(site, layout, engine=engine)
             for title, site, engine in sites(generated)
             for name, layout in layouts(site).items()
         }
         with progress_bar("blasts") as progress:
-            run = partial(ending, times=times)
+            run = partial(ending, times=times, store=BlastStore.of(cache))
             found = run_all(run, list(jobs.values()), processes, progress)
     headers = ("site", "layout", "end (ms)", "CPU (s)", "largest share missed of a wall")
     rows = [(*job, *_ending_row(each)) for job, each in zip(jobs, found, strict=True)]

@@ -1,14 +1,17 @@
 """Comparison of loads at the end of a run with those of a run several times as long."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from time import process_time
 from typing import Final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from blast_env.arrays import FloatArray
 from blast_env.design.rules import random_layout
+from blast_env.evaluation import BlastEvaluator, BlastStore, LoadCase
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.geometry import Layout
 from blast_env.particles.run import EndReason
@@ -20,7 +23,7 @@ from blast_env.sites import FAMILIES, generate_site
 _LARGE_M: Final = 50.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Ending:
     """The loads that a run waits for, at its end and later.
 
@@ -28,34 +31,38 @@ class Ending:
         time_s: End of the run.
         cpu_s: CPU time of the run until then.
         reason: Reason for its end.
-        impulse_pa_s: Loads on the counted protected walls, at the end (walls,).
-        later_pa_s: The same at the end of the longer run (walls,).
-        on_buildings_pa_s: Load of the protected buildings, at the end and later.
+        missed: Largest share of the load of a counted protected wall that arrived after the end.
+        missed_of_all: Share of the load of the protected buildings that arrived after the end.
         levels: Level of protection of the facades, at the end and later; `None` without any.
     """
 
     time_s: float
     cpu_s: float
     reason: EndReason
-    impulse_pa_s: FloatArray
-    later_pa_s: FloatArray
-    on_buildings_pa_s: tuple[float, float]
+    missed: float
+    missed_of_all: float
     levels: tuple[LevelOfProtection | None, LevelOfProtection | None]
 
-    @property
-    def missed(self) -> float:
-        """Largest share of the load of a wall that arrived after the end."""
-        return float((1.0 - self.impulse_pa_s / self.later_pa_s).max(initial=0.0))
 
-    @property
-    def missed_of_all(self) -> float:
-        """Share of the load of the protected buildings that arrived after the end."""
-        now, later = self.on_buildings_pa_s
-        return 1.0 - now / later
+_ENDING: Final = TypeAdapter(Ending)
 
 
-def ending(blast: GasBlast, times: float = 4.0) -> Ending:
-    """Run a blast to its end, and continue its gas to `times` times that time."""
+def ending(blast: GasBlast, times: float = 4.0, store: BlastStore | None = None) -> Ending:
+    """Run a blast to its end, and continue its gas to `times` times that time.
+
+    What is in the store is not run again.
+    """
+    known = BlastStore() if store is None else store
+    inputs = BlastEvaluator(blast.scenario, blast.engine).key(blast.layout, LoadCase(blast.threat))
+    key = json.dumps(("ending", inputs, times))
+    found = known.read(key, _ENDING.validate_json)
+    if found is None:
+        found = _ending(blast, times)
+        known.put(key, _ENDING.dump_json(found))
+    return found
+
+
+def _ending(blast: GasBlast, times: float) -> Ending:
     start = process_time()
     result = blast.run()
     cpu_s, time_s, reason = process_time() - start, result.time_s, result.end_reason
@@ -68,9 +75,8 @@ def ending(blast: GasBlast, times: float = 4.0) -> Ending:
         time_s,
         cpu_s,
         reason,
-        now.on_walls_pa_s,
-        later.on_walls_pa_s,
-        (now.on_buildings_pa_s, later.on_buildings_pa_s),
+        float((1.0 - now.on_walls_pa_s / later.on_walls_pa_s).max(initial=0.0)),
+        1.0 - now.on_buildings_pa_s / later.on_buildings_pa_s,
         (now.level, later.level),
     )
 

@@ -98,21 +98,18 @@ _FINAL_CELL_M: Final = 0.25
 _WIDEST_UNIFORM_M: Final = 40.0
 """Side of the cells of final statements, and the widest site on which they do not grow."""
 
-_PERIODS: Final = 2.0
-"""Natural periods for a loaded component to swing in and rebound; a cracked one is slower."""
-
-
 def response_time_s(scenario: Scenario) -> float:
-    """Return the response time of the slowest component of the facades of a site, s.
+    """Return the natural period of the slowest component of the facades of a site, s.
 
-    Components that hardening may install are included.
+    In a period a loaded component swings in and rebounds. Components that hardening may install
+    are included.
     """
     hardened = (
         bay
         for each in scenario.alternatives
         for bay in (*each.glazing.values(), *each.wall.values())
     )
-    return _PERIODS * slowest_period_s([*scenario.bays, *hardened])
+    return slowest_period_s([*scenario.bays, *hardened])
 
 
 @dataclass(frozen=True)
