@@ -76,7 +76,6 @@ class MeasuredSite:
             random ones (1 + random,).
         reduction: Reduction of the load by each of them, a share (1 + random,).
         rules: Reduction by the layout of each rule, a share, by name.
-        has_vehicle: Whether a vehicle brings the charge.
     """
 
     accepted: bool
@@ -85,7 +84,6 @@ class MeasuredSite:
     cut: FloatArray
     reduction: FloatArray
     rules: Mapping[str, float] = field(default_factory=dict)
-    has_vehicle: bool = False
 
     @property
     def made(self) -> float:
@@ -141,7 +139,6 @@ def measured(
         cut=np.array([cut_share_of(lines, LayoutState(site, layout)) for layout in layouts]),
         reduction=np.array([reduction[layout] for layout in layouts]),
         rules={name: reduction[layout] for name, layout in ruled.items()},
-        has_vehicle=bool(site.vehicles),
     )
 
 
@@ -205,7 +202,6 @@ def main(
         with progress_bar("blasts") as progress:
             results = run_all(measure, drawn, processes, progress=progress)
         print_measured([each for each in results if each.accepted])
-        print_rules([each for each in results if each.accepted and each.rules])
         print_agreement(results)
 
 
@@ -227,34 +223,6 @@ def print_measured(results: Sequence[MeasuredSite]) -> None:
     print_line("|---" * 6 + "|")
     for name, values in columns.items():
         print_row(name, *(f"{value:.0f}" for value in np.quantile(values, QUANTILES)))
-
-
-def print_rules(results: Sequence[MeasuredSite]) -> None:
-    """Print the reduction by each rule, and means over sites with and without vehicles."""
-    if not results:
-        return
-    print_row("rule", "sites", "mean reduction (%)", "sites where it is the best rule")
-    print_line("|---" * 4 + "|")
-    for name in dict.fromkeys(name for each in results for name in each.rules):
-        own = [each for each in results if name in each.rules]
-        mean = 100.0 * np.mean([each.rules[name] for each in own])
-        best = sum(each.rules[name] >= max(each.rules.values()) for each in own)
-        print_row(name, str(len(own)), f"{mean:.0f}", str(best))
-    for words, has_vehicle in (("with a vehicle", True), ("without", False)):
-        own = [each for each in results if each.has_vehicle is has_vehicle]
-        if own:
-            means = [
-                100.0 * np.mean(values)
-                for values in (
-                    [each.reduction[1:].mean() for each in own],
-                    [each.reduction[0] for each in own],
-                    [max(each.rules.values()) for each in own],
-                )
-            ]
-            print_line(
-                f"{words}: {len(own)} sites; random layouts {means[0]:.0f} %, visibility layout"
-                f" {means[1]:.0f} %, best rule {means[2]:.0f} %"
-            )
 
 
 def print_agreement(results: Sequence[MeasuredSite]) -> None:

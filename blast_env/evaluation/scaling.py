@@ -2,7 +2,7 @@
 
 Hopkinson-Cranz scaling: at the distance of each bay, Kingery and Bulmash's reflected peak and
 impulse of both charges give the factors on the pressures and on the times of its history. This
-leaves shielding and echoes as they are. `python -m studies.sure scaling` compares it with blasts.
+leaves shielding and echoes as they are.
 """
 
 from dataclasses import replace

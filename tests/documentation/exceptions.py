@@ -134,9 +134,6 @@ SMALLER: Final[dict[str, str]] = {
     "python -m studies.first_hour": "--steps 64 --seeds 1 --algorithm PPO --threats 2 --by-gas 0",
     # docs/engineers/response.md
     "python -m studies.response cells": "--finest 0.5",
-    "python -m studies.response_sites": "clinic_front",
-    "python -m studies.sure draws": "guard_post",
-    "python -m studies.sure scaling": "guard_post",
     "python -m studies.gas kingery-bulmash --charges 100": "--charges 20 --distances 4.3",
     "python -m studies.gas corners": "--sizes 0.5",
     "python -m studies.gas judge --random-layouts 18 --charges 1": (

@@ -64,7 +64,7 @@ def test_more_charge_makes_a_level_less_likely(found: Consequences) -> None:
 def test_scaled_histories_are_those_of_a_blast_of_that_mass(
     found: Consequences, share: float
 ) -> None:
-    """On the bays with a tenth of the largest impulse or more; `studies.sure scaling` has sites."""
+    """On the bays with a tenth of the largest impulse or more."""
     mass_kg = share * CHARGE.tnt_kg
     blast, scaled = (
         each.responses[0].on_cells

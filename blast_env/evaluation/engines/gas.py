@@ -98,6 +98,7 @@ _FINAL_CELL_M: Final = 0.25
 _WIDEST_UNIFORM_M: Final = 40.0
 """Side of the cells of final statements, and the widest site on which they do not grow."""
 
+
 def response_time_s(scenario: Scenario) -> float:
     """Return the natural period of the slowest component of the facades of a site, s.
 
