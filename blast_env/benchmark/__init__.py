@@ -3,7 +3,6 @@
 from blast_env.benchmark.definitions import (
     BUDGETS,
     DEFINITIONS,
-    LITE,
     SEEDS,
     Definition,
     secret_sites,
@@ -26,7 +25,6 @@ __all__ = [
     "BUDGETS",
     "DEFINITIONS",
     "JUDGE_CELL_M",
-    "LITE",
     "SEEDS",
     "Asked",
     "BenchmarkProblem",

@@ -6,7 +6,7 @@ from math import isnan
 
 import numpy as np
 
-from blast_env.benchmark.definitions import LITE
+from blast_env.benchmark.definitions import DEFINITIONS
 from blast_env.benchmark.judging import JudgedSubmission
 from blast_env.statistics import Estimate
 from blast_env.tables import markdown_table
@@ -93,8 +93,8 @@ def _table(
             found.append((score.value, taken.value, row))
     found.sort(key=lambda each: (round(each[0], 9), round(each[1], 9)), reverse=True)
     names = ", ".join(problems)
-    if tuple(problems) == tuple(sorted(LITE)):
-        names = "the Lite track"
+    if set(problems) == set(DEFINITIONS):
+        names = "All problems"
     elif len(problems) > _NAMED:
         names = f"{len(problems)} problems: {', '.join(problems[:_NAMED])}, ..."
     return StandingsTable(

@@ -14,7 +14,6 @@ from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
     JUDGE_CELL_M,
-    LITE,
     Asked,
     BenchmarkProblem,
     Definition,
@@ -58,7 +57,7 @@ def judge(
         [], help="Run folder of a trained agent, as a further method; may be given again."
     ),
     problem: list[str] = typer.Option(
-        [], help="Problem for the methods; may be given again; else the Lite track, `all` for all."
+        [], help="Problem for the methods; may be given again; else all."
     ),
     scenario: list[str] = typer.Option(
         [],
@@ -148,8 +147,7 @@ def _definitions(
         check_names("threat", [threat], ["visible", "hidden"])
         own = [site_problems(each, cases, is_hidden=threat == "hidden") for each in scenarios]
         return {each.name: each for of_site in own for each in of_site}
-    names = DEFINITIONS if problems == ["all"] else problems or LITE
-    return {name: make(name).definition for name in names}
+    return {name: make(name).definition for name in problems or DEFINITIONS}
 
 
 def _methods(

@@ -13,15 +13,17 @@ from blast_env.benchmark import (
     BUDGETS,
     DEFINITIONS,
     JUDGE_CELL_M,
-    LITE,
+    BenchmarkProblem,
+    Definition,
     ScoreReference,
     Submission,
+    make,
     shipped_standings,
 )
-from blast_env.benchmark.methods import reference_of
+from blast_env.benchmark.methods import reference_of, references_of
 from blast_env.benchmark.references import cell_key, engine_key, stored_references
 from blast_env.cli.output import print_line, user_errors
-from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.files import write_atomically
 from blast_env.plots.figures import save_figure
@@ -29,6 +31,7 @@ from blast_env.tables import markdown_table
 from studies.benchmark.references import (
     known_layouts,
     mean_curve,
+    named_definition,
     published_blasts,
     seen_references,
     submitted_layouts,
@@ -81,7 +84,7 @@ def references(
             )
             _write(known, out)
         fine = find_engine(JUDGE, JUDGE_CELL_M)
-        for name in LITE:
+        for name in DEFINITIONS:
             if _FINE in known[name].best.shares or monotonic() - began > most_s:
                 continue
             evaluator = BlastEvaluator(DEFINITIONS[name].scenario, fine, cache=store)
@@ -97,21 +100,33 @@ def _write(known: dict[str, ScoreReference], out: Path) -> None:
 
 @app.command()
 def headroom(
-    lite: Annotated[
-        bool, typer.Option("--lite", help="Of the Lite track alone, by the judge's cells too.")
-    ] = False,
+    candidate: Annotated[
+        list[str] | None,
+        typer.Argument(help="Possible further problem, such as site_6108-known, by a search."),
+    ] = None,
+    blasts: Annotated[int, typer.Option(help="Blasts of the search.")] = BUDGETS[1],
+    cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
 ) -> None:
     """Print the lead of the best known layout over the best of all rules, by problem.
 
-    It is a lower bound of the possible gain over the rules.
+    It is a lower bound of the possible gain over the rules. For candidates the best known layout is
+    that of the search `surrogate`, or of a rule, on cells of 0.5 m.
     """
-    known, cells = stored_references(), (_CELL, _FINE) if lite else (_CELL,)
+    with user_errors():
+        known, cells = stored_references(), (_CELL, _FINE)
+        if candidate:
+            store = BlastStore(cache)
+            asked = {each.name: each for each in map(named_definition, candidate)}
+
+            def searched(definition: Definition, _: int) -> BenchmarkProblem:
+                return make(definition, blasts, 0.5, cache=store)
+
+            known, cells = references_of(asked, (), 0.5, store, searched), (_CELL,)
     rows = []
-    for name in LITE if lite else known:
-        ends = known[name].rule, known[name].best
-        row = [f"`{name}`", ends[0].method]
+    for name, each in known.items():
+        row = [f"`{name}`", each.rule.method]
         for cell in cells:
-            rule, best = (100.0 * (1.0 - each.shares[cell]) for each in ends)
+            rule, best = (100.0 * (1.0 - end.shares[cell]) for end in (each.rule, each.best))
             row += [f"{rule:.1f}", f"{best:.1f}", f"{best - rule:.1f}"]
         rows.append(row)
     of_cell = "takes off ({} m, %)", "best known", "points more"
@@ -121,13 +136,13 @@ def headroom(
 
 @app.command()
 def picture(
-    out: Annotated[Path, typer.Argument(help="The file.")] = Path("docs/pictures/lite.png"),
+    out: Annotated[Path, typer.Argument(help="The file.")] = Path("docs/pictures/scores.png"),
     cache: Annotated[Path | None, typer.Option(help="Folder in which blasts are kept.")] = None,
 ) -> None:
     """Draw the mean score over the blasts spent, on the cells and charges of the search."""
     with user_errors():
-        methods = [each for each in shipped_standings() if set(each.problems) == set(LITE)]
-        ends = {name: seen_references(name, cache) for name in LITE}
+        methods = [each for each in shipped_standings() if set(each.problems) == set(DEFINITIONS)]
+        ends = {name: seen_references(name, cache) for name in DEFINITIONS}
         figure = Figure(figsize=(8.0, 4.5), layout="constrained")
         axes = figure.add_subplot(xlabel="blasts", ylabel="score as the search sees it")
         budget, curves = BUDGETS[1], {}

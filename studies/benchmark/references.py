@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import cast, get_args
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from blast_env.benchmark import (
     stored_references,
 )
 from blast_env.benchmark.data import remember_published
+from blast_env.benchmark.definitions import Family
 from blast_env.benchmark.methods import find_method
 from blast_env.benchmark.problem import shares_of
 from blast_env.benchmark.references import cell_key
 from blast_env.design.search import layouts_by_rule
+from blast_env.errors import UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import load_layout
@@ -32,6 +35,15 @@ DATA = Path("docs/data")
 _MOST = 50_000  # blasts in memory
 _CLOSE = 0.03
 """Share of the load within which a rule may become the best one with finer cells."""
+
+
+def named_definition(name: str) -> Definition:
+    """Return the definition of a name without its version, such as `control_room-known_2`."""
+    site, _, family = name.removesuffix("-v2").rpartition("-")
+    family, _, place = family.partition("_")
+    if family not in get_args(Family):
+        raise UnknownNameError("family", family, get_args(Family))
+    return Definition(site, cast("Family", family), int(place or 1))
 
 
 def published_layouts(definition: Definition, published: BlastStore) -> Iterator[Layout]:

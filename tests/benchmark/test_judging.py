@@ -186,7 +186,7 @@ def test_fixed_charges_of_ones_own_site_are_problems_once_each(most: int, places
     found = site_problems("control_room", most)
     assert [each.place for each in found] == list(range(1, places + 1))
     charges = [each.case.charge for each in found]
-    assert charges == [DEFINITIONS[each.name].case.charge for each in found]
+    assert len(set(charges)) == places
     (hidden,) = site_problems("control_room", is_hidden=True)
     assert set(hidden.case.charges) == set(charges) or most == 2
 

@@ -25,10 +25,11 @@ from tests.benchmark.row import RowEngine
 from tests.site.test_hardening import glazed_yard
 
 WALL = [Piece(12, 0, "low_wall", True)]
+HIDDEN = Definition("control_room", "hidden")
 
 
-def problem(budget: int = 3, name: str = "control_room-known-v2") -> BenchmarkProblem:
-    return make(name, budget, engine=RowEngine())
+def problem(budget: int = 3, asked: str | Definition = "control_room-known-v2") -> BenchmarkProblem:
+    return make(asked, budget, engine=RowEngine())
 
 
 def test_blasts_are_counted_and_refused_beyond_the_budget() -> None:
@@ -53,7 +54,7 @@ def test_an_illegal_layout_costs_nothing() -> None:
 
 
 def test_a_hidden_charge_takes_a_blast_a_place_or_fewer() -> None:
-    own = problem(7, "control_room-hidden-v2")
+    own = problem(7, HIDDEN)
     own.evaluate(WALL)
     assert own.blasts == 3
     own.evaluate([], threats=1)
@@ -100,12 +101,12 @@ def test_a_method_without_new_questions_ends() -> None:
     assert (run.blasts, run.layout) == (1, tuple(WALL))
 
 
-@pytest.mark.parametrize("name", ["control_room-known-v2", "control_room-hidden-v2"])
-def test_the_curve_of_a_search_ends_at_its_layout(name: str) -> None:
-    (run,) = play(find_method("genetic"), Asked([lambda budget: problem(budget, name)], (12,)))
+@pytest.mark.parametrize("asked", ["control_room-known-v2", HIDDEN])
+def test_the_curve_of_a_search_ends_at_its_layout(asked: str | Definition) -> None:
+    (run,) = play(find_method("genetic"), Asked([lambda budget: problem(budget, asked)], (12,)))
     blasts, shares = zip(*run.curve, strict=True)
     assert blasts[-1] <= run.blasts
-    assert shares[-1] == pytest.approx(problem(0, name).judged(run.layout), abs=1e-5)
+    assert shares[-1] == pytest.approx(problem(0, asked).judged(run.layout), abs=1e-5)
     assert blasts == tuple(sorted(blasts))
 
 
@@ -145,7 +146,7 @@ def test_a_problem_that_there_is_not_names_the_nearest() -> None:
 
 
 def test_families_ask_what_they_say() -> None:
-    for definition in DEFINITIONS.values():
+    for definition in (*DEFINITIONS.values(), HIDDEN):
         case, scenario = definition.case, definition.scenario
         search_set = case.search_set
         assert search_set is not None

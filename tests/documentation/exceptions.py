@@ -146,6 +146,7 @@ SMALLER: Final[dict[str, str]] = {
         "--sizes 0.5 --finest 0.5"
     ),
     # docs/studies/scenarios.md
+    "python -m studies.benchmark headroom visitor_entrance-known": "--blasts 1",
     "blast-env evaluate --scenario visitor_entrance --layout"
     " docs/data/best_found/visitor_entrance.json --engine gas --seeds 3": ("--cell 0.5 --seeds 1"),
     # docs/researchers/surrogate.md
@@ -161,10 +162,10 @@ SMALLER: Final[dict[str, str]] = {
     ),
     # docs/researchers/benchmark.md
     "blast-env judge --method genetic --seeds 5 --cache blasts --out entry": (
-        "--problem visitor_entrance-known_2-v2 --budget 2 --seeds 1 --cell 0.5"
+        "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge --method own_optimiser:climb --seeds 5 --cache blasts --out entry": (
-        "--problem visitor_entrance-known_2-v2 --budget 2 --seeds 1 --cell 0.5"
+        "--problem control_room-known-v2 --budget 2 --seeds 1 --cell 0.5"
     ),
     "blast-env judge --scenario courtyard --cases 8 --method rules --method best_rule"
     " --run runs/courtyard --out out/entry": "--cases 1 --budget 2 --cell 0.5",

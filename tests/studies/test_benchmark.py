@@ -4,27 +4,27 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from blast_env.benchmark import DEFINITIONS, LITE, Run, make, play
+from blast_env.benchmark import DEFINITIONS, Definition, Run, make, play
+from blast_env.errors import UnknownNameError
 from studies.benchmark import methods
 from studies.benchmark.__main__ import app
-from studies.benchmark.references import mean_curve
+from studies.benchmark.references import mean_curve, named_definition
 from tests.benchmark.row import RowEngine
 
 
-def test_no_best_layout_is_behind_a_rule_and_every_problem_is_there() -> None:
+def test_in_every_problem_the_best_known_layout_is_five_points_ahead() -> None:
     result = CliRunner().invoke(app, ["headroom"])
     assert result.exit_code == 0, result.output
     rows = [line.strip("| ").split(" | ") for line in result.stdout.splitlines()[2:]]
     assert {row[0].strip("`") for row in rows} == {*DEFINITIONS}
-    assert all(float(row[4]) >= 0.0 for row in rows)
-
-
-def test_in_the_lite_track_the_best_known_layout_is_five_points_ahead() -> None:
-    result = CliRunner().invoke(app, ["headroom", "--lite"])
-    assert result.exit_code == 0, result.output
-    rows = [line.strip("| ").split(" | ") for line in result.stdout.splitlines()[2:]]
-    assert [row[0].strip("`") for row in rows] == [*LITE]
     assert all(float(row[-1]) >= 5.0 for row in rows)
+
+
+def test_the_name_of_a_candidate_has_site_family_and_place() -> None:
+    assert named_definition("control_room-known_2") == Definition("control_room", "known", 2)
+    assert named_definition("site_6103-unseen-v2") == DEFINITIONS["site_6103-unseen-v2"]
+    with pytest.raises(UnknownNameError, match="did you mean 'known'"):
+        named_definition("control_room-knwn")
 
 
 def test_a_curve_has_the_score_of_the_best_layout_by_then() -> None:
@@ -39,7 +39,7 @@ def test_a_trained_agent_spends_the_budget_on_its_layouts(monkeypatch: pytest.Mo
     small = {"_DRAWS": 4, "_GUESSED": 8, "_IMITATED": 2, "_ORDERS": 1, "_EPOCHS": 1, "_BATCH": 4}
     for key, value in small.items():
         monkeypatch.setattr(methods, key, value)
-    problem = make("visitor_entrance-known_2-v2", 3, engine=RowEngine())
+    problem = make("control_room-known-v2", 3, engine=RowEngine())
     (run,) = play(methods.imitation, [(lambda _: problem, 3, 0)])
     assert 1 <= run.blasts <= 3
     assert run.layout == min(problem.history, key=lambda each: each.share).layout
