@@ -1,5 +1,6 @@
 """`python -m studies.benchmark`: references of the problems, and runs of strong methods."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from time import monotonic
 from typing import Annotated
@@ -113,7 +114,8 @@ def headroom(
     that of the search `surrogate`, or of a rule, on cells of 0.5 m.
     """
     with user_errors():
-        known, cells = stored_references(), (_CELL, _FINE)
+        known: Mapping[str, ScoreReference] = stored_references()
+        cells: tuple[str, ...] = (_CELL, _FINE)
         if candidate:
             store = BlastStore(cache)
             asked = {each.name: each for each in map(named_definition, candidate)}
