@@ -37,7 +37,6 @@ from blast_env.app.work import (
     Answer,
     AnswerTask,
     BlastTask,
-    FilmTask,
     ProposalTask,
     Question,
     ReportChoice,
@@ -267,20 +266,6 @@ class Session:
             begin_with=placing.plain(self.design.layout) if from_layout else (),
         )
         return self._begin(task, f"{method} search, {budget} blasts, {task.engine.label}")
-
-    def film(self, path: Path) -> Path:
-        """Write a film of the active layout beside no barrier, under the first threat.
-
-        Raises:
-            BlastEnvError: If it cannot be started.
-        """
-        task = FilmTask(
-            **self._on_site(self.scenario.without_budget),
-            layout=placing.plain(self.design.layout),
-            engine=self.engine,
-            path=str(path),
-        )
-        return self._begin(task, f"film {path.name}")
 
     def report(
         self, page: Path, pdf: Path | None = None, choice: ReportChoice | None = None

@@ -1,4 +1,4 @@
-"""The tasks of a worker: proposals, searches, answers, films, reports; blasts are in `blasts`.
+"""The tasks of a worker: proposals, searches, answers, reports; blasts are in `blasts`.
 
 Long work reports its progress through a `Teller`, and may be interrupted anywhere by
 `KeyboardInterrupt`.
@@ -19,7 +19,6 @@ from blast_env.app.work import (
     Answer,
     AnswerTask,
     BlastTask,
-    FilmTask,
     ProposalTask,
     Question,
     ReportTask,
@@ -95,8 +94,6 @@ def run_task(folder: Path) -> None:
         teller.tell(state="done", share=1.0, text="done")
     elif isinstance(task, SearchTask):
         _search(task, teller)
-    elif isinstance(task, FilmTask):
-        _film(task, teller)
     elif isinstance(task, ReportTask):
         _report(task, teller)
     elif isinstance(task, AnswerTask):
@@ -211,20 +208,6 @@ def _answer(task: AnswerTask, teller: Teller) -> None:
     write_kept(answer, teller.folder / ANSWER)
     first = next(each for each in answer.parts if isinstance(each, str))
     teller.tell(state="done", share=1.0, text=first, **changes)
-
-
-def _film(task: FilmTask, teller: Teller) -> None:
-    scenario, charge = task.site, task.threats[0].charge
-    layout, path = placing.layout_from(scenario, task.layout), Path(task.path)
-    engine = task.engine.found
-    unprotected, own = (engine.blast(scenario, each, 0, charge) for each in ((), layout))
-    write: Callable[..., object]
-    if task.engine.is_first_look:
-        from blast_env.plots.film import write_film as write
-    else:
-        from blast_env.plots.pressure_film import write_pressure_film as write
-    write(own, path, beside=unprotected if layout else None, progress=teller.share)
-    teller.tell(state="done", share=1.0, text=f"wrote {path.name}", file=str(path))
 
 
 def _report(task: ReportTask, teller: Teller) -> None:

@@ -103,19 +103,6 @@ class ProposalTask(SiteTask):
     is_run: bool = False
 
 
-class FilmTask(LayoutTask):
-    """A film of the first threat as a file to keep, without a barrier beside it.
-
-    Attributes:
-        engine: The engine.
-        path: The file.
-    """
-
-    kind: Literal["film"] = "film"
-    engine: EngineRecord
-    path: str
-
-
 class Question(StrEnum):
     """Questions on the level of protection of buildings, each as a command answers it.
 
@@ -217,7 +204,7 @@ class ReportTask(LayoutTask):
 
 
 Task = Annotated[
-    BlastTask | SearchTask | ProposalTask | FilmTask | ReportTask | AnswerTask,
+    BlastTask | SearchTask | ProposalTask | ReportTask | AnswerTask,
     Field(discriminator="kind"),
 ]
 

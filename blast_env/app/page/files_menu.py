@@ -1,4 +1,4 @@
-"""Opening and saving: sites and layouts as files, all forms of export, films."""
+"""Opening and saving: sites and layouts as files, all forms of export, reports."""
 
 from collections.abc import Callable
 from functools import partial
@@ -57,7 +57,6 @@ class FilesMenu:
             ui.menu_item("site: scenario file (.toml)", self._save_site)
             for suffix in SUFFIXES:
                 ui.menu_item(f"layout: {suffix}", partial(self._save_layout, suffix))
-            ui.menu_item("film of this layout (.mp4)", self._save_film)
             ui.menu_item("report on this layout (.html)", partial(self._save_report, False))
             ui.menu_item("report on this layout (.pdf)", partial(self._save_report, True))
 
@@ -114,16 +113,6 @@ class FilesMenu:
             complain(error)
             return
         ui.download.content(content, name)
-
-    def _save_film(self) -> None:
-        session = self._session
-        name = f"{session.scenario.name}_{SLOTS[session.design.active]}.mp4"
-        try:
-            session.film(session.folder.path / name)
-        except BlastEnvError as error:
-            complain(error)
-            return
-        ui.notify("the film is being made: download it on the right when it is ready")
 
     def _save_report(self, as_pdf: bool) -> None:
         session = self._session
