@@ -128,7 +128,9 @@ def test_a_side_of_a_building_has_components_of_its_own() -> None:
     thing = SiteThing(ThingKind.STRUCTURE, 0)
 
     def put(site: Scenario, typed: str | None) -> Scenario:
-        (panels,) = (each for each in fields_of(site, thing, "west") if each.label == "wall panels")
+        (panels,) = (
+            each for each in fields_of(site, thing, "west") if each.side and each.key == "wall"
+        )
         section = edits.section_of(site, thing)
         after = edits.with_values(site, thing, change_of(section, panels, typed))
         assert value_of(edits.section_of(after, thing), panels) == typed

@@ -37,7 +37,7 @@ from blast_env.site import Scenario, load_scenario, save_scenario
 from tests.app.here import Here
 from tests.app.test_work import CELLS
 from tests.builders import block
-from tests.gas_sites import WALL, hut
+from tests.gas_sites import WALL, glazed_hut, hut
 from tests.io.importing.maps import BLOCK
 from tests.scenarios import BALLISTIC_COURTYARD
 from tests.test_terraces import TERRACE, terraced
@@ -294,6 +294,26 @@ def test_fields_change_the_site_or_say_why_not(tmp_path: Path) -> None:
         assert facade.glazing == "window_annealed_6"
         windows.value = None
         assert session.scenario.structures[0].facade is None
+
+    play(tmp_path, story)
+
+
+def test_panels_of_one_side_are_chosen_in_the_fields(tmp_path: Path) -> None:
+    async def story(user: User, sessions: Sessions) -> None:
+        session = await opened(user, sessions, glazed_hut())
+
+        def select(label: str) -> ui.select:
+            found = user.find(kind=ui.select).elements
+            return next(each for each in found if each.props.get("label") == label)
+
+        select("selected").value = "structure 0"
+        select("windows and walls of").value = "west"
+        select("wall panels, west side").value = "concrete_200"
+        facade = session.scenario.structures[0].facade
+        assert facade is not None
+        assert [(each.walls, each.wall) for each in facade.parts] == [(("west",), "concrete_200")]
+        select("windows and walls of").value = ""
+        assert select("wall panels").value == facade.wall != "concrete_200"
 
     play(tmp_path, story)
 

@@ -144,9 +144,9 @@ _LAST_OF_STRUCTURE: Final = (
     FormField("assessed walls", "faces", "walls"),
     FormField("windows and walls of", "side", "of"),
     FormField("windows", "glazing", "glazing", optional=True, inside="facade"),
+    FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
     FormField("width of a pane (m)", "pane_width_m", optional=True, inside="facade", hint=_PANES),
     FormField("height of a pane (m)", "pane_height_m", optional=True, inside="facade", hint=_PANES),
-    FormField("wall panels", "wall", "wall", optional=True, inside="facade"),
     FormField(
         "storeys",
         "storeys",
@@ -175,10 +175,12 @@ def fields_of(
         return (*_OF_CHARGES, *_OF_CHARGE[kind])
     if thing.kind is ThingKind.STRUCTURE:
         name = FormField("name", "name", "text")
-        last = (
-            each._replace(side=side if each.form in _FILLINGS else None)
+        last = [
+            each
+            if side is None or each.form not in _FILLINGS
+            else each._replace(side=side, label=f"{each.label}, {side} side")
             for each in _LAST_OF_STRUCTURE
-        )
+        ]
         return (name, *_OF_STRUCTURE, *_OF_STRUCTURES[kind], *last)
     return _FIELDS[thing.kind]
 

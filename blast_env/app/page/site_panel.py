@@ -121,7 +121,6 @@ class SitePanel:
             element.on_value_change(lambda e: self._put(field, e.value))
         if field.optional:
             empty = "none" if field.form in ("glazing", "wall") else "by rule"
-            empty = empty if field.side is None else "as the building"
             element.props(f'placeholder="{empty}" clearable stack-label')
         element.props("dense outlined").classes("w-full")
         return element.tooltip(field.hint) if field.hint else element
