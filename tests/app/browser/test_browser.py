@@ -386,7 +386,7 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     page.button("Blast").click()
     sleep(4.0)
     page.shoot("gas_running")
-    page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 240.0)
+    page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 1800.0)
     sleep(1.0)
     page.all("[data-film-play]")[0].click()
     slider = page.all("input[data-film-slider]")[0]
