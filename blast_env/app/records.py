@@ -331,8 +331,8 @@ def comparison(
     rows += _all_threats(records, objective, errors)
     headers = [*_HEADERS]
     headers[_LOAD] += objective.noun + (f" ({objective.unit})" if objective.unit else "")
-    if scenario.build_zone is not None:
-        headers[_COST] += f" ({scenario.zone.cost_unit})"
+    if scenario.build_zone is not None and scenario.zone.currency:
+        headers[_COST] += f" ({scenario.zone.currency})"
     table = [tuple(headers), *rows]
     if objective.quantity == "impulse":  # it is the load
         table = [row[:_LOAD] + row[_LOAD + 1 :] for row in table]

@@ -140,5 +140,5 @@ def _draw(advice: Advised) -> "Figure":
     count = len(judge.problem.threats)
     title = f"{scenario.name}: cost of each higher level, worst of {count} charges"
     engines = judge.problem.evaluator.engine.words, judge.engine.words
-    unit = scenario.zone.cost_unit
-    return cost_level_figure(tried, pairs, judge.target, title, engines, unit)
+    axis = f"cost, {scenario.zone.cost_unit}" if scenario.zone.currency else "cost units"
+    return cost_level_figure(tried, pairs, judge.target, title, engines, axis)

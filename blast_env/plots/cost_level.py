@@ -48,7 +48,7 @@ def cost_level_figure(
     target: LevelOfProtection,
     title: str,
     words: tuple[str, str],
-    unit: str,
+    axis: str,
 ) -> Figure:
     """Return a picture of cost against level of protection.
 
@@ -58,7 +58,7 @@ def cost_level_figure(
         target: The required level.
         title: Title of the picture.
         words: Engines of the search and of the judge, as `gas, cells of 0.5 m`.
-        unit: Unit of costs.
+        axis: Label of the axis of costs.
     """
     figure = Figure(figsize=(8.6, 5.6), layout="constrained")
     axes = figure.subplots()
@@ -86,7 +86,7 @@ def cost_level_figure(
         zorder=4,
     )
     axes.set_title(f"{title}\npoints: {words[0]}; peaks that cells do not clip", fontsize=11)
-    axes.set_xlabel(f"cost ({unit})")
+    axes.set_xlabel(axis)
     axes.set_ylabel("worst damage of all components and charges (0 to 5)")
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return figure
