@@ -145,7 +145,7 @@ _PROBLEMS: Final = (
     Definition("school_and_clinic", "known"),
     Definition("school_and_clinic", "known", 3),
     Definition("hotel_forecourt", "known"),
-    *(Definition(f"{_GENERATED}{seed}", "known") for seed in (6117, 6124, 6127, 6143)),
+    *(Definition(f"{_GENERATED}{seed}", "known") for seed in (6117, 6124, 6127, 6143, 6226)),
     Definition("hotel_forecourt", "vehicle"),
     Definition(f"{_GENERATED}6103", "unseen"),
     Definition("guard_post", "response"),
