@@ -142,7 +142,7 @@ class Page:
                 found = None
             if found:
                 return found
-            sleep(0.02)
+            sleep(0.1)  # the browser, too, has to work
         self.shoot("failed")
         raise AssertionError(f"did not come within {most_s:g} s")
 
