@@ -95,13 +95,10 @@ def test_rows_of_a_table_are_what_they_must_be() -> None:
         ("", "is empty"),
         ("name,count,share\na,1,0.5", "line 2: has no end: was it cut short"),
         ("name,count,share\na,1\n", "line 2: has 2 cells, must have 3"),
-        ("name,count,share\na,1,2,3\n", "line 2: has 4 cells, must have 3"),
         ("name,count\na,1\n", "line 2: share is missing"),
         ("name,count,share\na,1,0.5\nb,1.5,0.5\n", "line 3: count is '1.5': .* integer"),
         ("name,count,share\na,1,-1\n", "line 2: share is '-1': .* greater than or equal to 0"),
-        (f"name,count,share\na,{'9' * 6000},1\n", "line 2: count is '9999"),
         ('name,count,share\n"a,1,2\n', "is no row of a table: unexpected end"),
-        (f"name,count,share\n{'a' * 200_000},1,2\n", "is no row of a table: field larger"),
     ],
 )
 def test_what_is_no_table_is_named_with_its_line(text: str, words: str) -> None:

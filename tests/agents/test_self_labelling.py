@@ -29,7 +29,6 @@ from blast_agents.training.run_folder import (
 from blast_agents.training.self_labelling import (
     Demonstration,
     Judge,
-    SelfLabelling,
     imitate,
     imitation_loss,
     race,
@@ -39,7 +38,6 @@ from blast_env.design.search.registry import layouts_by_rule
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, Evaluators, LoadCaseSet
-from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, VehicleCharge, save_scenario
@@ -247,12 +245,6 @@ def test_no_label_is_worse_than_a_rule_s_layout(finished: Path) -> None:
     assert all(row.blasts + row.cache_hits == row.steps for row in rows)
 
 
-def test_its_agent_is_one_like_any_other(finished: Path) -> None:
-    agent = load_agent(finished)
-    layout = agent.propose(small_scenario())
-    assert LayoutState.of(small_scenario(), layout)
-
-
 def test_an_interrupted_run_ends_as_if_it_had_not_been(finished: Path, tmp_path: Path) -> None:
     calls, rounds = [], 2
 
@@ -267,28 +259,6 @@ def test_an_interrupted_run_ends_as_if_it_had_not_been(finished: Path, tmp_path:
     assert len(read_rows(run / "rollouts.csv", RolloutRow)) == rounds
     resume(run)
     assert outcome(run) == outcome(finished)
-
-
-def test_blasts_of_an_interrupted_round_are_not_repeated_but_counted(
-    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run, rounds = tmp_path / "run", 1
-    imitate = SelfLabelling._imitate
-
-    def interrupt(training: SelfLabelling, updates: int, rng: np.random.Generator) -> float:
-        if training.progress.counters.rollouts == rounds:
-            raise KeyboardInterrupt
-        return imitate(training, updates, rng)
-
-    monkeypatch.setattr(SelfLabelling, "_imitate", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        train(run_settings(scenario_file(tmp_path)), own(), run)
-    monkeypatch.undo()
-    simulated = len(BlastStore(run / "blasts"))
-    assert simulated > Checkpoint.load(run / "checkpoint.pt").counters.blasts
-    result = resume(run)
-    assert outcome(run) == outcome(finished)
-    assert result.progress.counters.blasts == len(BlastStore(run / "blasts"))
 
 
 def test_another_training_begins_with_the_weights_of_a_run(finished: Path, tmp_path: Path) -> None:

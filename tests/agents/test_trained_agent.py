@@ -197,14 +197,6 @@ def test_code_in_a_checkpoint_does_not_run(run: Path, tmp_path: Path) -> None:
     assert not victim.exists()
 
 
-def test_an_image_agent_is_trained_loaded_and_proposes(tmp_path: Path) -> None:
-    chosen = settings(scenario_file(tmp_path), algorithm="ppo", steps=16, observation="image")
-    train(chosen, hyperparameters({"policy": "CnnPolicy"}, "ppo"), tmp_path / "run")
-    agent = load_agent(tmp_path / "run")
-    layout = agent.propose(small_scenario(), CHARGES[0])
-    assert LayoutState.of(small_scenario(), layout).cells == layout
-
-
 def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:
     folder = RunFolder(run)
     configuration = folder.configuration()

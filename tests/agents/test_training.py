@@ -2,7 +2,6 @@
 
 import json
 import multiprocessing
-import time
 from dataclasses import astuple, replace
 from importlib import import_module
 from pathlib import Path
@@ -13,8 +12,7 @@ import pytest
 import torch
 from blast_agents.training import resume, train
 from blast_agents.training.checkpoint import Checkpoint, Weights
-from blast_agents.training.recorder import learning_curve
-from blast_agents.training.run_folder import EvaluationRow, RolloutRow, RunFolder, read_rows
+from blast_agents.training.run_folder import EvaluationRow, RolloutRow, read_rows
 from blast_agents.training.train import TrainingResult
 
 from blast_env.errors import BlastEnvError
@@ -103,17 +101,6 @@ def test_the_best_weights_are_those_of_the_best_evaluation(finished: Path) -> No
     assert all(same) == (best.steps == checkpoint.counters.steps)
 
 
-@pytest.mark.parametrize(("engine", "spent"), [("event", "blasts"), ("surrogate", "guesses")])
-def test_the_learning_curve_tells_blasts_from_guesses(
-    finished: Path, engine: str, spent: str
-) -> None:
-    configuration = RunFolder(finished).configuration()
-    settings = configuration.settings.model_copy(update={"engine": engine})
-    progress = Checkpoint.load(finished / "checkpoint.pt")
-    figure = learning_curve(progress, configuration.model_copy(update={"settings": settings}))
-    assert figure.axes[0].get_xlabel() == f"{spent} spent on training"
-
-
 def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:
     module = import_module("tensorboard.backend.event_processing.event_accumulator")
     events = module.EventAccumulator(str(finished / "tensorboard"))
@@ -150,33 +137,6 @@ def test_a_finished_run_stays_as_it_is(finished: Path, tmp_path: Path) -> None:
     assert_same_outcome(finished, run)
 
 
-def test_a_killed_run_loses_at_most_one_rollout(tmp_path: Path) -> None:
-    """kill -9 in the middle."""
-    run, steps = tmp_path / "run", 20_000  # more than it will get
-    chosen = settings(scenario_file(tmp_path), steps=steps)
-    context = multiprocessing.get_context("fork")
-    process = context.Process(target=train, args=(chosen, hyperparameters(), run))
-    process.start()
-    try:
-        deadline = time.monotonic() + 120.0
-        while not (run / "rollouts.csv").exists() or len(lines_of(run / "rollouts.csv")) < 2:
-            assert process.is_alive()
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-    finally:
-        process.kill()
-        process.join()
-    folder = RunFolder(run)
-    before = Checkpoint.load(folder.checkpoint).counters.steps
-    assert 0 < before < steps
-    shorten(run, before + 2 * ROLLOUT)
-    result = resume(run)
-    assert result.progress.counters.steps == before + 2 * ROLLOUT
-    assert [row.steps for row in result.progress.rollouts] == [
-        ROLLOUT * number for number in range(1, len(result.progress.rollouts) + 1)
-    ]
-
-
 def test_the_loss_of_an_environment_s_process_is_told(tmp_path: Path) -> None:
     """As the kernel takes one when memory runs out."""
     of_others = multiprocessing.active_children()
@@ -189,18 +149,6 @@ def test_the_loss_of_an_environment_s_process_is_told(tmp_path: Path) -> None:
     chosen = hyperparameters({"n_envs": 2})
     with pytest.raises(BlastEnvError, match=r"has ended, .*; --resume continues"):
         train(settings(scenario_file(tmp_path)), chosen, tmp_path / "run", progress)
-
-
-def lines_of(path: Path) -> list[str]:
-    return path.read_text().splitlines()
-
-
-def shorten(run: Path, steps: int) -> None:
-    """Let a run end sooner than it was begun for."""
-    path = run / "config.json"
-    document = json.loads(path.read_text())
-    document["settings"]["steps"] = steps
-    path.write_text(json.dumps(document))
 
 
 def test_an_unknown_engine_is_refused_before_anything_is_written(tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ import sys
 from functools import partial
 from pathlib import Path
 
-import matplotlib
 import pandas as pd
 import pytest
 from typer.testing import Result
@@ -64,32 +63,6 @@ def test_simulate_prints_loads_with_units_and_writes_all_files(
     for path in written:
         assert path.stat().st_size > 1000
         assert str(path) in result.stdout.replace("\n", "")
-
-
-@pytest.mark.usefixtures("drawn")
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [
-        ("--heat-map", "building"),
-        ("--history", "impulse over time"),
-    ],
-)
-def test_simulate_writes_each_picture(
-    sparse: Path, tmp_path: Path, option: str, words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(matplotlib.rcParams, "svg.fonttype", "none")  # text stays text
-    picture = tmp_path / "picture.svg"
-    result = run("simulate", sparse, "--engine", "event", option, picture)
-    assert result.exit_code == 0, result.output
-    assert f"wrote {picture}" in result.stdout.replace("\n", "")
-    assert words in picture.read_text("utf-8")
-    assert [path.name for path in tmp_path.iterdir()] == ["picture.svg"]
-
-
-def test_simulate_takes_charge_and_preset() -> None:
-    result = run("simulate", "courtyard", "--charge", "8,15", "--preset", "ballistic")
-    assert result.exit_code == 0
-    assert "at (8.00, 15.00) m" in result.stdout
 
 
 def test_a_layout_is_for_its_site_also_with_another_preset(tmp_path: Path) -> None:

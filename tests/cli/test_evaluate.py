@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from blast_env import Charge, load_scenario, save_scenario
+from blast_env import load_scenario, save_scenario
 from blast_env.evaluation import evaluate_layout
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import PointSource
@@ -64,16 +64,6 @@ def test_it_prints_json_and_says_when_one_threat_has_no_interval(layout: Path) -
     share = 100.0 * content["result"]["reduction"]["value"]
     assert f"mean reduction {share:.1f} %\n" in table.stdout
     assert "(cells)" not in table.stdout
-
-
-def test_it_says_what_is_outside_the_calibration(tmp_path: Path) -> None:
-    layout, light = tmp_path / "empty.json", tmp_path / "light.toml"
-    layout.write_text("[]")
-    save_scenario(load_scenario("courtyard").with_charge(Charge((10.0, 15.0), 15.0)), light)
-    options = ("--scenario", light, "--seeds", "1", "--engine", "event")
-    result = evaluate("--layout", layout, *options)
-    assert result.exit_code == 0, result.output
-    assert "note: building: 1 of 1 threats are outside the range of calibration" in result.stdout
 
 
 def test_the_next_run_finds_the_blasts_that_the_first_one_kept(

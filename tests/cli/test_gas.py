@@ -43,15 +43,6 @@ def test_a_blast_prints_what_the_library_finds(site: Path, tmp_path: Path) -> No
     assert (tmp_path / "a.parquet").exists()
 
 
-def test_json_has_the_loads_and_the_cell(site: Path) -> None:
-    result = run("simulate", site, "--engine", "gas", "--cell", 0.25, "--json")
-    content = json.loads(result.stdout)
-    assert content["run"]["cell (m)"] == 0.25
-    assert content["impulse"]["hut"]["pa_s"] > 0.0
-    assert [each["name"] for each in content["gauges"]] == ["front", "behind"]
-    assert "modules" not in content
-
-
 def test_a_layout_is_evaluated_by_gas_unless_told_otherwise(site: Path, tmp_path: Path) -> None:
     layout = write_layout(tmp_path / "wall.json", hut(), WALL, {"made by": "hand"})
     options = ("--layout", layout, "--scenario", site, "--seeds", 1)

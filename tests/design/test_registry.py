@@ -1,6 +1,5 @@
 """A rule and a search are a file and a line each, and then they are everywhere."""
 
-from inspect import signature
 from pathlib import Path
 from types import MappingProxyType
 
@@ -12,8 +11,7 @@ from blast_env import save_scenario
 from blast_env.app import offers
 from blast_env.benchmark import JudgedSubmission, make, play
 from blast_env.benchmark.methods import find_method
-from blast_env.cli import app, evaluate, search
-from blast_env.design.proposal import problem_of
+from blast_env.cli import app
 from blast_env.design.rules import random_layout
 from blast_env.design.search import (
     DesignProblem,
@@ -113,13 +111,6 @@ def test_the_page_offers_both() -> None:
     assert offers.proposed("corner", hut(), [charge]) == (expected, "")
 
 
-def test_help_names_all_of_them() -> None:
-    """Those that the package has: the list is made when the command is imported."""
-    shown = run("search", "--help").stdout.replace("│", " ").split()
-    words = {each.strip(".,") for each in shown}
-    assert set(registry._TABLE) - set(OWN) <= words
-
-
 def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> None:
     name = "ring_around_building"
     assert f"rule {name}" not in offers.offered(hut())
@@ -129,12 +120,6 @@ def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> 
         "has no catalogue (build_zone.items): ring_around_building is of no use there"
         in " ".join(result.stderr.split())
     )
-
-
-def test_verdicts_are_by_gas_dynamics_unless_told_otherwise() -> None:
-    for command in (search.search, evaluate.evaluate):
-        assert signature(command).parameters["engine"].default == "gas"
-    assert problem_of(hut(), None).evaluator.engine.name == "gas"
 
 
 def test_a_proposal_says_how_far_it_has_come() -> None:

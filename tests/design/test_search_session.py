@@ -114,13 +114,6 @@ def test_the_lucky_one_is_found_out(problem: DesignProblem) -> None:
     assert it.best.load == pytest.approx(min(impulses.values()))
 
 
-def test_what_is_held_back_is_not_explored_with(problem: DesignProblem) -> None:
-    it = SearchSession(problem, 10, Plan(1, 6))
-    met = []
-    it.run(lambda: _ask(it), lambda: met.append(it.blasts))
-    assert met == [6]
-
-
 def _ask(it: SearchSession) -> None:
     it.assess(LAYOUTS)
 
@@ -146,18 +139,6 @@ def test_it_reports_every_batch(problem: DesignProblem) -> None:
     assert seen == [(4, 9), (6, 9)]
 
 
-def test_few_blasts_go_into_layouts_and_many_into_threats_as_well() -> None:
-    scenario = ballistic("courtyard")
-    evaluator = BlastEvaluator(scenario, "event")
-    problem = DesignProblem(evaluator, hidden_search_set(scenario, 16, 1, 0))
-    plans = [Plan.of(problem, budget) for budget in (1, 10, 50, 200, 1000, 100_000)]
-    assert all(plan.exploring_blasts >= 1 for plan in plans)
-    threats = [plan.threats for plan in plans]
-    assert threats == sorted(threats)
-    assert threats[0] == 1
-    assert plans[-1] == Plan(16, 100_000)
-
-
 def test_hidden_charges_come_first_and_spread() -> None:
     """A search that looks at the first three charges of the road has its middle and both ends."""
     scenario = ballistic("courtyard")
@@ -176,14 +157,6 @@ def test_a_known_charge_has_its_realisations() -> None:
     assert len({threat.seed for threat in threats}) == 3
     assert threats == known_search_set(scenario, WEST, 3, seed=1).threats
     assert threats != known_search_set(scenario, WEST, 3, seed=2).threats
-
-
-def test_reductions_refer_to_the_threats_that_were_met(problem: DesignProblem) -> None:
-    it = session(problem, 100)
-    for threats in (1, 4):
-        it.assess([()], threats)
-        assert it.best is not None
-        assert it.best.reduction(problem) == 0.0
 
 
 @pytest.mark.parametrize(

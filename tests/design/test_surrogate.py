@@ -20,13 +20,11 @@ import studies.surrogate
 from blast_env.design.rules import random_layout
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.registry import layouts_by_rule
-from blast_env.design.surrogate import walls
 from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.design.surrogate.fitting import (
     MEMBERS,
     Predictions,
     Samples,
-    elements,
     errors,
     fit,
     folds,
@@ -44,20 +42,19 @@ from blast_env.design.surrogate.network import (
 )
 from blast_env.design.surrogate.relations import relations
 from blast_env.design.surrogate.search import Guesses, LearntSearch, _floored, improved
-from blast_env.design.surrogate.walls import FEATURES, INPUTS, MOST_POINTS, WallPoints, site_of
+from blast_env.design.surrogate.walls import FEATURES, INPUTS, WallPoints, site_of
 from blast_env.design.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.geometry import Layout, Piece
+from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.scene import Charge
 from studies.blast_table import COLUMNS, scenario_of, site_name
 from studies.surrogate import HeldOut, Recipe, verdict
 from tests.agents.test_self_labelling import wide_yard
-from tests.office_park import office_park
 
 CHARGE_M = np.array([0.0, 0.0, 0.3])
 POINT_M = np.array([[20.0, 0.0, 1.5]])
@@ -100,32 +97,6 @@ def by_hand(seed: int = 0, members: int = 2) -> Surrogate:
         networks.append(member)
     of_both = Networks(networks[:members]), Networks(networks[members:])
     return Surrogate(np.zeros(INPUTS), np.ones(INPUTS), *of_both, ABOUT)
-
-
-def test_all_is_open_where_nothing_stands_and_nothing_behind_an_endless_wall() -> None:
-    assert shares() == pytest.approx(1.0)
-    assert shares(wall(5.0, -100.0, 100.0, 100.0)) == pytest.approx(0.0)
-    assert shares(wall(25.0, -100.0, 100.0, 100.0)) == pytest.approx(1.0)  # behind the point
-    assert shares(wall(5.0, 30.0, 40.0, 100.0)) == pytest.approx(1.0)  # far aside
-
-
-def test_ways_go_over_the_top_and_round_the_ends() -> None:
-    low, high = shares(wall(5.0, -50.0, 50.0, 2.0)), shares(wall(5.0, -50.0, 50.0, 4.0))
-    assert low[-1] == high[-1] == 0.0
-    assert (low[:-1] >= high[:-1]).all()
-    assert low.sum() > 1.2 * high.sum() > 0.0
-    narrow, wide = shares(wall(5.0, -1.0, 1.0, 50.0)), shares(wall(5.0, -4.0, 4.0, 50.0))
-    assert narrow.sum() > 1.2 * wide.sum() > 0.0
-    gap = shares(wall(5.0, -50.0, -0.5, 50.0), wall(5.0, 0.5, 50.0, 50.0))
-    assert gap[-1] == 1.0
-    assert 0.0 < gap[-2] < 1.0
-
-
-def test_long_detours_count_for_more_where_the_weight_falls_slowly() -> None:
-    """Behind a wide wall only long detours are open."""
-    behind = shares(wall(10.0, -5.0, 5.0, 50.0))[:-1].reshape(-1, len(FALLS_M))
-    assert (np.diff(behind, axis=1) >= 0.0).all()
-    assert behind[1, -1] > behind[1, 0]
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
@@ -217,23 +188,6 @@ def related(*solids: list[float], **changes: np.ndarray) -> np.ndarray:
     return relations(**where, scale_m=1.0, solids=np.array(solids).reshape(-1, 5))[:, 0]
 
 
-def test_relations_tell_where_a_solid_stands() -> None:
-    """Worked out by hand; 20 m ahead is the point, whose wall looks to the left."""
-    (found,) = related([4.0, 1.0, 6.0, 4.0, 2.0])
-    straight_m = 0.3 + 0.25 * 1.2
-    assert found[0] == pytest.approx(5.0 / 20.0, abs=1e-6)
-    assert found[1:7] == pytest.approx([5.0, 6.0, 2.5, 1.0, 1.5, 2.0])  # 15 m back are cut to 6
-    assert found[7] == pytest.approx(2.0 - straight_m, abs=1e-6)
-    to_charge_m, to_point_m = np.hypot(4.0, 1.0), np.hypot(14.0, 1.0)
-    assert found[8:10] == pytest.approx(np.log([to_charge_m + 0.05, to_point_m + 0.05]))
-    detours_m = [np.hypot(5.0, each) + np.hypot(15.0, each) - 20.0 for each in (4.0, 1.0, 1.4)]
-    assert found[10:13] == pytest.approx(detours_m, abs=1e-5)
-    assert found[13:] == pytest.approx([1.0, 0.0], abs=1e-6)  # a gap, and not in the way
-    assert related([4.0, -1.0, 6.0, 4.0, 2.0])[0, 13:].tolist() == [0.0, 1.0]
-    assert related([-3.0, -1.0, -2.0, 1.0, 2.0])[0, 14] == 0.0  # behind the charge
-    assert related([21.0, -1.0, 22.0, 1.0, 2.0])[0, 14] == 0.0  # behind the point
-
-
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(boxes=BOXES)
 def test_mirrors_and_quarter_turns_change_no_relation(
@@ -246,17 +200,6 @@ def test_mirrors_and_quarter_turns_change_no_relation(
     turned = (solids * (1.0, -1.0, 1.0, -1.0, 1.0))[:, [3, 0, 1, 2, 4]]
     turned_to = {"points_m": np.array([[0.0, 20.0, 1.5]]), "outward": OUTWARD[:, ::-1] * (-1, 1)}
     assert related(*turned.tolist(), **turned_to) == pytest.approx(found, abs=1e-9)
-
-
-def test_large_walls_have_few_points_that_say_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    scenario, surrogate, charge = office_park(), packaged_surrogate(), Charge((22.0, 40.0), 500.0)
-    few = site_of(scenario)
-    monkeypatch.setattr(walls, "MOST_POINTS", 10**6)
-    every = site_of(scenario)
-    points = [len(site.approach(charge).area_m2) for site in (few, every)]
-    assert points[0] < 1.2 * MOST_POINTS < points[1]
-    loads = [surrogate.guess(site, [()], [charge]).loads(site).item() for site in (few, every)]
-    assert loads[0] == pytest.approx(loads[1], rel=0.01)
 
 
 def test_far_outside_its_fit_no_guess_is_without_bounds() -> None:
@@ -480,20 +423,6 @@ def test_it_learns_from_messages_what_ways_do_not_see() -> None:
     assert within[1] < 0.3 * within[0]
 
 
-def test_the_unit_of_loads_changes_nothing_that_is_learnt() -> None:
-    """Not even where high powers of them are beyond any number."""
-    samples = Samples.of(table_of_guesses(by_hand(), 40), {YARD.content_hash: YARD})
-    every = np.ones(len(samples), dtype=bool)
-    off = []
-    for logarithm in (0.0, 60.0):
-        peak = samples.peak
-        known, target = peak.known + logarithm, peak.target + logarithm
-        made_up = replace(samples, impulse=replace(peak, known=known, target=target))
-        found = fit(made_up, every, 3, 0, ABOUT, 1, peaks=False)
-        off.append(load_errors(found, found.impulse, samples, peak, every).rms)
-    assert off[1] == pytest.approx(off[0], rel=0.02)
-
-
 def test_loads_that_are_no_numbers_stop_a_fit() -> None:
     samples = Samples.of(table_of_guesses(by_hand(), 10), {YARD.content_hash: YARD})
     target = np.full_like(samples.impulse.target, np.inf)
@@ -507,11 +436,6 @@ def test_rows_of_unknown_scenarios_are_left_out() -> None:
     table = table_of_guesses(by_hand(), 3)
     with pytest.raises(BlastEnvError, match="no load of a protected structure"):
         Samples.of(table, {})
-
-
-def test_layouts_of_the_table_are_read_back() -> None:
-    assert elements("[[1, 2], [3, 4]]") == ((1, 2), (3, 4))
-    assert elements('[[1, 2, "t_wall", true]]') == (Piece(1, 2, "t_wall", True),)
 
 
 def case(charges: int = 1) -> LoadCaseSet:

@@ -1,7 +1,6 @@
 import os
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
 from blast_env.plots.canvas import Frame
 from blast_env.plots.frames import FramePainter
-from blast_env.plots.plan import BARRIER, BORDER, EXPLOSIVE, PROTECTED
+from blast_env.plots.plan import BARRIER, EXPLOSIVE, PROTECTED
 from blast_env.plots.style import AIR
 from blast_env.site.balls import CollisionType
 from blast_env.site.structure import load_colour
@@ -67,15 +66,6 @@ def test_the_size_of_frames_does_not_depend_on_the_loads(blast: Blast) -> None:
     assert len({painter.size_px for painter in painters}) == 1
 
 
-def test_small_balls_stay_visible(blast: Blast) -> None:
-    balls = balls_at_start(blast.scene)
-    balls = replace(balls, radius=np.full(len(balls), 0.01))
-    painter = FramePainter(blast, width_px=320)
-    frame = painter.paint(balls, blast.scene.obstacles(), 0.0)
-    x, y = balls.position[0].tolist()
-    assert pixel_at(painter, frame, x, y) == AIR
-
-
 def test_y_points_up_and_scales_are_equal(blast: Blast) -> None:
     sheet = FramePainter(blast).sheet
     left, low = sheet.pixel(0.0, 0.0)
@@ -97,13 +87,6 @@ def edge_of(painter: FramePainter, rectangle_m: Rectangle) -> list[tuple[int, in
     x_m, y_m = rectangle_m.centre
     sides = ((left, y_m), (right, y_m), (x_m, bottom), (x_m, top))
     return [painter.sheet.pixel(*place) for place in sides]
-
-
-def test_the_border_is_red_all_around(blast: Blast) -> None:
-    painter = FramePainter(blast)
-    frame = start_frame(painter, blast)
-    for place in edge_of(painter, blast.scene.site_m):
-        assert nearest(frame, BORDER, *place) < 60.0
 
 
 def test_a_modules_colour_follows_its_load(blast: Blast) -> None:

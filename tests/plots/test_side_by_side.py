@@ -64,16 +64,6 @@ def test_both_blasts_are_shown_to_the_end_of_the_longer_one(
     assert list(both.path.parent.iterdir()) == [both.path]
 
 
-def test_the_same_blast_twice_gives_two_equal_halves(blast: Blast, tmp_path: Path) -> None:
-    """Neither half may lag behind or be moved; the codec alone may differ."""
-    path = tmp_path / "twins.mp4"
-    write(blast, blast, path)
-    frames = frames_of(path).astype(int)
-    left, right = np.split(frames, 2, axis=2)
-    assert np.abs(left - right).mean() < 1.0
-    assert np.abs(frames[0] - frames[-1]).max() > 100
-
-
 def test_the_barrier_is_in_its_own_half_alone(barrier_blast: Blast, both: Written) -> None:
     first = both.frames[0].astype(int)
     painter = FramePainter(barrier_blast, width_px=WIDTH_PX // 2)

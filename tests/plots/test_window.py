@@ -5,7 +5,7 @@ import pygame
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.plots.window import Window, fit
+from blast_env.plots.window import Window
 
 FRAME = np.full((120, 200, 3), 77, dtype=np.uint8)
 
@@ -25,14 +25,6 @@ def test_a_frame_is_shown(window: Window) -> None:
     assert tuple(screen.get_at((5, 5)))[:3] == (77, 77, 77)
 
 
-def test_frames_may_change_their_size(window: Window) -> None:
-    assert window.show(FRAME)
-    assert window.show(np.zeros((60, 80, 3), dtype=np.uint8))
-    screen = pygame.display.get_surface()
-    assert screen is not None
-    assert screen.get_size() == (80, 60)
-
-
 def test_closing_by_the_user_is_no_error(window: Window) -> None:
     window.show(FRAME)
     pygame.event.post(pygame.event.Event(pygame.QUIT))
@@ -46,11 +38,6 @@ def test_close_may_be_called_again_and_before_any_frame(window: Window) -> None:
     window.close()
     window.close()
     assert not window.show(FRAME)
-
-
-def test_a_frame_larger_than_the_screen_is_made_smaller() -> None:
-    assert fit((960, 916), (1920, 1080)) == (960, 916)
-    assert fit((1000, 2000), (1920, 1000)) == (450, 900)
 
 
 def test_without_a_screen_the_error_names_another_way(

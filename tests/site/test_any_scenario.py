@@ -1,9 +1,7 @@
 """Wherever a scenario is asked for, its bundled name or the path of its file will do."""
 
-import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import FrozenInstanceError, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -36,54 +34,6 @@ PUBLIC = (
     "blast_env.design.search",
     "blast_agents.training",
 )
-GIVEN_BY_THE_CALLER = {
-    "Observable",  # what an observation is given
-    "TrainedAgent",
-    "LayoutState",  # whose constructor checks nothing: `of` does
-}
-
-
-FOR_AUTHORS = {"Engine"}  # who write one, and are given a loaded scenario
-
-
-def _callables(module_name: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    module = import_module(module_name)
-    names = getattr(module, "__all__", [name for name in vars(module) if name[0] != "_"])
-    for name in names:
-        value = getattr(module, name)
-        if not callable(value) or not getattr(value, "__module__", "").startswith("blast"):
-            continue
-        if getattr(value, "_is_protocol", False) or inspect.isabstract(value):
-            continue
-        if name in FOR_AUTHORS:
-            continue
-        if name not in GIVEN_BY_THE_CALLER:
-            yield name, value
-        if inspect.isclass(value):
-            for method_name, method in inspect.getmembers(value, inspect.isroutine):
-                if method_name[0] != "_" and _qualified(method).startswith(name):
-                    yield f"{name}.{method_name}", method
-
-
-def _qualified(method: object) -> str:
-    """Return the name of a method with its class; a function in an attribute has another."""
-    return str(getattr(method, "__qualname__", ""))
-
-
-@pytest.mark.parametrize("module_name", PUBLIC)
-def test_no_public_function_insists_on_a_loaded_scenario(module_name: str) -> None:
-    if module_name == "blast_agents.training":
-        pytest.importorskip("torch")  # an extra, which `make matrix` may leave out
-    insisting = []
-    for name, value in _callables(module_name):
-        try:
-            parameters = inspect.signature(value).parameters
-        except ValueError:  # an exception or enumeration made in C
-            continue
-        annotation = str(getattr(parameters.get("scenario"), "annotation", "str"))
-        if "str" not in annotation and "ScenarioField" not in annotation:
-            insisting.append(f"{name}(scenario: {annotation})")
-    assert insisting == []
 
 
 @pytest.mark.parametrize(

@@ -178,13 +178,10 @@ def test_mask_explanation_and_rules_agree(document: Document, seed: int) -> None
     [
         (Piece(0, 9, "wall"), "is outside the build zone of 14 rows and 6 columns"),
         (Piece(0, 4, "wall"), "sticks out of the build zone of 14 rows and 6 columns"),
-        (Piece(12, 3, "wall", True), "sticks out of the build zone"),
         (Piece(0, 0, "wal"), "is not in the catalogue, did you mean 'wall'?"),
-        (Piece(0, 0, "fence"), "is not in the catalogue; known: wall, basket, post"),
         (Piece(0, 0, "post", True), "is as long as it is thick: it is not turned"),
         (Piece(11, 0, "wall", True), "would stand on cell (13, 0), which must stay empty: a tree"),
         (Piece(5, 3, "basket"), "would stand on cell (5, 4), which is taken by 'basket' at cell"),
-        (Piece(5, 5, "post"), "would stand on cell (5, 5), which is taken by 'basket' at cell (5,"),
         (Piece(8, 5, "post"), "costs 1, but only 0.5 of the budget of 3.5 is left"),
     ],
 )
@@ -221,9 +218,6 @@ def test_a_piece_that_closes_the_way_is_refused() -> None:
     ("layout", "words"),
     [
         ([(0, 0)], "layout[0]: has 2 values, must be (row, column, item, turned), two integers"),
-        ([(0, 0, "wall", 1)], "layout[0]: is (0, 0, 'wall' (a string), 1), must be (row, column"),
-        ([(0.0, 0, "wall")], "layout[0]: is (0.0, 0, 'wall' (a string)), must be (row, column,"),
-        (["wall"], "layout[0]: is 'wall' (a string), must be (row, column, item, turned)"),
         ({(0, 0, "wall")}, "layout is a set, must be a list of (row, column, item, turned)"),
         ([WALL[0], WALL[0]], "'wall' at cell (5, 1), turned, is repeated"),
         (
@@ -264,15 +258,8 @@ PIECE = {"item": "wall", "row": 5, "column": 1, "turned": True}
     ("content", "words"),
     [
         ({"version": 4, "pieces": []}, "version: is 4, must be 1"),
-        ({"version": 1.0, "pieces": []}, "version: is 1.0, must be 1"),
-        ({"cells": [], "pieces": []}, "cells: unknown key"),
-        ({"version": 1}, "cells or pieces: missing"),
         ({"pieces": {}}, "pieces: is a table, must be a list of tables"),
-        ({"pieces": [[5, 1]]}, "pieces[0]: is an array, must be a table"),
-        ({"pieces": [{**PIECE, "row": 1.5}]}, "pieces[0]: row: is 1.5, must be a wh"),
         ({"pieces": [{**PIECE, "turned": 1}]}, "pieces[0]: turned: is 1, must be tr"),
-        ({"pieces": [{**PIECE, "rows": 1}]}, "pieces[0]: rows: unknown key, did you"),
-        ({"pieces": [{"item": "wall", "row": 5}]}, "pieces[0]: column: missing"),
         ({"pieces": [{**PIECE, "item": "fence"}]}, "'fence' at cell (5, 1), turned,"),
         ({"cells": [[5, 1]]}, "layout[0]: has 2 values, must be (row, column, item, turned)"),
     ],
@@ -367,10 +354,8 @@ def test_cost_name_and_words_of_the_stock_list_can_be_changed(tmp_path: Path) ->
             {"from_catalogue": "t_wall_36"},
             "from_catalogue: is 't_wall_36', there is no such barrie",
         ),
-        ({"from_catalogue": 3}, "from_catalogue: is 3, must be a string"),
         ({"from_catalog": "planter"}, "from_catalog: unknown key, did you mean 'from_catalogue'?"),
         ({**PLANTER, "height_m": 2.0}, "height_m: must be left out: 'planter' has 1"),
-        ({**PLANTER, "cost": 0.0}, "cost: is 0.0: Input should be greater than or equal to 0.000"),
     ],
 )
 def test_bad_use_of_the_stock_list_is_named(keys: Document, words: str) -> None:

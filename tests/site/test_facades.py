@@ -75,14 +75,6 @@ def test_a_facade_needs_a_height() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (
-            {"thickness_mm": -6.0},
-            "thickness_mm: is -6.0: Input should be greater than or equal to 1",
-        ),
-        (
-            {"interlayer": {"tension_n_m": -1.0}},
-            "interlayer.tension_n_m: is -1.0: Input should be greater",
-        ),
         ({"interlayer": {"tear_shere": 0.1}}, "interlayer.tear_shere: unknown key"),
         ({"kind": "door"}, "kind: Input tag 'door' found using 'kind' does not match"),
     ],

@@ -146,12 +146,7 @@ def test_name_means_the_bundled_scenario_wherever_one_is(
     ("content", "line"),
     [
         (b"a = 1\nb = = 2", "line 2, column 5: is not TOML: Invalid value"),
-        (b"a = 1\nb = '", "line 2, column 6: is not TOML"),
-        (b"a = 1\na = 2", "line 2, column 6: is not TOML: Cannot overwrite a value"),
         (b"a = 1\r\n\xff = 2", "line 2: is not UTF-8 text: byte 0xff"),
-        (b"a = 1\n\nb = " + b"[" * 100_000, "line 3: is nested too deeply"),
-        (b"a = 1\nb = " + b"9" * 5000, "line 2: is not usable: Exceeds the limit (4300 digits)"),
-        (b"#" * 1_000_001, "has 1000001 bytes, must have at most 1000000"),
         (b"", "schema_version: missing"),
     ],
 )

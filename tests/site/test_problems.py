@@ -20,27 +20,13 @@ LEAST = "Input should be greater than or equal to"
 @pytest.mark.parametrize(
     ("path", "value", "line"),
     [
-        (("structures", 0, "rows"), -3, "structures[0].rows: is -3: Input should be greater than"),
         (("structures", 0, "rows"), 2.0, "structures[0].rows: is 2.0: Input should be a valid int"),
-        (("structures", 0, "weight"), 0, "is 0: Input should be greater than or equal to 0.000001"),
-        (("site", "width_m"), "10", "site.width_m: is '10': Input should be a valid number"),
         (("site", "width_m"), True, "site.width_m: is true: Input should be a valid number"),
-        (
-            ("site", "width_m"),
-            float("nan"),
-            "site.width_m: is nan: Input should be a finite number",
-        ),
         (("site", "width_m"), 16**300, "site.width_m: is an integer of about 362 digits: Input"),
-        (("site",), 3, "site: is 3: Input should be a valid dictionary"),
-        (("structures",), [], "structures: is an array: Tuple should have at least 1 item"),
         (("structures",), {}, "structures: is a table: Input should be a valid tuple"),
         (("structures", 1, "name"), "a b", "structures[1].name: is 'a b', must be 1 to 40 letter"),
         (("structures", 1, "kind"), "ConcretSquare", "did you mean 'ConcreteSquare'?"),
-        (("structures", 1, "kind"), 7, "structures[1].kind: Input tag '7' found using 'kind' does"),
-        (("charge", 0, "position_m"), [1.0], "charge[0].position_m[1]: missing"),
         (("schema_version",), 1, "schema_version: is 1, must be 2, the version of this release"),
-        (("simulation", "preset"), "balistic", "simulation.preset: is 'balistic', there is no su"),
-        (("simulation", "overrides", "air"), 1, "simulation.overrides.air: is 1, must be a table"),
         (
             ("simulation", "overrides", "air", "jitter"),
             1.5,

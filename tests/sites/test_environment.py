@@ -3,7 +3,6 @@
 from typing import Any
 
 import gymnasium as gym
-import numpy as np
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.sites import HELD_OUT_SITES, SiteSource
@@ -37,15 +36,3 @@ def test_it_can_be_given_the_sites_held_out() -> None:
     env = make(scenario=SiteSource.held_out(1))
     env.reset(seed=4)
     assert env.observable.scenario.name == "site_0"
-
-
-def test_vectors_have_a_site_each() -> None:
-    arguments: dict[str, Any] = {"engine": ThinEngine(), "realisations": 1}
-    envs = gym.make_vec(ID, num_envs=2, vectorization_mode="sync", **arguments)
-    observation, info = envs.reset(seed=3)
-    assert not np.array_equal(observation[0], observation[1])
-    assert not np.array_equal(info["action_mask"][0], info["action_mask"][1])
-    _, _, ended, _, info = envs.step(np.array([FINISH, FINISH]))
-    assert ended.all()
-    assert info["scenario_hash"][0] != info["scenario_hash"][1]
-    envs.close()

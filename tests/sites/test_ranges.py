@@ -12,17 +12,11 @@ from blast_env.sites import SiteRanges
     ("changes", "words"),
     [
         ({"side_m": 36.2}, r"side_m is 36.2, must be a multiple of 0.5 m from 2 to 2000"),
-        ({"zone_side_m": 0.0}, r"zone_side_m is 0.0, must be a multiple of 0.5 m from 0.5 to 500"),
-        ({"tnt_kg": (0.0, 10.0)}, r"tnt_kg is \(0.0, 10.0\), must be a pair .* from 0.1 to 100000"),
         ({"tnt_kg": (20.0, 10.0)}, r"tnt_kg is \(20.0, 10.0\), must be a pair \(lowest, highest\)"),
-        ({"tnt_kg": 10.0}, r"tnt_kg is 10.0, must be a pair"),
-        ({"tnt_kg": (float("nan"), 10.0)}, r"tnt_kg is \(nan, 10.0\), must be a pair"),
         ({"stand_off_m": (12.1, 12.4)}, r"\(12.1, 12.4\), must be .* multiple of 0.5 m between"),
         ({"parking_probability": 1.5}, r"parking_probability is 1.5, must be a number from 0 to 1"),
-        ({"path_probability": True}, r"path_probability is True, must be a number"),
         ({"stock": (8.0, 9.0)}, r"stock is \(8.0, 9.0\), must be a pair .* of whole numbers"),
         ({"stock": (0, 9)}, r"stock is \(0, 9\), must be .* from 1 to 10000"),
-        ({"trees": (0, 1, 2)}, r"trees is \(0, 1, 2\), must be a pair"),
     ],
 )
 def test_a_value_out_of_bounds_is_named_with_its_bound(changes: dict[str, Any], words: str) -> None:

@@ -20,15 +20,6 @@ def test_training_and_held_out_seeds_are_disjoint() -> None:
     assert held_out.start == 0
 
 
-def test_training_never_draws_a_held_out_site() -> None:
-    held_out = {site.content_hash for site in SiteSource.held_out(6)}
-    rng = np.random.default_rng(0)
-    drawn = [SiteSource.training().sample(rng) for _ in range(6)]
-    assert all(int(site.name.removeprefix("site_")) >= HELD_OUT_SITES for site in drawn)
-    assert not held_out & {site.content_hash for site in drawn}
-    assert len({site.content_hash for site in drawn}) == 6
-
-
 def test_held_out_sites_are_counted_from_0(sites: tuple[Scenario, ...]) -> None:
     source = SiteSource.held_out(3)
     assert list(source) == [source.site(index) for index in range(3)] == list(sites[:3])

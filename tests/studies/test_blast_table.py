@@ -6,16 +6,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import typer
-from blast_agents.training import train
 from typer.testing import CliRunner
 
 from blast_env.evaluation import BlastEvaluator, BlastStore, draw_threats
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Piece
-from blast_env.site import save_scenario
 from studies import blast_table
-from tests.agents.test_self_labelling import own, run_settings
-from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 from tests.evaluation.cases import COURTYARD
 from tests.evaluation.test_blast_store import key, loads, same
 
@@ -42,35 +38,6 @@ def test_each_blast_is_there_once_with_what_was_asked(tmp_path: Path) -> None:
     assert set(table["scenario_hash"]) == {scenario.content_hash}
     assert table["seed"].tolist() == [each.seed for each in threats]
     assert [json.loads(each) for each in table["layout"]] == [[], []]
-
-
-def test_own_scenarios_are_named_if_they_are_given(tmp_path: Path) -> None:
-    own, out = tmp_path / "own.toml", tmp_path / "blasts.parquet"
-    save_scenario(small_scenario(), own)
-    evaluator = BlastEvaluator(small_scenario(), "event", cache=tmp_path / "blasts")
-    evaluator.loads((), draw_threats(small_scenario(), [0])[0])
-    for options, names in (((), {""}), (("--scenario", own), {str(own)})):
-        assert run(tmp_path / "blasts", *options, "--out", out)[0] == 0
-        assert set(pd.read_parquet(out)["scenario"]) == names
-    assert blast_table.scenario_of(str(own)) == small_scenario()
-
-
-def test_the_sites_that_a_run_learnt_from_are_named(tmp_path: Path) -> None:
-    agent, out = tmp_path / "agent", tmp_path / "blasts.parquet"
-    few = {"engine": "event", "threat": "hidden", "hidden_threats": 1, "evaluation_cases": 2}
-    train(run_settings(Path("item_sites"), steps=1, **few), own(cases=1, first_updates=1), agent)
-    assert run(agent / "blasts", "--run", agent, "--out", out)[0] == 0
-    table = pd.read_parquet(out)
-    learnt_from = {name for name in table["scenario"] if name}  # the others chose the weights
-    (site,) = learnt_from
-    assert set(table["scenario_hash"][table["scenario"] == site]) == {
-        blast_table.scenario_of(site).content_hash
-    }
-    other = tmp_path / "other"
-    train(settings(scenario_file(tmp_path), steps=16), hyperparameters(), other)
-    code, words = run(agent / "blasts", "--run", other)
-    assert code != 0
-    assert "is no run by self-labelling on item_sites" in words
 
 
 def test_generated_sites_of_all_sides_are_named(tmp_path: Path) -> None:
@@ -106,13 +73,6 @@ def test_walls_of_front_sites_see_the_charge(tmp_path: Path, seed: int) -> None:
     options = ("--first", seed - 10_000, "--sites", 1, "--side", 18, "--front", "--out", out)
     assert run(tmp_path / "blasts", *options)[0] == 0
     assert set(pd.read_parquet(out)["scenario"]) == {f"front_sites/18/{seed}"}
-
-
-def test_a_folder_without_blasts_is_an_error(tmp_path: Path) -> None:
-    code, words = run(tmp_path)
-    assert code != 0
-    assert "no blasts in" in words
-    assert "is no folder of blasts" in run(tmp_path / "none")[1]
 
 
 def test_keys_come_back_as_they_were(tmp_path: Path) -> None:

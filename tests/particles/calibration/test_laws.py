@@ -127,14 +127,10 @@ def test_a_falling_power_law_refuses_zero() -> None:
     [
         ([], [], "i_sim is empty"),
         ([7.0, 7.0, 7.0, 7.0], I_REFERENCE, r"i_sim is 7 at every distance \(4\)"),
-        ([0.0, 0.0, 0.0, 0.0], I_REFERENCE, "i_sim is 0 at every distance"),
         ([1.0, float("nan"), 3.0, 4.0], I_REFERENCE, r"i_sim\[1\] is nan"),
-        ([1.0, 2.0, 3.0, float("inf")], I_REFERENCE, r"i_sim\[3\] is inf"),
         ([1.0, 2.0, -3.0, 4.0], I_REFERENCE, r"i_sim\[2\] is -3, must be at least 0"),
         (I_SIM, [0.1, 0.2, 0.0, 0.4], r"i_reference\[2\] is 0, must be above 0"),
-        (I_SIM, [0.1, 0.2, float("nan"), 0.4], r"i_reference\[2\] is nan"),
         (I_SIM, I_REFERENCE[:3], "i_sim has 4 values and i_reference 3"),
-        ([I_SIM], I_REFERENCE, "i_sim has 2 dimensions, must have 1"),
     ],
 )
 def test_bad_input_is_named(

@@ -64,13 +64,8 @@ def test_the_paper_s_columns_give_the_known_measures(
     [
         ([10.0, 20.0, 20.0], [1.0] * 3, [1.0] * 3, "distance_m[2] is 20, repeated"),
         ([10.0, 30.0, 20.0], [1.0] * 3, [1.0] * 3, "distance_m[2] is 20, out of order after 30"),
-        ([10.0, float("nan")], [1.0] * 2, [1.0] * 2, "distance_m[1] is nan"),
-        ([-10.0, 20.0], [1.0] * 2, [1.0] * 2, "distance_m[0] is -10, must be at least 0"),
         ([10.0], [1.0], [1.0], "distance_m has 1 values, must have at least 2"),
-        ([], [], [], "distance_m has 0 values"),
         ([10.0, 20.0], [1.0] * 3, [1.0] * 2, "predicted has 3 values, must have 2"),
-        ([10.0, 20.0], [1.0] * 2, [1.0] * 3, "reference has 3 values, must have 2"),
-        ([10.0, 20.0], [float("nan"), 1.0], [1.0] * 2, "predicted[0] is nan"),
         ([10.0, 20.0], [1.0] * 2, [1.0, 0.0], "reference[1] is 0, must be above 0"),
     ],
 )
@@ -141,10 +136,7 @@ def test_seeds_are_drawn_as_a_whole() -> None:
     ("changes", "message"),
     [
         ({"i_sim_by_seed": np.ones((1, 4))}, "has 1 seeds, must have at least 2"),
-        ({"i_sim_by_seed": np.ones(4)}, "has 1 dimensions, must have 2"),
-        ({"i_sim_by_seed": np.array([[1.0, np.nan], [1.0, 2.0]])}, r"i_sim_by_seed\[0, 1\] is nan"),
         ({"resamples": 99}, "resamples is 99, must be at least 100"),
-        ({"confidence": 1.0}, "confidence is 1, must be between 0 and 1"),
         (
             {"i_sim_by_seed": np.array([[1.0, 2.0, 3.0, 0.0], [1.0, 2.0, 3.0, 4.0]])},
             r"a draw of 2 seeds with replacement cannot be fitted: i_sim\[3\] is 0",
