@@ -82,8 +82,7 @@ def train(
     cells: CellsOption = None,
     observation: str | None = typer.Option(
         None,
-        help="Observation: grid, grid_with_load, image (with a CnnPolicy), or features (with an "
-        "MlpPolicy).",
+        help="Observation: grid, image (with a CnnPolicy), or features (with an MlpPolicy).",
         show_default="grid",
     ),
     changes: list[str] = typer.Option(

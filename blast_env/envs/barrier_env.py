@@ -67,8 +67,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     ## Observation space
     `observation="image"`: `Box(0, 255, (height, width, planes), uint8)`, planes over the site, for
     image policies. `"grid"`: the same as `Box(0, 1, (planes, rows, columns), float32)`, for
-    custom networks. `"grid_with_load"`: one plane more, the load without a barrier. `"features"`: a
-    flat vector. `"dict"`: image, vector and mask. `blast_env.envs.observations` lists all values.
+    custom networks. `"features"`: a flat vector. `"dict"`: image, vector and mask.
+    `blast_env.envs.observations` lists all values.
 
     ## Rewards
     The rewards of an episode add up to minus the weighted impulse on the protected structures
@@ -144,8 +144,7 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             scenario: Bundled name, path of a scenario file, a `Scenario` or its plain data; or
                 `"sites"`, which draws a generated site at every `reset`, or any `ScenarioSource`.
             reward: `"terminal"`, `"incremental"`, or a `Reward`.
-            observation: `"image"`, `"grid"`, `"grid_with_load"` (four more blasts per charge),
-                `"features"`, or an `Observation`.
+            observation: `"image"`, `"grid"`, `"features"`, `"dict"`, or an `Observation`.
             action: `"place"`, `"item_then_place"`, `"item_then_block"`, `"row"`, or `Actions`.
             threat: `"visible"`, `"hidden"`, or a `ThreatModel`.
             threats: Number of hidden charges per episode; default 16.

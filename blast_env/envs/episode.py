@@ -16,7 +16,6 @@ from blast_env.envs.observations import (
     EpisodeObservation,
     Observable,
     Observation,
-    SimulatedModuleLoads,
 )
 from blast_env.envs.strategies import (
     HiddenThreat,
@@ -342,7 +341,6 @@ class Task:
         observable = Observable(
             scenario,
             self.threat_model.shown(scenario, charges),
-            SimulatedModuleLoads(self.evaluators),
             bool(self.source.representative.vehicles),
         )
         placement = prepared.empty

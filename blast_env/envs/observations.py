@@ -1,7 +1,7 @@
 """Observations of an agent, and their parts."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil, hypot, inf
@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import draw_threats
-from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout, Rectangle
 from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import vehicle_reach, worst_places
@@ -54,34 +52,6 @@ FULL_HEIGHT_M: Final = 12.0
 
 # ---- The observable part of an episode.
 
-ModuleLoads = Callable[[Scenario, tuple[AnySource, ...], int], FloatArray]
-"""Returns the load on each module of the structures without a barrier, simulation units (modules,).
-
-Modules are in the order of the scenario's structures, row by row. Arguments are the scenario, the
-place of the charge or its possible places, and the number of blasts to average.
-"""
-
-
-@dataclass(frozen=True)
-class SimulatedModuleLoads:
-    """Mean loads of blasts of charges from the sources, with seeds from 0 on: a `ModuleLoads`.
-
-    Other blasts assess the layout.
-
-    Attributes:
-        evaluators: Run the blasts; used only when loads are requested.
-    """
-
-    evaluators: Evaluators
-
-    def __call__(
-        self, scenario: Scenario, sources: tuple[AnySource, ...], blasts: int
-    ) -> FloatArray:
-        """Return the mean load on each module, simulation units (modules,)."""
-        threats = draw_threats(scenario.model_copy(update={"charge": sources}), range(blasts))
-        loads = self.evaluators.of(scenario).loads_of_many([((), threat) for threat in threats])
-        return np.asarray(np.mean([each.module_impulse for each in loads], axis=0))
-
 
 @dataclass(frozen=True, eq=False)
 class Observable:
@@ -93,34 +63,18 @@ class Observable:
     Attributes:
         scenario: The scenario.
         sources: The place of the charge, or its possible places.
-        module_loads: For observations with loads; only they call it, and only it needs an engine
-            and a calibration.
         among_vehicles: Whether other scenarios of the environment have vehicles, so that values
             for vehicles are present.
     """
 
     scenario: Scenario
     sources: tuple[AnySource, ...]
-    module_loads: ModuleLoads | None = None
     among_vehicles: bool = False
 
     @property
     def shows_vehicles(self) -> bool:
         """Whether observations have values for vehicles."""
         return self.among_vehicles or bool(self.scenario.vehicles)
-
-    def unprotected_loads(self, blasts: int) -> FloatArray:
-        """Return the load on each module of the structures without a barrier (modules,).
-
-        Args:
-            blasts: Number of blasts to average.
-
-        Raises:
-            BlastEnvError: If `module_loads` is None.
-        """
-        if self.module_loads is None:
-            raise BlastEnvError("module_loads is None, must be given for an observation with loads")
-        return self.module_loads(self.scenario, self.sources, blasts)
 
 
 @dataclass(frozen=True)
@@ -549,44 +503,6 @@ class GridObservation:
         return episode
 
 
-@dataclass(frozen=True)
-class GridWithLoadObservation(GridObservation):
-    """`GridObservation` with one more plane: the loads on the structures without a barrier.
-
-    Channel 9, `unprotected_load`, has the impulse on each module divided by the largest one: the
-    mean of blasts with separate seeds, of the visible charge or of charges drawn from the sources
-    of a hidden one. The blasts run at `reset`, once per charge, or once per scenario if the charge
-    is hidden.
-
-    Attributes:
-        blasts: Number of blasts to average.
-    """
-
-    blasts: int = 4
-    channels: ClassVar[tuple[str, ...]] = (*GridObservation.channels, "unprotected_load")
-
-    def episode(self, observable: Observable) -> "GridEpisode":
-        """Draw the planes that do not change, with the loads."""
-        episode = super().episode(observable)
-        grid = SiteGrid.of(observable.scenario.site)
-        impulses = observable.unprotected_loads(self.blasts)
-        shares = impulses / max(impulses.max(), np.finfo(float).tiny)
-        plane = np.zeros((1, grid.rows, grid.columns), dtype=np.float32)
-        first = 0
-        for structure in observable.scenario.structures:
-            rows, columns = structure.rows, structure.columns
-            own = shares[first : first + structure.modules]
-            if structure.cells is None:
-                values = own.reshape(rows, columns)
-            else:
-                values = np.zeros((rows, columns))
-                values[tuple(np.array(structure.cells).T)] = own
-            plane += grid.lattice(structure.corner_m, rows, columns).plane(values)
-            first += structure.modules
-        episode.show(episode.static, ("unprotected_load",), plane)
-        return episode
-
-
 @dataclass(frozen=True, eq=False)
 class GridEpisode(BatchedObservation):
     """The planes of one episode.
@@ -1011,7 +927,6 @@ OBSERVATIONS: Final[Mapping[str, Observation]] = MappingProxyType(
     {
         "dict": DictObservation(),
         "grid": GridObservation(),
-        "grid_with_load": GridWithLoadObservation(),
         "image": ImageObservation(),
         "features": FeaturesObservation(),
     }

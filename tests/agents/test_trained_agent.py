@@ -19,7 +19,7 @@ from sb3_contrib import MaskablePPO
 
 from blast_env import load_scenario
 from blast_env.design.search import LayoutAgent
-from blast_env.envs.observations import GridWithLoadObservation, Observable
+from blast_env.envs.observations import GridObservation, Observable
 from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.layout import LayoutState
@@ -72,14 +72,11 @@ def test_proposals_keep_every_condition_of_a_bundled_site(name: str) -> None:
     assert LayoutState.of(scenario, layout).cells == layout
 
 
-def test_a_grid_agent_needs_no_engine_and_no_calibration() -> None:
-    """Whoever has but a site and an agent gets a layout; only the loads ask for more."""
+def test_an_agent_needs_no_calibration() -> None:
     scenario = load_scenario("courtyard")
     unprotected = scenario.model_copy(update={"calibration": None})
-    agent = replace(untrained(scenario), engine="there is none")
-    assert agent.propose(unprotected) == untrained(scenario).propose(scenario)
-    with pytest.raises(UnknownNameError, match="there is none"):
-        replace(agent, observation="grid_with_load").propose(unprotected)
+    agent = untrained(scenario)
+    assert agent.propose(unprotected) == agent.propose(scenario)
     with pytest.raises(UnknownNameError, match="did you mean 'grid'"):
         replace(agent, observation="gird")
 
@@ -89,7 +86,7 @@ SPATIAL = "blast_agents.policies.spatial.SpatialMaskablePolicy"
 
 @pytest.mark.parametrize(
     ("observation", "policy"),
-    [("grid_with_load", SPATIAL), ("grid_with_load", "MlpPolicy"), ("features", "MlpPolicy")],
+    [("grid", SPATIAL), ("grid", "MlpPolicy"), ("features", "MlpPolicy")],
 )
 def test_an_agent_of_another_observation_learns_is_chosen_and_proposes(
     observation: str, policy: str, tmp_path: Path
@@ -105,12 +102,12 @@ def test_an_agent_of_another_observation_learns_is_chosen_and_proposes(
         assert layout == LayoutState.of(small_scenario(), layout).cells
 
 
-def test_the_spatial_policy_sees_the_loads_and_finds_channels_by_their_names() -> None:
-    """Planes in another order are the same site; the load is seen where there is one."""
+def test_the_spatial_policy_finds_channels_by_their_names() -> None:
+    """Planes in another order are the same site."""
     scenario = load_scenario("courtyard")
-    space = GridWithLoadObservation().space(scenario)
+    space = GridObservation().space(scenario)
     assert isinstance(space, spaces.Box)
-    channels = GridWithLoadObservation.channels
+    channels = GridObservation.channels
     policies = []
     for names in (channels, channels[::-1]):
         torch.manual_seed(0)
@@ -126,13 +123,11 @@ def test_the_spatial_policy_sees_the_loads_and_finds_channels_by_their_names() -
             )
         )
     charge = PointSource(position_m=(5.0, 12.0), tnt_kg=100.0)
-    observable = Observable(scenario, (charge,), lambda *_: np.arange(1.0, 161.0))
-    seen = GridWithLoadObservation().episode(observable).observe(LayoutState.empty(scenario))
+    observable = Observable(scenario, (charge,))
+    seen = GridObservation().episode(observable).observe(LayoutState.empty(scenario))
     planes = torch.as_tensor(seen)[None]
     logits = logits_of(policies[0], planes)
     torch.testing.assert_close(logits_of(policies[1], planes.flip(1)), logits)
-    planes[:, channels.index("unprotected_load")] = 0
-    assert not torch.equal(logits_of(policies[0], planes), logits)
 
 
 def test_a_policy_that_looks_at_planes_is_refused_where_there_are_none(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blast_agents.training import load_agent
 from blast_agents.training.run_folder import RunFolder
 
 from blast_env.evaluation.engines.gas import GasEngine
@@ -49,9 +48,6 @@ def test_training_and_its_evaluations_use_the_cells(
     assert cells == {0.25}
     assert "cells of 0.25 m" in result.stdout
     assert RunFolder(folder).configuration().settings.cell_m == 0.25
-    engine = load_agent(folder).engine
-    assert isinstance(engine, GasEngine)
-    assert engine.cell_m == 0.25
 
 
 def test_growing_cells_are_those_of_commands_that_run_gas(

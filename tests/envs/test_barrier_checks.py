@@ -51,7 +51,7 @@ def test_each_bundled_site_with_a_build_zone_has_an_environment_with_its_engine(
     ("observation", "reward", "threat"),
     [
         *((each, "terminal", "visible") for each in ("image", "grid", "features", "dict")),
-        ("grid_with_load", "incremental", "hidden"),
+        ("grid", "incremental", "hidden"),
         ("image", "relative", "hidden"),
     ],
 )

@@ -55,7 +55,7 @@ def test_monitor_logs_the_final_information() -> None:
 
 
 @pytest.mark.parametrize("again", [lambda env: pickle.loads(pickle.dumps(env)), copy.deepcopy])
-@pytest.mark.parametrize("observation", ["grid_with_load", "features"])
+@pytest.mark.parametrize("observation", ["grid", "features"])
 def test_a_copy_in_mid_episode_goes_on_identically(again: Any, observation: str) -> None:
     env = make(reward="incremental", observation=observation, render_mode="rgb_array")
     env.reset(seed=2)

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from blast_env.envs.barrier_env import BlastBarrierEnv
-from blast_env.envs.observations import GridObservation, GridWithLoadObservation
-from blast_env.evaluation.cases import draw_threats
-from blast_env.evaluation.evaluator import BlastEvaluator
+from blast_env.envs.observations import GridObservation
 from blast_env.site import Scenario
 from tests.envs import small
-from tests.envs.small import ThinEngine, restricted_scenario, small_document, small_scenario
+from tests.envs.small import restricted_scenario, small_document, small_scenario
 
-CHANNEL = {name: index for index, name in enumerate(GridWithLoadObservation.channels)}
+CHANNEL = {name: index for index, name in enumerate(GridObservation.channels)}
 FINISH = 40
 ZONE = np.s_[14:22, 14:19]  # where the build zone lies on the site, rows and columns
 
@@ -36,7 +34,6 @@ def test_the_shape_is_channels_rows_columns_of_half_metres() -> None:
     space = make().observation_space
     assert space.shape == (9, 36, 38)
     assert space.dtype == np.float32
-    assert make(observation="grid_with_load").observation_space.shape == (10, 36, 38)
 
 
 def test_structures_cover_their_squares_row_0_at_the_bottom() -> None:
@@ -121,7 +118,7 @@ def test_a_hidden_charge_shows_all_places_where_it_may_be() -> None:
 
 
 def test_a_hidden_observation_tells_nothing_about_the_charges_that_were_drawn() -> None:
-    for observation in ("grid", "grid_with_load", "image", "features"):
+    for observation in ("grid", "image", "features"):
         env = make(observation=observation, threat="hidden", threats=2)
         first, second = env.reset(seed=1)[0], env.reset(seed=2)[0]
         assert (first == second).all()
@@ -130,21 +127,6 @@ def test_a_hidden_observation_tells_nothing_about_the_charges_that_were_drawn() 
             env.reset(seed=seed)
             ends.append(env.step(FINISH)[4]["charges"])
         assert ends[0] != ends[1]
-
-
-def test_the_loads_without_a_barrier_lie_on_the_modules_that_bear_them() -> None:
-    scenario = small_scenario()
-    env = make(scenario, observation=GridWithLoadObservation(blasts=2))
-    load = plane(env, "unprotected_load", charge_position_m=(3.0, 9.0), tnt_kg=100.0)
-    at_charge = scenario.model_copy(update={"charge": env.observable.sources})
-    evaluator = BlastEvaluator(scenario, ThinEngine())
-    blasts = evaluator.loads_of_many([((), each) for each in draw_threats(at_charge, range(2))])
-    mean = np.mean([each.module_impulse for each in blasts], axis=0)
-    house = (mean[8:56] / mean.max()).reshape(12, 4)
-    assert load[10:22, 28:32] == pytest.approx(house, abs=0.003)
-    assert load.max() == 1.0
-    load[10:22, 28:32] = load[2:5, 24:27] = load[28:30, 22:26] = 0.0
-    assert not load.any()
 
 
 def test_what_lies_off_the_grid_is_shown_by_the_share_of_a_square() -> None:
@@ -161,8 +143,7 @@ def test_scenarios_of_one_size_share_a_space_whatever_stands_on_them() -> None:
     document["structures"] = document["structures"][1:]
     document["charge"] = document["charge"][1:]
     variant = Scenario.model_validate(document)
-    for kind in (GridObservation(), GridWithLoadObservation()):
-        assert kind.space(variant) == kind.space(small_scenario())
+    assert GridObservation().space(variant) == GridObservation().space(small_scenario())
 
 
 def test_an_observation_is_not_changed_afterwards() -> None:

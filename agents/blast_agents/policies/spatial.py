@@ -23,7 +23,7 @@ from blast_env.errors import BlastEnvError
 _LOGIT_GAIN: Final = 0.01
 
 _OVERVIEW: Final = (
-    *("protected", "other_structures", "charge", "barrier", "unprotected_load"),
+    *("protected", "other_structures", "charge", "barrier"),
     *("structure_height", "barrier_height", "reach_without_barrier", "reach"),
 )
 """Channels of the network's overview of the site, as far as the observation has them."""

@@ -32,16 +32,12 @@ from blast_env.envs.observations import (
     SINGLE_ARRAYS,
     Array,
     EpisodeObservation,
-    ModuleLoads,
     Observable,
-    SimulatedModuleLoads,
     item_channels,
     vehicle_channels,
 )
 from blast_env.envs.strategies import check_size
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import Evaluators
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
@@ -210,8 +206,6 @@ class TrainedAgent:
         policy: The policy, of PPO or MaskablePPO.
         representative: A scenario of the size that the policy is for.
         observation: Name of the observation that the policy is for.
-        engine: Engine for the blasts of an observation that shows loads; other observations need
-            neither engine nor calibration.
 
     Raises:
         UnknownNameError: If the observation is unknown.
@@ -220,7 +214,6 @@ class TrainedAgent:
     policy: Policy
     representative: Scenario
     observation: str = "grid"
-    engine: str | Engine = "event"
 
     def __post_init__(self) -> None:
         check_names("observation", [self.observation], SINGLE_ARRAYS)
@@ -232,10 +225,6 @@ class TrainedAgent:
         for name, values in self.policy.state_dict().items():
             digest.update(name.encode() + values.numpy().tobytes())
         return digest.hexdigest()[:16]
-
-    @cached_property
-    def _module_loads(self) -> SimulatedModuleLoads:
-        return SimulatedModuleLoads(Evaluators(self.engine))
 
     def propose(self, scenario: AnyScenario, charge: AnyCharge | None = None) -> Layout:
         """Return the layout of the most likely legal actions.
@@ -303,9 +292,7 @@ class TrainedAgent:
     def _episode(self, scenario: Scenario, charge: AnyCharge | None) -> EpisodeObservation:
         sources = scenario.charge if charge is None else (source_of(charge),)
         among_vehicles = bool(self.representative.vehicles)
-        # The engine is resolved on the first use, since most observations show no loads.
-        module_loads: ModuleLoads = lambda *asked: self._module_loads(*asked)  # noqa: E731
-        observable = Observable(scenario, sources, module_loads, among_vehicles)
+        observable = Observable(scenario, sources, among_vehicles)
         return OBSERVATIONS[self.observation].episode(observable)
 
     def _actions(
@@ -367,7 +354,7 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     policy = policy_for(configuration, scenario)
     checkpoint.load_policy(policy, folder.path, weights)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, settings.observation, settings.real_engine)
+    return TrainedAgent(policy, scenario, settings.observation)
 
 
 def load_archive(
@@ -377,7 +364,6 @@ def load_archive(
     *,
     trust_archive: bool = False,
     observation: str = "grid",
-    engine: str | Engine = "event",
 ) -> TrainedAgent:
     """Return the agent of an archive written by stable-baselines3 or RL Zoo.
 
@@ -390,7 +376,6 @@ def load_archive(
         scenario: A scenario of the size that the policy is for, or its bundled name or path.
         trust_archive: Whether the archive may run code; only for a trusted source.
         observation: Name of the observation that the policy is for.
-        engine: Engine for an observation that shows loads; see `TrainedAgent`.
 
     Raises:
         BlastEnvError: If the archive is not trusted, cannot be read, or is for observations or
@@ -406,7 +391,7 @@ def load_archive(
     except (OSError, ImportError, ValueError, KeyError, RuntimeError, AttributeError) as error:
         raise BlastEnvError(f"{path}: cannot be read: {error}") from error
     policy.set_training_mode(False)
-    agent = TrainedAgent(policy, find_scenario(scenario), observation, engine)
+    agent = TrainedAgent(policy, find_scenario(scenario), observation)
     seen, actions = policy_spaces(observation, agent.representative)
     for name, found, wanted in (
         ("observation_space", policy.observation_space, seen),

@@ -146,7 +146,6 @@ class TrainingRecorder(BaseCallback):
             self.algorithm.policy,
             self.scenario,
             self.settings.observation,
-            self.settings.real_engine,
         )
         row = evaluate(self.progress, agent, self.selection)
         self.logger.record("evaluation/reduction", row.reduction)

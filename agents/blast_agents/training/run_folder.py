@@ -87,7 +87,7 @@ class TrainingSettings(BaseModel):
     engine: str = "event"
     cell_m: Annotated[float, Field(gt=0.0)] | None = None
     cells: str | None = None
-    observation: Literal["grid", "grid_with_load", "image", "features"] = "grid"
+    observation: Literal["grid", "image", "features"] = "grid"
     hidden_threats: Annotated[int, Field(ge=1, le=1000)] = 2
     evaluation_interval: Annotated[int, Field(ge=1, le=10**6)] = 5
     evaluation_cases: Annotated[int, Field(ge=2, le=100)] = 16
@@ -95,20 +95,6 @@ class TrainingSettings(BaseModel):
     evaluation_first_seed: Annotated[int, Field(ge=0, lt=2**30)] = 0
     torch_threads: Annotated[int, Field(ge=1, le=256)] = 1
     start_from: str | None = None
-
-    @model_validator(mode="after")
-    def _check_loads(self) -> "TrainingSettings":
-        """Refuse an observation with the loads of modules where these are not available.
-
-        A surrogate predicts only their mean, and self-labelling would need additional blasts.
-        """
-        where = "with a surrogate" if self.guesses else "for self_labelling"
-        nobody_knows = self.guesses or self.algorithm == SELF_LABELLING
-        if nobody_knows and self.observation == "grid_with_load":
-            raise ValueError(
-                f"observation is 'grid_with_load', must be 'grid', 'image' or 'features' {where}"
-            )
-        return self
 
     @property
     def blast_engine(self) -> Engine:
@@ -126,20 +112,10 @@ class TrainingSettings(BaseModel):
         return is_surrogate(self.engine)
 
     @property
-    def real_engine(self) -> Engine:
-        """The engine that simulates blasts: gas dynamics if a surrogate trains.
-
-        A surrogate's file need not exist (any more).
-
-        Raises:
-            UnknownNameError: If no engine has that name.
-            BlastEnvError: If the engine does not support the cells.
-        """
-        return find_engine(JUDGE) if self.guesses else self.blast_engine
-
-    @property
     def judge(self) -> Engine:
         """The engine that selects the best weights and evaluates the agent.
+
+        It is gas dynamics if a surrogate trains, whose file need not exist (any more).
 
         Raises:
             UnknownNameError: If no engine has that name.
@@ -152,7 +128,7 @@ class TrainingSettings(BaseModel):
                     "blasts: a surrogate guesses them"
                 )
             return find_engine(self.evaluation_engine)
-        return self.real_engine
+        return find_engine(JUDGE) if self.guesses else self.blast_engine
 
 
 class RunConfiguration(BaseModel):

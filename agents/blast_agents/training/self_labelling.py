@@ -418,7 +418,7 @@ class SelfLabelling:
         return cls(
             folder=folder,
             configuration=configuration,
-            agent=TrainedAgent(policy, scenario, settings.observation, settings.real_engine),
+            agent=TrainedAgent(policy, scenario, settings.observation),
             lessons=Lessons(cases, progress.labels),
             judge=judge,
             selection=selection,
