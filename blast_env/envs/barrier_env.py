@@ -1,7 +1,5 @@
 """The environment `BlastBarrier-v0`: placing barriers to protect a structure."""
 
-from collections.abc import Iterator
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +35,7 @@ from blast_env.envs.strategies import (
     ThreatModel,
     scenario_source,
 )
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import value_text
 from blast_env.evaluation.engines import Engine, default_engine, find_engine
 from blast_env.evaluation.evaluator import Evaluators
 from blast_env.evaluation.store import BlastStore
@@ -136,7 +134,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         cell_m: float | None = None,
         cache: str | Path | BlastStore | None = None,
         render_mode: str | None = None,
-        show_blast: bool = False,
     ) -> None:
         """Make an environment from the keywords of `gymnasium.make`.
 
@@ -167,9 +164,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             cache: Folder of a store of blasts, which other processes and later runs may use too,
                 or a `BlastStore`; by default blasts are only in memory.
             render_mode: `None`, `"human"`, `"rgb_array"` or `"ansi"`.
-            show_blast: Whether an episode continues after the detonation, for as many steps as the
-                film of the blast has frames (some 250), regardless of the actions: for a window,
-                and for `gymnasium.wrappers.RecordVideo`. The reward is paid at the detonation.
 
         Raises:
             BlastEnvError: If an argument is invalid; the message names it and its bounds.
@@ -203,15 +197,8 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
         if isinstance(self.observation_space, spaces.Dict):
             mask = spaces.MultiBinary(numbered.finish + 1)
             self.observation_space = spaces.Dict({**self.observation_space, MASK: mask})
-        self.show_blast = show_blast
-        if show_blast and render_mode not in ("human", "rgb_array"):
-            raise BlastEnvError(
-                f"show_blast is True, but render_mode {render_mode!r} shows nothing:"
-                " must be 'human' or 'rgb_array'"
-            )
         self._display = Display(render_mode, self.metadata["render_fps"])
         self._begun: Episode | None = None
-        self._film_info: dict[str, Any] | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -225,8 +212,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
                 from that of the representative one.
         """
         super().reset(seed=seed)
-        self._display.stop_film()
-        self._film_info = None
         episode = self.task.start(self.np_random, ResetOptions.from_mapping(options))
         self._begun = episode
         if self.render_mode == "human":
@@ -246,31 +231,14 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
             )
         episode = self._episode
         if episode.ended:
-            return self._show_blast()
+            raise gym.error.ResetNeeded("the episode has ended: call reset")
         terms = episode.act(int(action), self.reward_strategy, self.illegal)
         info = episode.information() | {"reward_terms": terms}
         if episode.ended:
             info |= episode.final_information(self.task.evaluators)
-        self._film_info = info if episode.ended and self.show_blast else None
-        if self._film_info is not None:
-            self._display.begin_film(episode)
         if self.render_mode == "human":
             self._display.show(episode)
-        ended = episode.ended and self._film_info is None
-        return episode.observe(), total(terms), ended, False, info
-
-    def _show_blast(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Go on to the next frame of the film, with a reward of 0."""
-        if self._film_info is None:
-            raise gym.error.ResetNeeded("the episode has ended: call reset")
-        terms = dict.fromkeys(self._film_info["reward_terms"], 0.0)
-        info = deepcopy(self._film_info) | {"reward_terms": terms}
-        ended = not self._display.go_on_with_film()
-        if ended:
-            self._film_info = None
-        if self.render_mode == "human":
-            self._display.show(self._episode)
-        return self._episode.observe(), 0.0, ended, False, info
+        return episode.observe(), total(terms), episode.ended, False, info
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return the mask of actions that are legal now, (actions,).
@@ -312,18 +280,6 @@ class BlastBarrierEnv(PlainSpec, gym.Env[Any, np.int64]):
     def render(self) -> Any:
         """Return a frame (`"rgb_array"`) or text (`"ansi"`), or show a frame (`"human"`)."""
         return None if self._begun is None else self._display.render(self._begun)
-
-    def blast_frames(self) -> Iterator[NDArray[np.uint8]]:
-        """Return the film of the blast that ended the episode, frames of uint8 (height, width, 3).
-
-        The frames have the size of those of `render`. Of several charges, it shows the worst one.
-
-        Raises:
-            gymnasium.error.ResetNeeded: If no episode has ended.
-        """
-        if not self._episode.ended:
-            raise gym.error.ResetNeeded("the charge has not gone off: finish the episode first")
-        return self._display.blast_frames(self._episode)
 
     def close(self) -> None:
         """Close the window, if there is one."""

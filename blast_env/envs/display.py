@@ -1,8 +1,8 @@
 """Display of an episode: as text, as a picture, in a window."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import ceil
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,7 @@ from blast_env.site.zone import distances_m
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:
-    from blast_env.evaluation.engines.gas import GasBlast
-    from blast_env.plots.placing import BlastScreening, PlacingPainter
-    from blast_env.plots.pressure_film import PressureScreening
+    from blast_env.plots.placing import PlacingPainter
     from blast_env.plots.window import Window
 
 _LEGEND: Final = {
@@ -97,7 +95,7 @@ _FRAMES_PER_PLACEMENT: Final = 5  # in the window: 0.2 s, so that a person can f
 
 
 class Display:
-    """Shows an episode of placing, and the blast at its end.
+    """Shows an episode of placing, and the end of the blast.
 
     Drawing objects are made on demand and not pickled.
 
@@ -112,14 +110,11 @@ class Display:
         self._episode: Episode | None = None
         self._painter: PlacingPainter | None = None
         self._last_frame: Frame | None = None
-        self._film: Iterator[Frame] | None = None
-        self._film_frame: Frame | None = None
         self._window: Window | None = None
 
     def show(self, episode: Episode) -> None:
         """Show the present state in the window, long enough for a person to follow."""
-        in_film = self._film_frame is not None
-        for _ in range(1 if in_film or episode.ended else _FRAMES_PER_PLACEMENT):
+        for _ in range(1 if episode.ended else _FRAMES_PER_PLACEMENT):
             self._show(self._frame(episode))
 
     def render(self, episode: Episode) -> Frame | str | None:
@@ -133,27 +128,6 @@ class Display:
             self._show(self._frame(episode))
         return None
 
-    def blast_frames(self, episode: Episode) -> Iterator[Frame]:
-        """Yield the frames of the film of the blast that ended the episode."""
-        painter = self._placing_painter(episode)
-        return _screening(episode, painter.size_px).frames(self._frames_per_s)
-
-    def begin_film(self, episode: Episode) -> None:
-        """Begin the film of the blast, whose frames are shown from now on."""
-        self._film = self.blast_frames(episode)
-        self.go_on_with_film()
-
-    def go_on_with_film(self) -> bool:
-        """Go on to the next frame of the film; return whether there was one."""
-        self._film_frame = None if self._film is None else next(self._film, None)
-        if self._film_frame is None:
-            self._film = None
-        return self._film_frame is not None
-
-    def stop_film(self) -> None:
-        """End the film, if there is one, for a new episode."""
-        self._film = self._film_frame = None
-
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._window is not None:
@@ -162,12 +136,10 @@ class Display:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without drawing objects, which do not pickle."""
-        return {**self.__dict__, "_painter": None, "_window": None, "_film": None}
+        return {**self.__dict__, "_painter": None, "_window": None}
 
     def _frame(self, episode: Episode) -> Frame:
         """Return the present frame."""
-        if self._film_frame is not None:
-            return self._film_frame
         return self._final_frame(episode) if episode.ended else self._placing_frame(episode)
 
     def _placing_frame(self, episode: Episode) -> Frame:
@@ -175,10 +147,10 @@ class Display:
 
     def _final_frame(self, episode: Episode) -> Frame:
         painter = self._placing_painter(episode)
-        if self._last_frame is None and episode.problem.evaluator.engine.medium:
-            self._last_frame = _screening(episode, painter.size_px).last_frame()
-        if self._last_frame is None:  # the engine gives no state of the blast to draw
+        if episode.problem.evaluator.engine.medium != "particles":  # no state that stays
             return painter.paint(episode.placement, [*_state_lines(episode)[:1], _outcome(episode)])
+        if self._last_frame is None:
+            self._last_frame = _last_frame(episode, painter.size_px)
         return self._last_frame
 
     def _placing_painter(self, episode: Episode) -> "PlacingPainter":
@@ -201,21 +173,18 @@ class Display:
         self._window.show(frame)
 
 
-def _screening(episode: Episode, size_px: tuple[int, int]) -> "BlastScreening | PressureScreening":
-    """Return the film of the blast by the worst threat."""
+def _last_frame(episode: Episode, size_px: tuple[int, int]) -> Frame:
+    """Return the end of the blast of the worst threat, which runs again for the picture."""
+    from blast_env.plots.placing import last_frame
+
     shown, evaluator = _shown_threat(episode), episode.problem.evaluator
     # Sorted as for the assessment: the order may change the last bits.
     layout = tuple(sorted(episode.placement.layout))
-    blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
     charges = len(episode.problem.case.charges)
     remark = f": the worst of {charges} charges" if charges > 1 else ""
-    if isinstance(blast, Blast):
-        from blast_env.plots.placing import BlastScreening
-
-        return BlastScreening(blast, _outcome(episode), remark, size_px)
-    from blast_env.plots.pressure_film import PressureScreening
-
-    return PressureScreening(cast("GasBlast", blast), _outcome(episode), remark, size_px)
+    blast = evaluator.engine.blast(evaluator.scenario, layout, shown.seed, shown.charge)
+    assert isinstance(blast, Blast)
+    return last_frame(blast, _outcome(episode), remark, size_px)
 
 
 def _shown_threat(episode: Episode) -> LoadCase:

@@ -1,17 +1,15 @@
 """Pictures of an episode of placing, and of the blast at its end."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import Blast, BlastResult
+from blast_env.evaluation.engines import Blast
 from blast_env.layout import LayoutState
 from blast_env.layout.build_scene import build_site
 from blast_env.plots.canvas import Frame, SiteSheet
-from blast_env.plots.film import paint_at, plan_film
 from blast_env.plots.frames import FramePainter
 from blast_env.plots.plan import (
     Feature,
@@ -133,54 +131,24 @@ def _fullest_blast(scenario: Scenario) -> Blast:
 _LEAST_FULL_IMPULSE: Final = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class BlastScreening:
-    """Shows one blast, with a text about its outcome.
+def last_frame(blast: Blast, outcome: str, remark: str, size_px: tuple[int, int]) -> Frame:
+    """Run a blast and return its end, uint8 (height, width, 3).
 
-    The blast is simulated again, since assessments of layouts keep only its loads.
-
-    Attributes:
+    Args:
         blast: The blast.
-        outcome: Its outcome in words, shown in every frame.
+        outcome: Its outcome in words.
         remark: Remark about the blast, after the scenario's name.
-        size_px: Width and least height of the frames, as for `FramePainter`.
+        size_px: Width and least height of the frame, as for `FramePainter`.
     """
-
-    blast: Blast
-    outcome: str
-    remark: str = ""
-    size_px: tuple[int, int] = (960, 0)
-
-    def last_frame(self) -> Frame:
-        """Return the state at the end, uint8 (height, width, 3)."""
-        result = self.blast.run()
-        painter = self._painter(result)
-        balls, obstacles = result.final_balls, result.obstacles
-        return painter.paint(balls, obstacles, result.time_s, self.outcome)
-
-    def frames(self, frames_per_s: float) -> Iterator[Frame]:
-        """Yield the frames of a film of 8 to 12 s, as `write_film` plans it.
-
-        Args:
-            frames_per_s: Frames per second of the film.
-        """
-        result = self.blast.run()
-        plan = plan_film(result, frames_per_s)
-        painter = self._painter(result)
-        note = f"{self.outcome}; {plan.real_time_factor}"
-        run = self.blast.start()
-        for frame in range(plan.frame_count):
-            time_s = plan.time_s(frame)
-            yield paint_at(run, painter, time_s, note)
-
-    def _painter(self, result: BlastResult) -> FramePainter:
-        loads = [part.impulse for each in result.obstacles if each.protected for part in each.parts]
-        return FramePainter(
-            self.blast,
-            title=f"{self.blast.scenario.name}{self.remark}",
-            subtitle=f"charge {charge_text(self.blast.scene.charge)}",
-            width_px=self.size_px[0],
-            height_px=self.size_px[1],
-            full_impulse=nice_ceiling(max(*loads, _LEAST_FULL_IMPULSE)),
-            remark="",
-        )
+    result = blast.run()
+    loads = [part.impulse for each in result.obstacles if each.protected for part in each.parts]
+    painter = FramePainter(
+        blast,
+        title=f"{blast.scenario.name}{remark}",
+        subtitle=f"charge {charge_text(blast.scene.charge)}",
+        width_px=size_px[0],
+        height_px=size_px[1],
+        full_impulse=nice_ceiling(max(*loads, _LEAST_FULL_IMPULSE)),
+        remark="",
+    )
+    return painter.paint(result.final_balls, result.obstacles, result.time_s, outcome)

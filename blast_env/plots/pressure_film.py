@@ -1,7 +1,6 @@
 """Films of overpressure in the air, alone and side by side."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import cbrt
 from pathlib import Path
 from typing import Final
@@ -22,7 +21,6 @@ from blast_env.plots.film import (
     FilmPlan,
     for_gif,
     known_suffix,
-    made_higher,
     plan_until,
     save_frames,
     with_progress,
@@ -111,41 +109,6 @@ def write_pressure_film(
         reported = with_progress(frames, plan, share_of(progress, 1, 2))
         save_frames(reported, temporary, suffix, plan, blast.scenario.name, _comment(shots, plan))
     return tuple(shot.result for shot in shots)
-
-
-@dataclass(frozen=True)
-class PressureScreening:
-    """Shows a blast as overpressure, in frames of a given size.
-
-    Attributes:
-        blast: The blast.
-        outcome: Its outcome in words, not shown: a film of overpressure has no room for it.
-        remark: Remark about the blast, not shown either.
-        size_px: Width and height of the frames, both even.
-    """
-
-    blast: GasBlast
-    outcome: str = ""
-    remark: str = ""
-    size_px: tuple[int, int] = (960, 720)
-
-    def last_frame(self) -> Frame | None:
-        """Return None: at the end of a blast, the overpressure is gone."""
-        return None
-
-    def frames(self, frames_per_s: float) -> Iterator[Frame]:
-        """Yield the frames of a film of 8 to 12 s, uint8 (height, width, 3).
-
-        Args:
-            frames_per_s: Frames per second of the film.
-        """
-        shot = record_planes(self.blast, PLAN_HEIGHT_M, default_section(self.blast.site))
-        plan = plan_until(shot.result.time_s, frames_per_s)
-        width_px, height_px = self.size_px
-        painter = PressurePainter([shot], scale_end_kpa([shot.result]), width_px, height_px)
-        for number in range(plan.frame_count):
-            frame = painter.paint(plan.time_s(number), plan.real_time_factor)
-            yield made_higher(frame, height_px)
 
 
 class PressureNow:

@@ -6,7 +6,6 @@ They begin at the detonation, with the spherical stage of the blast before the g
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
@@ -258,7 +257,6 @@ class PressurePainter:
         shots: The blasts, from left to right.
         full_kpa: Overpressure at the end of the scale.
         width_px: Width of the frames, even.
-        most_high_px: Largest height of the frames, to which panels shrink if need be.
 
     Attributes:
         sheet: The page; its moving parts show the last moment painted.
@@ -270,7 +268,6 @@ class PressurePainter:
         shots: Sequence[PressureShot],
         full_kpa: float,
         width_px: int,
-        most_high_px: float = inf,
     ) -> None:
         self.shots = tuple(shots)
         self.scale = AsinhNorm(_LINEAR_SHARE * full_kpa, -full_kpa, full_kpa)
@@ -283,7 +280,7 @@ class PressurePainter:
         self._section_m = Rectangle(low, 0.0, high, site.air_height_m)
         self._images: list[_Picture] = []
         handles = self._handles()
-        self.sheet, self._axes, bar_px = self._arrange(width_px, most_high_px, len(handles))
+        self.sheet, self._axes, bar_px = self._arrange(width_px, len(handles))
         for number in range(len(shots)):
             self._draw_plan(number)
             self._draw_section(number)
@@ -325,9 +322,7 @@ class PressurePainter:
         index = np.clip((share + 0.5) * (last + 1), 0.0, last).astype(np.intp)
         return self._colours[index]
 
-    def _arrange(
-        self, width_px: int, most_high_px: float, legend_entries: int
-    ) -> tuple[Sheet, list[list[Axes]], float]:
+    def _arrange(self, width_px: int, legend_entries: int) -> tuple[Sheet, list[list[Axes]], float]:
         """Return the page, a plan and a section per blast, and the bottom of the colour bar, px."""
         count = len(self.shots)
         plan, section = self._site_m, self._section_m
@@ -338,11 +333,7 @@ class PressurePainter:
         first_px = _HEADER_PX + (_TITLES_PX if count > 1 else _TITLE_PX)
         around_px = first_px + 2 * _AXIS_PX + _BETWEEN_PX + below_px
         heights_m = [each.top - each.bottom for each in (plan, section)]
-        per_m = min(
-            panel_px / widest_m,
-            _MOST_HIGH * width_px / heights_m[0],
-            (most_high_px - 2.0 - around_px) / sum(heights_m),
-        )
+        per_m = min(panel_px / widest_m, _MOST_HIGH * width_px / heights_m[0])
         heights_px = [per_m * height_m for height_m in heights_m]
         height_px = round(around_px + sum(heights_px))
         sheet = Sheet(width_px, height_px + height_px % 2)
