@@ -1,6 +1,7 @@
 """`blast-env assess`: the damage of buildings by charges; stand-offs, and largest charges."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -40,7 +41,7 @@ from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.answers import charge_text, counted
 from blast_env.evaluation.assessment import Assessed
 from blast_env.evaluation.assessment import assess as assessed_by
-from blast_env.evaluation.capacity import MOST_BLASTS
+from blast_env.evaluation.capacity import MOST_BLASTS, Capacity
 from blast_env.evaluation.capacity import capacity as capacity_of
 from blast_env.evaluation.consequences import (
     BAY_CASE_COLUMNS,
@@ -69,7 +70,7 @@ from blast_env.layout import load_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.requirements import Requirement
-from blast_env.site import Scenario, load_scenario
+from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.presets import (
     CHARGE_PRESETS,
     EQUIVALENTS_SOURCE,
@@ -89,7 +90,7 @@ _MASS_HELP: Final = (
 )
 _OF_SCREENING: Final = ("mass", "gas")
 _OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg", "cache")
-_OF_ASSESSMENT: Final = ("without_fallen", "view", "diagram", "table")
+_OF_ASSESSMENT: Final = ("without_fallen", "diagram", "table")
 
 
 def assess(
@@ -177,25 +178,13 @@ def assess(
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
         refuse_given(context, (*_OF_ASSESSMENT, "require"), "does not apply to --capacity")
-    print_line(engine.describe([site]))
-    if capacity:
-        print_cost([(engine, site, each) for each in drawn for _ in layouts] * MOST_BLASTS)
         evaluator = BlastEvaluator(site, engine, cache=cache)
-        label = f"{site.name}: masses and stand-offs"
         with resumable(resume_words(cache)):
-            with progress_bar(label) as progress:
-                found = capacity_of(evaluator, layouts, drawn, progress)
-            print_answer(found.answer())
-
-        def curves() -> "Figure":
-            from blast_env.plots.capacity import capacity_figure
-
-            least, shown = found.curves(level, Uncertainty(mass=mass_error))
-            title = f"{site.name}: charge at ({least.place}) m"
-            return capacity_figure(shown, level.label, least.charge.tnt_kg, title)
-
-        print_written(save_figures((picture, curves)))
+            found = _capacity(evaluator, layouts, drawn)
+        figure = partial(_curves, found, site, level, mass_error)
+        print_written(save_figures((picture, figure)))
         return
+    print_line(engine.describe([site]))
     asked = [(engine, each) for each in drawn] + [(engine.coarser, drawn[0])]
     print_cost((each, site, charge) for each, charge in asked for _ in layouts)
     with resumable(resume_words(cache)):
@@ -213,6 +202,30 @@ def assess(
     if table is not None:
         _write_table(assessed, table, engine)
     _draw(assessed, picture, diagram)
+
+
+def _capacity(
+    evaluator: BlastEvaluator, layouts: Mapping[str, Layout], charges: Sequence[AnyCharge]
+) -> Capacity:
+    """Print the largest charges and the least stand-offs that keep each level."""
+    site, engine = evaluator.scenario, evaluator.engine
+    print_line(engine.describe([site]))
+    print_cost([(engine, site, each) for each in charges for _ in layouts] * MOST_BLASTS)
+    with progress_bar(f"{site.name}: masses and stand-offs") as progress:
+        found = capacity_of(evaluator, layouts, charges, progress)
+    print_answer(found.answer())
+    return found
+
+
+def _curves(
+    found: Capacity, site: Scenario, level: LevelOfProtection, mass_error: float
+) -> "Figure":
+    """Draw the probability of the level over the mass, at the least favourable place."""
+    from blast_env.plots.capacity import capacity_figure
+
+    least, shown = found.curves(level, Uncertainty(mass=mass_error))
+    title = f"{site.name}: charge at ({least.place}) m"
+    return capacity_figure(shown, level.label, least.charge.tnt_kg, title)
 
 
 def _write_table(assessed: Assessed, path: Path, engine: Engine) -> None:
