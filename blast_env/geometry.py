@@ -142,23 +142,11 @@ class Rectangle(NamedTuple):
 Place = tuple[float, float]
 """x and y."""
 
-Side = tuple[Place, Place]
-"""Start and end of a part of an outline."""
-
 _DIGITS = 9  # of a coordinate; further digits are rounding errors
 
 
-def open_sides(rectangles: Sequence[Rectangle]) -> list[list[Side]]:
-    """Return the parts of each rectangle's sides that no other one touches, counterclockwise.
-
-    Args:
-        rectangles: Rectangles that do not overlap.
-    """
-    exact = [Rectangle(*(round(value, _DIGITS) for value in each)) for each in rectangles]
-    return [list(_open_sides(each, exact)) for each in exact]
-
-
-def _open_sides(own: Rectangle, all_of_them: Sequence[Rectangle]) -> Iterator[Side]:
+def _open_sides(own: Rectangle, all_of_them: Sequence[Rectangle]) -> Iterator[tuple[Place, Place]]:
+    """Yield the parts of a rectangle's sides that no other one touches, counterclockwise."""
     left, bottom, right, top = own
     along_x = [(each.left, each.right, each) for each in all_of_them]
     along_y = [(each.bottom, each.top, each) for each in all_of_them]
@@ -192,8 +180,9 @@ def outlines(rectangles: Sequence[Rectangle]) -> list[tuple[Place, ...]]:
         rectangles: Rectangles that do not overlap.
     """
     ends: dict[Place, list[Place]] = defaultdict(list)
-    for sides in open_sides(rectangles):
-        for start, end in sides:
+    exact = [Rectangle(*(round(value, _DIGITS) for value in each)) for each in rectangles]
+    for own in exact:
+        for start, end in _open_sides(own, exact):
             ends[start].append(end)
     found = []
     while ends:
