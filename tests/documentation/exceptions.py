@@ -228,6 +228,7 @@ NOT_RUN: Final[dict[str, str]] = {
     " -conf agents/blast_agents/hyperparameters/ppo.yml --vec-env subproc"
     """ --env-kwargs 'engine:'"'"'event'"'"'' 'reward:'"'"'relative'"'"'' realisations:1"""
     """ 'observation:'"'"'grid'"'"''""": "needs RL Zoo",
+    "python ppo.py --env-id blast_env:BlastBarrier-v0 --total-timesteps 4096": "needs CleanRL",
     "python -m tests.libraries.run_rllib": "needs Ray, in an environment of its own",
 }
 """Commands that are parsed only, and why."""
@@ -245,3 +246,9 @@ CODE_SHORTENED: Final = {
     ("docs/researchers/sites.md", 1): ("held_out(100)", "held_out(5)"),
 }
 """Parts of blocks of Python that are replaced to take less time, by page and number."""
+
+CODE_NOT_RUN: Final = {
+    ("docs/researchers/libraries.md", 4): "needs SBX, and so JAX",
+    ("docs/researchers/libraries.md", 5): "needs PufferLib, which pip cannot build everywhere",
+}
+"""Blocks of Python, by their number on the page, that are compiled only, and why."""

@@ -25,6 +25,7 @@ import typer
 
 from tests.documentation.exceptions import (
     BACKGROUND,
+    CODE_NOT_RUN,
     GIVEN,
     NOT_RUN,
     SERVERS,
@@ -162,6 +163,8 @@ def run_step(step: Step, page: Page, tally: Tally) -> str:
     if isinstance(step, Cell):
         run(("bash", "-e", "-o", "pipefail"), page.folder, step.source)
         return "ran"
+    if (step.page, step.number) in CODE_NOT_RUN:
+        return f"not run: {CODE_NOT_RUN[step.page, step.number]}"
     page.source += step.source
     run((sys.executable, "-"), page.folder, page.source)
     return "ran"
