@@ -93,7 +93,7 @@ def _subtitle(scenario: Scenario, placement: LayoutState) -> str:
     if zone is not None:
         parts.append(layout_words(placement.layout) if placement.layout else "no barrier")
         if zone.budget is not None:
-            parts.append(f"cost {placement.cost:.4g} of {zone.budget:g}")
+            parts.append(f"cost {placement.cost:,.10g} of {zone.priced(zone.budget)}")
     parts.append(stand_off_text(scenario, placement.layout))
     return ", ".join(filter(None, parts))
 
