@@ -33,6 +33,7 @@ with render_extra():
 
 _PANEL_IN: Final = 5.4
 _WIDTHS_IN: Final = (4.6, 8.8)
+_AXIS_IN: Final = 0.6
 _HEADING_IN: Final = 0.9
 _LEGEND_ROW_IN: Final = 0.24
 _ARROW_PT: Final = 32.0
@@ -56,8 +57,9 @@ def site_picture(scenario: AnyScenario, layout: Sequence[Element] = ()) -> Figur
     layout = placement.layout
     features = (*site_features(found, layout), *vehicle_features(found, layout))
     handles = [*legend_of(features), *_items_left(found.build_zone, placement)]
-    height_in = _PANEL_IN + _HEADING_IN
-    figure = Figure(figsize=(_width_in(found), height_in), layout="constrained")
+    width_in, height_in = _panel_in(found)
+    height_in += _HEADING_IN
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
     figure.set_figheight(height_in + write_legend(figure, handles) * _LEGEND_ROW_IN)
     axes = figure.subplots()
     draw_plan(axes, features)
@@ -80,10 +82,12 @@ def _items_left(zone: BuildZone | None, placement: LayoutState) -> list[Artist]:
     ]
 
 
-def _width_in(scenario: Scenario) -> float:
-    """Return the width of a picture that the plan fills at its height, inches."""
+def _panel_in(scenario: Scenario) -> tuple[float, float]:
+    """Return the width and height of the plan with its axes, inches."""
+    ratio = scenario.site.width_m / scenario.site.height_m
     least_in, most_in = _WIDTHS_IN
-    return min(max(_PANEL_IN * scenario.site.width_m / scenario.site.height_m, least_in), most_in)
+    width_in = min(max(_PANEL_IN * ratio, least_in), most_in)
+    return width_in, min(width_in / ratio + _AXIS_IN, _PANEL_IN)
 
 
 def _subtitle(scenario: Scenario, placement: LayoutState) -> str:
