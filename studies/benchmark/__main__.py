@@ -156,7 +156,7 @@ def picture(
             axes.step(blasts, curves[name], where="post", label=name)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize="small")
+        axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
         save_figure(figure, out)
 
 
