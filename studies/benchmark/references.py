@@ -39,7 +39,7 @@ _CLOSE = 0.03
 
 def named_definition(name: str) -> Definition:
     """Return the definition of a name without its version, such as `control_room-known_2`."""
-    site, _, family = name.removesuffix("-v2").rpartition("-")
+    site, _, family = name.removesuffix(f"-v{Definition.version}").rpartition("-")
     family, _, place = family.partition("_")
     if family not in get_args(Family):
         raise UnknownNameError("family", family, get_args(Family))

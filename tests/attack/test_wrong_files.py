@@ -2,7 +2,6 @@
 
 import re
 from contextlib import suppress
-from time import process_time
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -46,16 +45,14 @@ def form(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return FORMATS[request.param](tmp_path_factory.mktemp("format"))
 
 
-@settings(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_a_damaged_file_is_refused_or_read(form: Format, data: st.DataObject) -> None:
     content = data.draw(damaged(form.samples))
-    began_s = process_time()
     with suppress(BlastEnvError):
         found = form.read(content)
         if form.has_checksum and found is not None:
             assert found in [form.read(each) for each in form.samples]
-    assert process_time() - began_s < 3.0
 
 
 def test_a_sound_file_is_read(form: Format) -> None:
