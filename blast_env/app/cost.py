@@ -33,7 +33,7 @@ class ReportCost:
         """Return the estimated cost of a report; nothing is run for it.
 
         Raises:
-            BlastEnvError: If there are too many threats, or a front cannot be read.
+            BlastEnvError: If there are too many threats.
         """
         # Imported here, because reports need an extra.
         from blast_env.report.study import blasts_of, threats_of

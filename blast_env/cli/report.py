@@ -64,16 +64,12 @@ def report(
     limits: list[str] = typer.Option(
         [],
         "--limit",
-        help="Largest permissible load of a building, in the units of the report; one may be left "
-        "out.",
+        help="Largest permissible load of a building, in Pa s and kPa; one may be left out.",
         metavar="NAME=IMPULSE,PEAK",
     ),
     target: TargetOption = None,
-    units: str = typer.Option("si", help="si (Pa s, kPa) or psi (psi ms, psi)."),
-    front: Path | None = typer.Option(None, help="front.csv of `blast-env search --method nsga2`."),
     places: int = typer.Option(5, help="Other places of each charge source."),
     items: bool = typer.Option(True, help="Rank the contribution of each module or piece."),
-    stills: int = typer.Option(4, help="Moments of the film, 0 to 12."),
     mass_error: MassErrorOption = 0.1,
     details: Path | None = typer.Option(
         None, help="TOML file with project, client, author, checker, revision and marking."
@@ -90,9 +86,9 @@ def report(
     """Report on a layout by gas dynamics, as one self-contained HTML page and as PDF.
 
     The verdict comes first, then the assumptions: site and threats, bill of quantities, loads with
-    two sizes of cells, damage, film stills, the worth of each item, other masses and places, the
-    source of every number, and everything to repeat it. If it is stopped (Ctrl-C) after the loads
-    with the coarser cells, the command writes the parts finished so far.
+    two sizes of cells, damage, the worth of each item, other places, checks by hand, and everything
+    to repeat it. If it is stopped (Ctrl-C) after the loads with the coarser cells, the command
+    writes the parts finished so far.
     """
     site = load_scenario(scenario)
     elements = load_layout(layout, site)
@@ -126,16 +122,14 @@ def report(
 
 def _study_options(scenario: Scenario, values: Mapping[str, Any]) -> "StudyOptions":
     """Return the options of the study from the values of the command line, by their names."""
-    from blast_env.report import Limit, StudyOptions, UnitSystem, final_cells
+    from blast_env.report import Limit, StudyOptions, final_cells
     from blast_env.report.details import DETAILS, read_details
 
-    units = UnitSystem.named(values["units"])
     given = {each.name: values[each.name] for each in fields(StudyOptions)}
     given |= {
         "details": read_details(values["details"], {name: values[name] for name in DETAILS}),
         "charges": tuple(_charge(each, scenario) for each in values["charges"]),
-        "limits": tuple(Limit.parsed(text, units) for text in values["limits"]),
-        "units": units,
+        "limits": tuple(Limit.parsed(text) for text in values["limits"]),
         "cells": final_cells(scenario),
     }
     if values["cells"]:

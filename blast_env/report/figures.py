@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from io import BytesIO
 from typing import Final
 
 import numpy as np
 
-from blast_env.evaluation import LoadCase, ThreatOutcome
+from blast_env.evaluation import LoadCase
 from blast_env.evaluation.consequences import Consequences
 from blast_env.geometry import Layout
 from blast_env.plots.facade import facade_picture
 from blast_env.plots.figures import png_of
-from blast_env.plots.gas import KINDS, Kind, facades
+from blast_env.plots.gas import KINDS, facades
 from blast_env.plots.ground_map import threshold_map
 from blast_env.plots.plan import (
     INK,
@@ -24,8 +23,6 @@ from blast_env.plots.plan import (
     vehicle_features,
     without,
 )
-from blast_env.plots.pressure_film import scale_end_kpa
-from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.pressure_impulse import pressure_impulse_diagram
 from blast_env.plots.site_picture import draw_north, draw_scale
 from blast_env.plots.site_plan import (
@@ -35,13 +32,12 @@ from blast_env.plots.site_plan import (
     write_legend,
     write_names,
 )
-from blast_env.plots.style import count_of, render_extra, unit_interval
-from blast_env.report.loads import MeasuredBlast, ReportedBuilding, UnitSystem
-from blast_env.report.outcomes import FrontPoint, ItemWorth
+from blast_env.plots.style import render_extra, unit_interval
+from blast_env.report.loads import MeasuredBlast, ReportedBuilding
+from blast_env.report.outcomes import ItemWorth
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
 from blast_env.site.worst_places import nearest_point_m
-from blast_env.units import MODULE_SIDE_M, MS_PER_S
+from blast_env.units import MODULE_SIDE_M, MS_PER_S, PA_PER_KPA
 
 with render_extra():
     from matplotlib.axes import Axes
@@ -49,15 +45,11 @@ with render_extra():
     from matplotlib.collections import PatchCollection
     from matplotlib.colors import TwoSlopeNorm
     from matplotlib.figure import Figure
-    from matplotlib.ticker import PercentFormatter
-    from PIL import Image
 
 _DOTS_PER_IN: Final = 150
 _WIDTH_IN: Final = 6.5  # letters of 10 points stay legible where A4 leaves a figure its height
 _HEIGHTS_IN: Final = (2.8, 6.2)
-_STILL_PX: Final = 760
 _BARE, _WALLED = "#D55E00", "#0072B2"  # Okabe and Ito's
-_ZONE: Final = (Kinds.BUILD_ZONE, Kinds.KEEP_OUT, Kinds.COST_AREA, Kinds.GATE, Kinds.ACCESS_WAY)
 
 Picture = tuple[str, bytes]
 """A caption, and a PNG."""
@@ -133,28 +125,14 @@ def _height_in(scenario: Scenario) -> float:
 # A threat.
 
 
-def kinds(units: UnitSystem) -> dict[str, Kind]:
-    """Return the kinds of loads for drawing, impulse and peak, in the given units."""
-    factors = {
-        "impulse": (units.impulse, 1.0 / units.pa_s_per_impulse),
-        "peak": (units.pressure, 1.0 / units.pa_per_pressure),
-    }
-    return {
-        name: replace(KINDS[name], unit=unit, factor=factor)
-        for name, (unit, factor) in factors.items()
-    }
-
-
-def blast_pictures(
-    unprotected: MeasuredBlast, protected: MeasuredBlast, units: UnitSystem
-) -> tuple[Picture, ...]:
+def blast_pictures(unprotected: MeasuredBlast, protected: MeasuredBlast) -> tuple[Picture, ...]:
     """Return the unfolded facades of the protected buildings, and the histories on them."""
     pictures: list[Picture] = []
     for target in protected.targets:
         if not target.protected or target.name not in protected.loads:
             continue
-        pictures.append(_history(unprotected, protected, target, units))
-        for kind in kinds(units).values():
+        pictures.append(_history(unprotected, protected, target))
+        for kind in KINDS.values():
             figure = facades(protected.result, target.name, kind, unprotected.result)
             pictures.append((f"{target.name}: {kind.name}, walls unfolded", png(figure)))
     return tuple(pictures)
@@ -164,7 +142,6 @@ def _history(
     unprotected: MeasuredBlast,
     protected: MeasuredBlast,
     target: ReportedBuilding,
-    units: UnitSystem,
 ) -> Picture:
     """Return the mean overpressure on the most loaded wall over time, without and with."""
     wall = unprotected.loads[target.name].wall
@@ -177,16 +154,14 @@ def _history(
         if pressure is not None:
             axes.plot(
                 MS_PER_S * measured.histories.time_s,
-                pressure / units.pa_per_pressure,
+                pressure / PA_PER_KPA,
                 color=colour,
                 linestyle="-" if measured is protected else "--",
                 linewidth=1.8,
                 label=words,
             )
     axes.axhline(0.0, color=unit_interval(QUIET_INK), linewidth=0.8)
-    axes.set(
-        xlabel="time since the detonation (ms)", ylabel=f"mean overpressure ({units.pressure})"
-    )
+    axes.set(xlabel="time since the detonation (ms)", ylabel="mean overpressure (kPa)")
     axes.set_xlim(left=0.0)
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
@@ -221,17 +196,6 @@ def risk_picture(unprotected: MeasuredBlast, protected: MeasuredBlast) -> Pictur
     return "risk to windows and eardrums, for the choice of assembly points", png(figure)
 
 
-def film_stills(shots: Sequence[PressureShot], moments_s: Sequence[float]) -> tuple[Picture, ...]:
-    """Return stills of two blasts side by side, in plan and in a section."""
-    painter = PressurePainter(shots, scale_end_kpa([each.result for each in shots]), _STILL_PX)
-    pictures = []
-    for moment_s in moments_s:
-        buffer = BytesIO()
-        Image.fromarray(painter.paint(moment_s)).save(buffer, "PNG", optimize=True)
-        pictures.append((f"{MS_PER_S * moment_s:.1f} ms after the detonation", buffer.getvalue()))
-    return tuple(pictures)
-
-
 # The worth of items.
 
 
@@ -257,76 +221,4 @@ def worth_map(scenario: Scenario, items: Sequence[ItemWorth]) -> bytes:
     bar = figure.colorbar(ScalarMappable(scale, modules.get_cmap()), ax=axes, shrink=0.8)
     bar.set_label("contribution: percentage points of reduction lost without the item")
     write_names(axes, features)
-    return png(figure)
-
-
-def mass_figure(masses: dict[str, tuple[ThreatOutcome, ...]], units: UnitSystem) -> bytes:
-    """Return impulses without and with the layout for other masses, one panel per threat."""
-    figure = Figure(figsize=(_WIDTH_IN, 2.6), layout="constrained")
-    panels = figure.subplots(1, len(masses), squeeze=False, sharey=True)[0]
-    for axes, (name, outcomes) in zip(panels, masses.items(), strict=True):
-        _bars(axes, outcomes, units)
-        axes.set_title(name, fontsize=10)
-    panels[0].set_ylabel(f"impulse, by weight ({units.impulse})")
-    panels[-1].legend(fontsize=9, frameon=False)
-    return png(figure)
-
-
-def _bars(axes: Axes, outcomes: Sequence[ThreatOutcome], units: UnitSystem) -> None:
-    place = np.arange(len(outcomes))
-    for shift, colour, label, values in (
-        (-0.2, _BARE, "no barrier", [each.unprotected_load for each in outcomes]),
-        (0.2, _WALLED, "layout", [each.load for each in outcomes]),
-    ):
-        heights = np.array(values) / units.pa_s_per_impulse
-        axes.bar(place + shift, heights, 0.38, color=colour, label=label)
-    axes.set_xticks(place, [each.threat.name for each in outcomes], fontsize=8)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(axis="y", alpha=0.25)
-
-
-def place_figure(
-    scenario: Scenario, charges: Sequence[Charge], outcomes: Sequence[ThreatOutcome]
-) -> bytes:
-    """Return the plan with the reduction for charges at other places, with the layout."""
-    figure, axes = _page(_height_in(scenario) + 0.3)
-    features = without(_unlabelled(site_features(scenario)), *_ZONE)
-    draw_plan(axes, features)
-    places = np.array([each.position_m for each in charges])
-    shares = 100.0 * np.array([each.reduction for each in outcomes])
-    reach = max(float(np.nanmax(np.abs(shares))), 1e-6)
-    x_m, y_m = places.T
-    dots = axes.scatter(
-        x_m,
-        y_m,
-        c=shares,
-        s=70,
-        cmap="PuOr",
-        norm=TwoSlopeNorm(0.0, -reach, reach),
-        edgecolor=unit_interval(INK),
-        zorder=6,
-    )
-    figure.colorbar(dots, ax=axes, shrink=0.8).set_label("reduction (%)")
-    write_names(axes, [*features, *(charge_feature(each, "charge") for each in charges)])
-    return png(figure)
-
-
-def front_figure(
-    points: Sequence[FrontPoint], own: tuple[float, float], threat_count: int
-) -> bytes:
-    """Return the diagram of reduction against cost, with the layout of the report."""
-    figure, axes = _page(2.8)
-    axes.plot(
-        [each.cost for each in points],
-        [each.reduction for each in points],
-        "o-",
-        color=_WALLED,
-        label="layouts of the search",
-    )
-    axes.plot(*own, "*", markersize=15, color=_BARE, label="the layout of this report")
-    axes.set(xlabel="cost", ylabel=f"reduction, mean of {count_of('threat', threat_count)}")
-    axes.yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
-    axes.grid(alpha=0.25)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=9, frameon=False)
     return png(figure)

@@ -1,9 +1,8 @@
-"""Loads by building and wall, with their durations, and the units of a report."""
+"""Loads by building and wall, with their durations."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,7 +10,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasResult
 from blast_env.evaluation.standing import Stood
 from blast_env.gas.grid import GasGrid
@@ -19,60 +17,11 @@ from blast_env.gas.probes import ARRIVAL_PA
 from blast_env.gas.solver import Gas, Recorder
 from blast_env.gas.tables import means_by_wall
 from blast_env.geometry import Rectangle
-from blast_env.plots.pressure_film import record_planes
-from blast_env.plots.pressure_frames import PressureShot, VerticalSection
 from blast_env.report.peaks import CountedPeak, counted_peak
 from blast_env.site import AnyStructure, Scenario
 from blast_env.site.scene import WALLS, BlastSite, WallName
 from blast_env.site.sections import buildings_of
 from blast_env.statistics import counted_parts
-from blast_env.units import MS_PER_S, PA_PER_KPA, PA_PER_PSI
-
-
-@dataclass(frozen=True)
-class UnitSystem:
-    """Units of loads; lengths are metres and masses kilograms in both.
-
-    Attributes:
-        name: Its name on the command line.
-        impulse: Unit of impulses.
-        pressure: Unit of overpressures.
-        pa_s_per_impulse: Pascal seconds in a unit of impulse.
-        pa_per_pressure: Pascals in a unit of pressure.
-    """
-
-    name: str
-    impulse: str
-    pressure: str
-    pa_s_per_impulse: float
-    pa_per_pressure: float
-
-    def impulse_of(self, pa_s: float) -> float:
-        """Return an impulse in Pa s in this unit."""
-        return pa_s / self.pa_s_per_impulse
-
-    def pressure_of(self, pa: float) -> float:
-        """Return a pressure in Pa in this unit."""
-        return pa / self.pa_per_pressure
-
-    @classmethod
-    def named(cls, name: str) -> "UnitSystem":
-        """Return the units of a name."""
-        if name not in UNITS:
-            raise UnknownNameError("units", name, UNITS)
-        return UNITS[name]
-
-
-UNITS: Final[Mapping[str, UnitSystem]] = MappingProxyType(
-    {
-        each.name: each
-        for each in (
-            UnitSystem("si", "Pa·s", "kPa", 1.0, PA_PER_KPA),
-            UnitSystem("psi", "psi·ms", "psi", PA_PER_PSI / MS_PER_S, PA_PER_PSI),
-        )
-    }
-)
-"""The units by their names."""
 
 
 @dataclass(frozen=True)
@@ -222,13 +171,11 @@ class MeasuredBlast:
         result: The blast.
         histories: Mean overpressures on walls.
         targets: The buildings.
-        shot: Its film, if it was recorded.
     """
 
     result: GasResult
     histories: WallHistories
     targets: tuple[ReportedBuilding, ...]
-    shot: PressureShot | None = None
 
     @cached_property
     def loads(self) -> dict[str, TargetLoad]:
@@ -296,7 +243,6 @@ class MeasuredBlast:
         return first_phase_s(self.histories.time_s, pressure)
 
 
-_STILL_HEIGHT_M: Final = 1.5
 _NO_PHASE: Final = float("nan")
 
 
@@ -328,20 +274,12 @@ def measure(
     blast: GasBlast,
     targets: Sequence[ReportedBuilding],
     progress: Callable[[float], None] | None = None,
-    section: VerticalSection | None = None,
 ) -> MeasuredBlast:
-    """Run a blast and return the loads on buildings.
-
-    A film in plan and section is recorded if a section is given.
-    """
+    """Run a blast and return the loads on buildings."""
     histories = WallHistories(targets, blast.site)
     from blast_env.gas.probes import GroundMap  # Numba takes half a second to import
 
     def recorders(grid: GasGrid) -> tuple[Recorder, ...]:
         return (histories, GroundMap(grid))
 
-    if section is None:
-        return MeasuredBlast(blast.run(progress, recorders), histories, tuple(targets))
-    height_m = min(_STILL_HEIGHT_M, 0.5 * blast.site.air_height_m)
-    shot = record_planes(blast, height_m, section, progress or (lambda _: None), recorders)
-    return MeasuredBlast(shot.result, histories, tuple(targets), shot)
+    return MeasuredBlast(blast.run(progress, recorders), histories, tuple(targets))

@@ -11,9 +11,10 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.grid_error import convergence_index
 from blast_env.gas.settings import Cells
-from blast_env.geometry import Layout, Rectangle
-from blast_env.report.loads import ReportedBuilding, TargetLoad, UnitSystem
+from blast_env.geometry import Rectangle
+from blast_env.report.loads import ReportedBuilding, TargetLoad
 from blast_env.statistics import reductions
+from blast_env.units import PA_PER_KPA
 from blast_env.values import plain_number
 
 
@@ -32,8 +33,8 @@ class Limit:
     peak_pa: float = inf
 
     @classmethod
-    def parsed(cls, text: str, units: UnitSystem) -> "Limit":
-        """Return the limit of a text such as `school=200,40`: NAME=IMPULSE,PEAK in some units.
+    def parsed(cls, text: str) -> "Limit":
+        """Return the limit of a text such as `school=200,40`: NAME=IMPULSE,PEAK in Pa s and kPa.
 
         One of the two may be left out. Other texts, and values not above 0, are refused.
         """
@@ -48,12 +49,12 @@ class Limit:
             impulse = peak = -1.0
         if not (name and sign) or len(parts) > 2 or not (impulse > 0.0 and peak > 0.0):
             raise BlastEnvError(
-                f"--limit is {text!r}, must be NAME=IMPULSE,PEAK with values above 0 in "
-                f"{units.impulse} and {units.pressure}; one of them may be left out"
+                f"--limit is {text!r}, must be NAME=IMPULSE,PEAK with values above 0 in Pa s "
+                "and kPa; one of them may be left out"
             )
         if not (isfinite(impulse) or isfinite(peak)):
             raise BlastEnvError(f"--limit is {text!r}, without any limit")
-        return cls(name, impulse * units.pa_s_per_impulse, peak * units.pa_per_pressure)
+        return cls(name, impulse, peak * PA_PER_KPA)
 
     def is_kept(self, load: TargetLoad) -> bool:
         """Return whether a load is within the limit."""
@@ -132,18 +133,3 @@ class ItemWorth:
     name: str
     rectangle_m: Rectangle
     worth: float
-
-
-@dataclass(frozen=True)
-class FrontPoint:
-    """A layout of a front.
-
-    Attributes:
-        layout: Its modules or pieces.
-        cost: Its cost.
-        reduction: Reduction of the impulse, as a share, mean over the threats.
-    """
-
-    layout: Layout
-    cost: float
-    reduction: float

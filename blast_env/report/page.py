@@ -1,7 +1,7 @@
 """The report as self-contained HTML, and as PDF."""
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -23,25 +23,18 @@ from blast_env.evaluation.grid_error import FACTOR, ORDER, worse
 from blast_env.evaluation.probability import level_probability, probability_text
 from blast_env.files import scratch_folder, write_atomically, write_text
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
-from blast_env.geometry import layout_counts, layout_text
+from blast_env.geometry import layout_counts
 from blast_env.layout import write_layout
 from blast_env.plots.plan import stand_off_text
 from blast_env.provenance import code_version, command, versions
 from blast_env.report.checks import checks_of
-from blast_env.report.figures import (
-    front_figure,
-    mass_figure,
-    place_figure,
-    site_plan,
-    worth_map,
-)
-from blast_env.report.loads import TargetLoad, UnitSystem
+from blast_env.report.figures import site_plan, worth_map
+from blast_env.report.loads import TargetLoad
 from blast_env.report.outcomes import LoadPair
 from blast_env.report.peaks import PeakSource
 from blast_env.report.study import Study
-from blast_env.report.threats import other_places, place_text
+from blast_env.report.threats import place_text
 from blast_env.report.verdict import StudyVerdict, counted
-from blast_env.response.buildings import BuildingDamage
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
@@ -117,19 +110,18 @@ def report_html(study: Study, commands: list[str]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    units = study.options.units
     environment.filters |= {
-        "impulse": lambda pa_s: _number(units.impulse_of(pa_s)),
-        "pressure": lambda pa: _number(units.pressure_of(pa)),
+        "impulse": _number,
+        "pressure": lambda pa: _number(pa / PA_PER_KPA),
         "titled": study.scenario.title_of,
-        "counted": lambda load: _counted(load, units),
+        "counted": _counted,
         "word": lambda passes, flagged: Verdict.of(passes).word(flagged).lower(),
         "percent": _percent,
         "gone": _gone,
         "span": _span,
         "noun_of": counted,
         "css": _css,
-        "impulse_error": lambda pa_s: _error(units.impulse_of(pa_s)),
+        "impulse_error": _error,
         "share_error": lambda share: _error(100.0 * share, 1),
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),
@@ -171,16 +163,11 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
     coarse, fine = options.cells
     protected = [each for each in study.targets if each.protected]
     layout_json = _layout_file(study)
-    places = [
-        each.charge_against(scenario, study.layout)
-        for each in other_places(scenario, options.places)
-    ]
-    verdict, summary = StudyVerdict(study), _summary(study)
+    verdict = StudyVerdict(study)
     standing = "" if verdict.barrier is None else outcome_words(verdict.barrier.pieces)
     return {
         "study": study,
         "scenario": scenario,
-        "units": options.units,
         "fine": fine,
         "coarse_words": options.words[0],
         "fine_words": options.words[1],
@@ -191,9 +178,8 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
             each.name: place_text(each, scenario, study.layout) for each in study.threats
         },
         "stand_off": stand_off_text(scenario, study.layout),
-        "summary": summary,
+        "summary": _summary(study),
         "verdict": verdict,
-        "sources": _sources(study, verdict, standing, summary),
         "standing": standing,
         "standings": {each.name: _standings(study, each.name) for each in study.threats},
         "checks": checks_of(study),
@@ -215,9 +201,6 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "grid_error": study.grid_error,
         "index": {"ratio": options.ratio, "factor": FACTOR, "order": ORDER},
         "worth_map": worth_map(scenario, study.items) if study.items else None,
-        "mass_figure": mass_figure(study.masses, options.units) if study.masses else None,
-        "place_figure": place_figure(scenario, places, study.places) if study.places else None,
-        "front_figure": _front(study) if study.front else None,
         "checked": CHECKED_SCALED_DISTANCE,
         "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "command": " ".join(_quoted(part) for part in commands),
@@ -226,7 +209,6 @@ def _context(study: Study, commands: list[str]) -> dict[str, Any]:
         "layout_json": layout_json,
         "layout_hash": sha256(layout_json.encode()).hexdigest()[:_HASH_DIGITS],
         "layout_words": layout_counts(study.layout),
-        "texts": [layout_text(each.layout) for each in study.front],
         "bill": table_records(study.bill),
     }
 
@@ -318,9 +300,7 @@ REFERENCES: Final = (
 
 
 def _spread(study: Study) -> tuple[float, float] | None:
-    outcomes = [each for own in study.masses.values() for each in own]
-    shares = [each.reduction for each in (*outcomes, *study.places)]
-    found = [share for share in shares if isfinite(share)]
+    found = [each.reduction for each in study.places if isfinite(each.reduction)]
     return (min(found), max(found)) if found else None
 
 
@@ -380,91 +360,6 @@ def _bay_texts(row: Mapping[str, object]) -> tuple[str, str, str]:
     )
 
 
-Source = tuple[str, str, str]
-"""A number of the summary: its name, its value and its source."""
-
-
-def _sources(
-    study: Study, verdict: StudyVerdict, standing: str, summary: Sequence[SummaryLine]
-) -> list[Source]:
-    """Return every number of the summary with its source."""
-    units, fine = study.options.units, study.options.words[1]
-    digests, titled = dict(study.digests), study.scenario.title_of
-
-    def blasts(words: str) -> str:
-        found = (
-            f"{each.name}: {digests[f'{each.name} {words}, {fine}'][:_HASH_DIGITS]}"
-            for each in study.threats
-        )
-        return "blast " + ", ".join(found)
-
-    sides = (("without", "without a barrier"), ("with the layout", "with the layout"))
-    found: list[Source] = []
-    for name, both in verdict.buildings.items():
-        for (words, of_blast), each in zip(sides, both, strict=True):
-            where = f"worst of the threats; {blasts(of_blast)}; response of its bays"
-            values = (
-                ("level of protection", each.level),
-                ("panes that break", f"{each.broken:.1f} of {each.panes}"),
-                ("panels that fail", f"{each.failed} of {each.panels}"),
-            )
-            found += [(f"{titled(name)}, {words}: {what}", value, where) for what, value in values]
-    for line in summary:
-        for words, of_blast, load, error in (
-            (*sides[0], line.worst.unprotected, line.worst.unprotected_error_pa_s),
-            (*sides[1], line.worst.protected, line.worst.protected_error_pa_s),
-        ):
-            label = f"{line.worst.threat.name} {of_blast}, {fine}"
-            where = f"loads, {line.worst.threat.name}; blast {digests[label][:_HASH_DIGITS]}"
-            impulse = f"{_number(units.impulse_of(load.impulse_pa_s))} {units.impulse}"
-            impulse += _of_cells(_error(units.impulse_of(error)))
-            peak = f"{_number(units.pressure_of(load.peak_pa))} {units.pressure}"
-            found.append((f"{titled(line.worst.target.name)}, {words}: impulse", impulse, where))
-            found.append((f"{titled(line.worst.target.name)}, {words}: peak", peak, where))
-        span = _span(line)
-        span += _of_cells(_error(100.0 * line.error, 1))
-        found.append(
-            (
-                f"{titled(line.worst.target.name)}: reduction",
-                span,
-                "1 - impulse with / without, all threats",
-            )
-        )
-    cost = study.scenario.zone.priced(study.cost)
-    found.append(("cost of the layout", cost, "bill of quantities"))
-    if isfinite(study.grid_error):
-        found.append(
-            (
-                "error of the cells",
-                _percent(study.grid_error),
-                "grid convergence index, the largest of all reductions",
-            )
-        )
-    if verdict.barrier is not None:
-        where = f"rigid bodies under the pressures on their sides; {blasts(sides[1][1])}"
-        found.append(("barriers", standing, where))
-    for neighbour in study.protected.worst_neighbours:
-        share = _percent(neighbour.probability[BuildingDamage.MAJOR])
-        where = f"Green Book's probit; {_number(neighbour.peak_pa / PA_PER_KPA)} kPa side-on, "
-        where += f"{_number(neighbour.impulse_pa_s)} Pa s; {blasts(sides[1][1])}"
-        name = titled(neighbour.building)
-        found.append((f"{name}, a house there: major damage", share, where))
-    return found
-
-
-def _front(study: Study) -> bytes:
-    """Return the figure of the front with the layout of the report, on the same cells."""
-    weighted = []
-    for threat in study.threats:
-        outcomes = {each.threat.name: each for each in study.masses[threat.name]}
-        own = outcomes.get(f"{threat.charge.tnt_kg:g} kg")
-        if own is not None:
-            weighted.append(own.reduction)
-    if not weighted:
-        raise AssertionError(f"no threat was run with {study.options.words[0]}")
-    return front_figure(study.front, (study.cost, float(np.mean(weighted))), len(weighted))
-
-
 def _number(value: float) -> str:
     """Return a number with three significant digits, or a dash if it is not finite."""
     if not isfinite(value):
@@ -487,16 +382,12 @@ def _error(value: float, digits: int | None = None) -> str:
     return f" {_PLUS_MINUS} {value:,.{digits}f}"
 
 
-def _of_cells(error: str) -> str:
-    return error and f"{error} (cells)"
-
-
-def _counted(load: TargetLoad, units: UnitSystem) -> str:
+def _counted(load: TargetLoad) -> str:
     """Return the peak to compare with limits, and its source."""
-    peak, source = _number(units.pressure_of(load.counted.pa)), load.counted.source
+    peak, source = _number(load.counted.pa / PA_PER_KPA), load.counted.source
     if source is PeakSource.GAS:
         return f"{peak} ({source})"
-    return f"{peak} ({source}; gas {_number(units.pressure_of(load.peak_pa))})"
+    return f"{peak} ({source}; gas {_number(load.peak_pa / PA_PER_KPA)})"
 
 
 def _percent(share: float) -> str:

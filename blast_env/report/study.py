@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from blast_env.arrays import FloatArray
-from blast_env.documents import parse_csv, read_text
-from blast_env.errors import BlastEnvError, shortened
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, ThreatOutcome
 from blast_env.evaluation.consequences import Consequences, consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
@@ -19,51 +18,32 @@ from blast_env.evaluation.governing import Severity
 from blast_env.evaluation.probability import Uncertainty
 from blast_env.evaluation.shared import keep_consequences
 from blast_env.gas.settings import Cells
-from blast_env.geometry import Element, Layout, Piece, layout_text, standing
+from blast_env.geometry import Element, Layout, layout_text, standing
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
 from blast_env.layout import LayoutState, check_layout
-from blast_env.plots.pressure_frames import VerticalSection, default_section
 from blast_env.report.details import ReportDetails
 from blast_env.report.figures import (
     Picture,
     blast_pictures,
     damage_pictures,
-    film_stills,
     risk_picture,
 )
 from blast_env.report.loads import (
-    UNITS,
     MeasuredBlast,
     ReportedBuilding,
     TargetLoad,
-    UnitSystem,
     measure,
     targets_of,
 )
-from blast_env.report.outcomes import (
-    FrontPoint,
-    ItemWorth,
-    Limit,
-    LoadPair,
-    check_limits,
-)
-from blast_env.report.threats import (
-    asked_threats,
-    chief_threats,
-    other_masses,
-    other_places,
-)
+from blast_env.report.outcomes import ItemWorth, Limit, LoadPair, check_limits
+from blast_env.report.threats import asked_threats, chief_threats, other_places
 from blast_env.response.buildings import LevelOfProtection
-from blast_env.runner import Tell, as_completed
+from blast_env.runner import as_completed
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
-from blast_env.statistics import reductions
 
 MOST_THREATS: Final = 6
-MOST_FRONT: Final = 30
-_MASSES: Final = (0.5, 2.0)
 _BARE, _WALLED = "without a barrier", "with the layout"
-_MASSES_PART, _ITEMS = "other masses", "without each item"
-_PLACES, _FRONT = "other places", "front"
+_ITEMS, _PLACES = "without each item", "other places"
 
 
 def final_cells(scenario: Scenario) -> tuple[Cells, Cells]:
@@ -85,11 +65,8 @@ class StudyOptions:
         limits: Limits of the loads on buildings.
         target: Level of protection that buildings with facades must reach; `None` for that of the
             scenario's objective, or low if it has none.
-        units: Units of loads.
-        front: CSV file of a search with the layouts of a front.
         places: Number of places of each source in the sensitivity study.
         items: Whether to rank the worth of each module or piece.
-        stills: Number of moments of the film.
         processes: Worker processes of blasts that need no pictures.
         cache: Folder of the loads of those blasts.
         mass_error: Half the width of the 95 % interval of the charges' masses, as a share.
@@ -104,11 +81,8 @@ class StudyOptions:
     cells: tuple[Cells, Cells] = (0.5, 0.25)
     limits: tuple[Limit, ...] = ()
     target: LevelOfProtection | None = None
-    units: UnitSystem = field(default_factory=lambda: UNITS["si"])
-    front: Path | None = None
     places: int = 5
     items: bool = True
-    stills: int = 4
     processes: int = 1
     cache: Path | None = None
     mass_error: float = 0.1
@@ -120,7 +94,6 @@ class StudyOptions:
             ("threats", self.most_threats, 1, MOST_THREATS),
             ("charges", len(self.charges), 0, MOST_THREATS),
             ("places", self.places, 1, 50),
-            ("stills", self.stills, 0, 12),
             ("mass_error", self.mass_error, 0.0, 0.3),
         ):
             if not low <= value <= high:
@@ -173,13 +146,9 @@ class Study:
         walled_coarse: The same with the coarser cells.
         pictures: Facades and histories with the finer cells, by threat; none if it was stopped
             before those.
-        stills: Moments of the film of the first threat.
         items: The worth of each module or piece, the most valuable one first.
-        masses: The threats with other masses, by the name of the threat.
         places: Charges at other places.
-        front: The front, if one was given.
         notes: Reasons to distrust loads, by threat and cell size.
-        left_out: Notes on the cases left out.
         digests: Digest of every blast with pictures.
         stopped: The part before which it was stopped; empty for a whole report.
     """
@@ -196,13 +165,9 @@ class Study:
     protected: Consequences
     walled_coarse: Consequences
     pictures: dict[str, tuple[Picture, ...]]
-    stills: tuple[Picture, ...]
     items: tuple[ItemWorth, ...]
-    masses: dict[str, tuple[ThreatOutcome, ...]]
     places: tuple[ThreatOutcome, ...]
-    front: tuple[FrontPoint, ...]
     notes: tuple[str, ...]
-    left_out: tuple[str, ...]
     digests: tuple[tuple[str, str], ...]
     stopped: str = ""
 
@@ -252,8 +217,8 @@ def run_study(
     the parts finished by then. Progress is the label of the current part, and its completed share.
 
     Raises:
-        BlastEnvError: If the layout is not legal, a charge is out of place, a limit names no
-            building, or a front cannot be read; all before the first blast.
+        BlastEnvError: If the layout is not legal, a charge is out of place, or a limit names no
+            building; all before the first blast.
     """
     options = options or StudyOptions(cells=final_cells(scenario))
     cells = check_layout(scenario, layout)
@@ -264,27 +229,19 @@ def run_study(
     asked = asked_threats(scenario, options.charges)
     for threat in asked:
         check_layout(scenario.with_possible_charges([threat.charge]), cells)
-    front = front_layouts(options.front, scenario)
     bill = bill_of_quantities(LayoutPlan(scenario, cells))
     runs = Runs(scenario, cells, options, targets, asked, progress)
-    masses: dict[str, tuple[ThreatOutcome, ...]] = {}
-    left_out: tuple[str, ...] = ()
     items: tuple[ItemWorth, ...] = ()
     places: tuple[ThreatOutcome, ...] = ()
-    points: tuple[FrontPoint, ...] = ()
     part = options.words[1]
     try:
         if not asked:
             runs.choose_threats()
         runs.run_threats()
-        part = _MASSES_PART
-        masses, left_out = runs.other_masses()
         part = _ITEMS
         items = runs.item_worths() if options.items else ()
         part = _PLACES
         places = runs.other_places()
-        part = _FRONT
-        points = runs.front_points(front)
         part = ""
     except KeyboardInterrupt:
         options = runs.options_of_what_is_done()
@@ -303,13 +260,9 @@ def run_study(
         protected=runs.consequences(fine, protected=True),
         walled_coarse=runs.consequences(coarse, protected=True),
         pictures=runs.pictures,
-        stills=runs.stills,
         items=items,
-        masses=masses,
         places=places,
-        front=points,
         notes=tuple(dict.fromkeys(runs.notes)),
-        left_out=left_out,
         digests=tuple(runs.digests),
         stopped=part,
     )
@@ -319,7 +272,7 @@ class PlannedPart(NamedTuple):
     """A part of a report before it is run.
 
     Attributes:
-        label: The label that `run_study` reports; of parts with several, their common start.
+        label: The label that `run_study` reports.
         cells: Their cells.
         charges: The charge of each blast; of equal blasts, only the first is run.
         is_drawn: Whether each blast has pictures.
@@ -356,14 +309,9 @@ def blasts_of(
         known.update(new)
         parts.append(PlannedPart(label, coarse, tuple(charge for _, charge in new)))
 
-    for each in threats:
-        masses, _ = other_masses(scenario, each.charge, _MASSES)
-        charges = [mass.charge for mass in masses]
-        asked(f"{each.name}, {_MASSES_PART}", both, charges)
     asked(_ITEMS, _fewer(layout) if options.items else (), own)
     if options.charges:
         asked(_PLACES, both, places)
-    asked(_FRONT, front_layouts(options.front, scenario), own)
     return tuple(parts)
 
 
@@ -433,7 +381,6 @@ class Runs:
         self.targets, self.threats, self.progress = targets, threats, progress
         self.pairs: list[LoadPair] = []
         self.pictures: dict[str, tuple[Picture, ...]] = {}
-        self.stills: tuple[Picture, ...] = ()
         self.notes: list[str] = []
         self.digests: list[tuple[str, str]] = []
         self._ahead: dict[tuple[Layout, LoadCase], _Blast] = {}
@@ -454,11 +401,7 @@ class Runs:
             for threat in self.threats:
                 self._keep(threat, size, *(self._coarse(threat, each) for each in self._layouts))
         for threat in self.threats:
-            shown = threat is self.threats[0] and self.options.stills > 0
-            section = None
-            if shown:
-                section = default_section(self._blast(threat, fine, self.layout).site)
-            both = [self._drawn(threat, fine, layout, section) for layout in self._layouts]
+            both = [self._measured(threat, fine, layout) for layout in self._layouts]
             self._keep(threat, fine, *map(_Blast.of, both))
             # Drawn now, because only these two results are in memory at once.
             unprotected, protected = (
@@ -467,12 +410,8 @@ class Runs:
             self.pictures[threat.name] = (
                 *damage_pictures(unprotected, protected),
                 risk_picture(*both),
-                *blast_pictures(both[0], both[1], self.options.units),
+                *blast_pictures(both[0], both[1]),
             )
-            shots = [each.shot for each in both if each.shot is not None]
-            moments_s = self._moments_s() if shots else []
-            if moments_s:
-                self.stills = film_stills(shots, moments_s)
 
     @property
     def _layouts(self) -> tuple[Layout, Layout]:
@@ -503,26 +442,16 @@ class Runs:
     def _blast(self, threat: LoadCase, cells: Cells, layout: Layout) -> GasBlast:
         return GasBlast(self.scenario, layout, 0, GasEngine.with_cells(cells), threat.charge)
 
-    def _progress_of(self, threat: LoadCase, cells: Cells, layout: Layout) -> Tell:
-        label = _label(threat, _WALLED if layout else _BARE, cells)
-        return partial(self.progress, label)
-
     def _coarse(self, threat: LoadCase, layout: Layout) -> _Blast:
         """Return a blast with the coarser cells, which may be among those run ahead."""
         if (layout, threat) in self._ahead:
             return self._ahead[layout, threat]
-        size = self.options.cells[0]
-        progress = self._progress_of(threat, size, layout)
-        return _Blast.of(measure(self._blast(threat, size, layout), self.targets, progress))
+        return _Blast.of(self._measured(threat, self.options.cells[0], layout))
 
-    def _drawn(
-        self, threat: LoadCase, cells: Cells, layout: Layout, section: VerticalSection | None
-    ) -> MeasuredBlast:
-        blast, progress = (
-            self._blast(threat, cells, layout),
-            self._progress_of(threat, cells, layout),
-        )
-        return measure(blast, self.targets, progress, section)
+    def _measured(self, threat: LoadCase, cells: Cells, layout: Layout) -> MeasuredBlast:
+        label = _label(threat, _WALLED if layout else _BARE, cells)
+        progress = partial(self.progress, label)
+        return measure(self._blast(threat, cells, layout), self.targets, progress)
 
     def _keep(self, threat: LoadCase, cells: Cells, unprotected: _Blast, protected: _Blast) -> None:
         """Keep the numbers of both blasts of a threat."""
@@ -544,35 +473,6 @@ class Runs:
                 coarse = coarser.get(target.name)
                 ratio = self.options.ratio
                 self.pairs.append(LoadPair(target, threat, cells, *loads, coarse, ratio))
-
-    def _moments_s(self) -> list[float]:
-        """Return the times of the stills, s: around the arrival at a protected building."""
-        own = [
-            each
-            for each in self.pairs
-            if each.threat is self.threats[0]
-            and each.target.protected
-            and each.unprotected.arrival_s > 0.0
-        ]
-        if not own:
-            return []
-        first = min(own, key=lambda each: each.unprotected.arrival_s).unprotected
-        arrival_s = first.arrival_s
-        phase_s = first.duration_s if np.isfinite(first.duration_s) else arrival_s
-        last_s = arrival_s + 2.0 * phase_s
-        moments_s = np.linspace(0.5 * arrival_s, last_s, self.options.stills)
-        return [float(moment_s) for moment_s in moments_s]
-
-    def other_masses(self) -> tuple[dict[str, tuple[ThreatOutcome, ...]], tuple[str, ...]]:
-        """Return the outcomes of every threat with other masses, and notes on those left out."""
-        found, left_out = {}, []
-        for threat in self.threats:
-            charges, notes = other_masses(self.scenario, threat.charge, _MASSES)
-            left_out += list(notes)
-            own = replace(threat, name=f"{threat.charge.tnt_kg:g} kg", why="as in the threat")
-            ordered = sorted((own, *charges), key=lambda each: each.charge.tnt_kg)
-            found[threat.name] = self._outcomes(f"{threat.name}, {_MASSES_PART}", ordered)
-        return found, tuple(left_out)
 
     def other_places(self) -> tuple[ThreatOutcome, ...]:
         """Return the outcomes of the charges at other places."""
@@ -642,19 +542,6 @@ class Runs:
         ]
         return tuple(sorted(items, key=lambda each: -each.worth))
 
-    def front_points(self, layouts: Sequence[Layout]) -> tuple[FrontPoint, ...]:
-        """Return layouts of a front with their reductions by gas dynamics, the cheapest first."""
-        if not layouts:
-            return ()
-        impulses = self._loads(_FRONT, ((), *layouts), self.threats)
-        unprotected = np.broadcast_to(impulses[0], impulses[1:].shape)
-        gone = reductions(impulses[1:], unprotected).mean(axis=1)
-        points = [
-            FrontPoint(layout, LayoutState.of(self.scenario, layout).cost, float(share))
-            for layout, share in zip(layouts, gone, strict=True)
-        ]
-        return tuple(sorted(points, key=lambda each: (each.cost, each.reduction)))
-
     def _loads(
         self, label: str, layouts: Sequence[Layout], threats: Sequence[LoadCase]
     ) -> FloatArray:
@@ -670,43 +557,3 @@ class Runs:
         pairs = [(layout, threat) for layout in layouts for threat in threats]
         progress = partial(self.progress, label)
         return self._evaluator.loads_of_many(pairs, self.options.processes, progress)
-
-
-@dataclass(frozen=True)
-class _FrontRow:
-    """The column that is read from a row of a front."""
-
-    layout: str
-
-
-def front_layouts(path: Path | None, scenario: Scenario) -> tuple[Layout, ...]:
-    """Return the layouts of a front that a search wrote; refuse other files and illegal layouts."""
-    if path is None:
-        return ()
-    try:
-        layouts = [layout_from(row.layout) for row in parse_csv(read_text(path), _FrontRow)]
-    except ValueError as error:
-        raise BlastEnvError(
-            f"{path}: is not the front.csv of a search (column `layout`, cells as row,column or "
-            f"pieces as row,column,item): {error}"
-        ) from error
-    if len(layouts) > MOST_FRONT:
-        raise BlastEnvError(f"{path}: has {len(layouts)} layouts, must have at most {MOST_FRONT}")
-    return tuple(check_layout(scenario, layout) for layout in layouts if layout)
-
-
-def layout_from(text: str) -> Layout:
-    """Return a layout from the text of `layout_text`: `3,4 3,5`, `3,4,t_wall 7,4,t_wall,turned`."""
-    return tuple(_element_from(element) for element in text.split())
-
-
-def _element_from(text: str) -> Element:
-    parts = text.split(",")
-    if not 2 <= len(parts) <= 4:
-        raise ValueError(f"{shortened(text)!r} must have 2 to 4 parts")
-    row, column, item, turned = (*parts, "", "")[:4]
-    if turned not in ("", "turned"):
-        raise ValueError(f"{shortened(turned)!r} must be 'turned'")
-    if not item:
-        return int(row), int(column)
-    return Piece(int(row), int(column), item, turned == "turned")

@@ -1,4 +1,4 @@
-"""The charges of a report: the worst places, other places, other masses."""
+"""The charges of a report: the worst places, and other places."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -6,7 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.geometry import Layout, Rectangle
@@ -15,7 +14,6 @@ from blast_env.site import (
     PointSource,
     RectangleSource,
     Scenario,
-    ScenarioError,
     SegmentSource,
     VehicleCharge,
     VehicleSource,
@@ -85,34 +83,11 @@ def other_places(scenario: Scenario, count: int) -> tuple[LoadCase, ...]:
     return tuple(found.values())
 
 
-def other_masses(
-    scenario: Scenario, charge: AnyCharge, factors: tuple[float, ...]
-) -> tuple[tuple[LoadCase, ...], tuple[str, ...]]:
-    """Return the same charge with other masses, and notes on those that are not possible."""
-    possible, notes = [], []
-    for factor in factors:
-        other = _with_mass(charge, factor * charge.tnt_kg)
-        name = f"{other.tnt_kg:g} kg"
-        try:
-            scenario.with_possible_charges([other])
-        except (ScenarioError, BlastEnvError) as error:
-            notes.append(f"{name} is omitted: {error}")
-        else:
-            possible.append(LoadCase(other, name=name, why=f"{factor:g} times the mass"))
-    return tuple(possible), tuple(notes)
-
-
 def _why(place: LoadCase, count: int) -> str:
     if count == 1:
         return place.why
     words = "the worst with the layout"
     return f"{place.why}, {words} of {count} places examined"
-
-
-def _with_mass(charge: AnyCharge, tnt_kg: float) -> AnyCharge:
-    if isinstance(charge, VehicleCharge):
-        return charge.with_charge(tnt_kg)
-    return charge._replace(tnt_kg=tnt_kg)
 
 
 def _place_text(charge: Charge) -> str:

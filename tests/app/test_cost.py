@@ -62,7 +62,7 @@ def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
     options = StudyOptions(charges=(threats_of(hut())[0].charge,))
     cost = ReportCost.of(hut(), WALL, options)
     sizes = [each.cells for each in cost.blasts]
-    assert len(sizes) == 4 + 4 + len(WALL)  # the one other place is the threat's
+    assert len(sizes) == 4 + len(WALL)  # the one other place is the threat's
     assert cost.drawn == 2
     assert sum(each == max(sizes) for each in sizes) == 2
     shares = [cost.share(label, share) or 0.0 for label, _ in cost.parts for share in (0.0, 1.0)]
@@ -71,7 +71,7 @@ def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:
     assert shares == sorted(shares)
     assert cost.share("no part", 0.5) is None
     one = ReportCost.of(hut(), WALL, replace(options, cells=(0.5, 0.5), items=False))
-    assert len(one.blasts) == 2 + 4
+    assert len(one.blasts) == 2
 
 
 def test_words() -> None:

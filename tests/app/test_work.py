@@ -590,7 +590,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
         scenario: Scenario, layout: Layout, options: StudyOptions, tell: Callable[..., None]
     ) -> SimpleNamespace:
         asked.update(scenario=scenario, layout=layout, options=options)
-        for label in ("T1, other masses", "other places", "stopped before: nothing"):
+        for label in ("without each item", "other places", "stopped before: nothing"):
             sleep(0.11)  # more often nobody is told
             tell(label, 0.5)
             status = state_of(session)
@@ -610,7 +610,7 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     choice = ReportChoice(cells=(0.5, 0.5), items=False, target=3)
     session.report(tmp_path / "r.html", tmp_path / "r.pdf", choice)
     cost = session.cost_of_report(choice)
-    shares = [cost.share("T1, other masses", 0.5), cost.share("other places", 0.5)]
+    shares = [cost.share("without each item", 0.5), cost.share("other places", 0.5)]
     assert seen == [*shares, shares[-1]]  # of the whole, and what is no part changes nothing
     status = state_of(session)
     assert (status.state, status.file) == ("done", str(tmp_path / "r.pdf"))
@@ -624,11 +624,11 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
         cache=session.work.cache,
     )
     assert asked == {"scenario": session.scenario, "layout": WALL, "options": options}
-    stopped = "other masses"
+    stopped = "other places"
     session.report(tmp_path / "r.html")
     status = state_of(session)
     assert (status.state, status.file) == ("stopped", str(tmp_path / "r.html"))
-    assert status.text == "stopped before: other masses; wrote r.html with the finished parts"
+    assert status.text == "stopped before: other places; wrote r.html with the finished parts"
 
 
 def test_a_report_that_is_stopped_may_take_time_to_write(tmp_path: Path) -> None:

@@ -33,7 +33,6 @@ from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile, write_layout
 from blast_env.particles.calibration.model import load_calibration, save_calibration
 from blast_env.particles.parquet import _run_record, checked_table
-from blast_env.report.study import front_layouts
 from blast_env.site import Scenario, load_scenario, save_scenario
 from blast_env.site.scene import Charge
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
@@ -150,14 +149,6 @@ def _setting(_: Path) -> Format:
     return Format(samples, read)
 
 
-def _front(folder: Path) -> Format:
-    rows = ('1.5,0.25,"0,0 0,1"', '2.5,0.5,"0,0 0,1 0,2"', '3,0.6,"1,1"')
-    sample = "\n".join(("cost,reduction,layout", *rows, "")).encode()
-    scenario = small_scenario()
-    path = folder / "front.csv"
-    return Format((sample,), _from_file(path, lambda path: front_layouts(path, scenario)))
-
-
 def _loads(folder: Path) -> Format:
     key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
     load = ParticleLoad(
@@ -240,7 +231,6 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "run: rollouts.csv": _rollouts,
         "run: checkpoint.pt": _checkpoint,
         "--set": _setting,
-        "front.csv": _front,
         "store of blasts": _loads,
         "GeoJSON": _map(".geojson"),
         "OpenStreetMap": _map(".osm"),

@@ -97,18 +97,13 @@ SMALLER: Final[dict[str, str]] = {
         "--seeds 1 --cell 0.5"
     ),
     "blast-env report visitor_entrance --layout found/layout.json --out report.html"
-    " --pdf report.pdf": ("--threats 1 --places 1 --stills 1 --no-items"),
-    # docs/start.md
-    "blast-env report depot.toml --layout building/layout.json --limit control_room=600,170"
-    " --threats 1 --places 1 --stills 2 --no-items --out report.html --pdf report.pdf": (
-        "--stills 0"
-    ),
+    " --pdf report.pdf": ("--threats 1 --places 1 --no-items"),
     # docs/howto
     "blast-env report site.toml --layout layout.json --out report.html --pdf report.pdf": (
-        "--threats 1 --places 1 --stills 1 --no-items"
+        "--threats 1 --places 1 --no-items"
     ),
     "blast-env report site.toml --layout layout.json --out report.html --limit Pump_House=300,60"
-    " --charge 5,9,100": "--places 1 --stills 1 --no-items",
+    " --charge 5,9,100": "--places 1 --no-items",
     "blast-env search --engine gas --method genetic --budget 2000 --cache blasts"
     " --cluster tcp://login1:8786": (
         f"--scenario visitor_entrance --budget 4 --held-out 1 {_CLUSTER}"

@@ -20,10 +20,7 @@ def _probabilities_are_drawn_once() -> Iterator[None]:
 
 
 @pytest.fixture(scope="package")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
-    front = tmp_path_factory.mktemp("front") / "front.csv"
-    rows = ("blasts,impulse_pa_s,threats,modules,layout", "3,1,1,0,", '4,1,1,2,"2,0 3,0"')
-    front.write_text("\n".join(rows) + "\n")
+def study() -> Study:
     limits = (Limit("hut", impulse_pa_s=300.0),)
-    options = StudyOptions(limits=limits, front=front, places=1, stills=2)
+    options = StudyOptions(limits=limits, places=1)
     return run_study(glazed_hut(), LAYOUT, options)
