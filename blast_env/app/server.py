@@ -1,7 +1,6 @@
 """The server of the page, for one person at a desk."""
 
 import socket
-from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -43,12 +42,11 @@ _MOST_MESSAGE_BYTES: Final = 2_000_000
 _KEPT_BY_BROWSER: Final = {"Cache-Control": "private, max-age=31536000, immutable"}
 
 
-def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
+def add_pages(sessions: Sessions) -> None:
     """Add the pages to NiceGUI's application.
 
     Args:
         sessions: The designs.
-        runs: Run folders of trained agents, offered as proposers.
     """
     room = [Depends(_check_room)]
 
@@ -65,7 +63,7 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
         except BlastEnvError as error:
             StartPage(sessions, str(error))
             return
-        DesignPage(session, runs)
+        DesignPage(session)
         ui.context.client.on_delete(partial(sessions.leave, design_id))
 
     @app.get("/blasts/{design_id}/{key}/{name}")
@@ -93,7 +91,6 @@ def add_pages(sessions: Sessions, runs: Sequence[Path] = ()) -> None:
             sessions.leave(design_id)  # unless a page shows it
         return FileResponse(path, headers=_KEPT_BY_BROWSER)
 
-    app.add_static_file(local_file=_PAGE_FILES / "player.js", url_path="/player.js")
     app.add_exception_handler(503, _say)
     app.add_exception_handler(404, _say)  # NiceGUI's would open a page
     app.timer(_TICK_S, sessions.workers.tick)
@@ -122,7 +119,6 @@ def _say(_: Request, error: Exception) -> PlainTextResponse:
 def _style() -> None:
     ui.colors(primary=_PRIMARY)
     ui.add_css((_PAGE_FILES / "page.css").read_text(encoding="utf-8"))
-    ui.add_body_html('<script src="/player.js"></script>')
 
 
 def check_port(host: str, port: int) -> None:
@@ -143,13 +139,12 @@ def check_port(host: str, port: int) -> None:
             ) from error
 
 
-def serve(entrance: Entrance, folder: Path, runs: Sequence[Path] = ()) -> None:
+def serve(entrance: Entrance, folder: Path) -> None:
     """Serve the page until the process is terminated.
 
     Args:
         entrance: The address of the page, and its secret.
         folder: The work folder.
-        runs: Run folders of trained agents.
 
     Raises:
         BlastEnvError: If the port cannot be used, or another server has the folder open.
@@ -159,7 +154,7 @@ def serve(entrance: Entrance, folder: Path, runs: Sequence[Path] = ()) -> None:
     with ExitStack() as held:
         held.enter_context(work.held(entrance.url))
         held.callback(workers.close)
-        add_pages(Sessions(work, workers), runs)
+        add_pages(Sessions(work, workers))
         app.on_startup(workers.prepare)
         app.on_shutdown(held.close)  # after SIGTERM, code below the server does not run
         outside = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)

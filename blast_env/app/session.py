@@ -4,7 +4,7 @@ A session is independent of the page. All tabs on one design share its session, 
 independent of each other.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -15,11 +15,10 @@ from blast_env.app.cost import CostGuess, ReportCost
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
-from blast_env.app.offers import title_of
+from blast_env.app.offers import runs_blasts
 from blast_env.app.records import (
-    BlastRecord,
+    Blasted,
     DesignSettings,
-    EngineRecord,
     blast_key,
     comparison,
     read_kept,
@@ -37,7 +36,6 @@ from blast_env.app.work import (
     Answer,
     AnswerTask,
     BlastTask,
-    ProposalTask,
     Question,
     ReportChoice,
     ReportTask,
@@ -47,12 +45,15 @@ from blast_env.app.work import (
 )
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS
+from blast_env.design.search.registry import proposer_row
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.capacity import MOST_BLASTS
 from blast_env.evaluation.consequences import Consequences
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.probability import Uncertainty
+from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
 from blast_env.layout.build_scene import charge_against
@@ -90,7 +91,7 @@ class Session:
         work: The work folder.
         workers: The worker processes.
         history: The design with its steps.
-        engine: The engine of new blasts and of the results shown; searches take coarser cells.
+        cells: The cells of new blasts and of the results shown; searches take larger ones.
         threats: Names of the threats of blasts; by default `usual_threats` of the site.
         view: The view opened last; a reloaded page starts with it.
     """
@@ -99,7 +100,7 @@ class Session:
     work: WorkFolder
     workers: Workers
     history: History
-    engine: EngineRecord = field(default_factory=lambda: EngineRecord(name="gas", cell_m=0.5))
+    cells: Cells = 0.5
     threats: tuple[str, ...] = ()
     view: str = "Plan"
     _listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
@@ -114,18 +115,20 @@ class Session:
         """
         session = cls(folder, work, workers, folder.load())
         settle(folder.jobs, workers)
-        kept = folder.settings() or DesignSettings(engine=EngineRecord.final(session.scenario))
-        session.engine, session.view = kept.engine, kept.view
+        final = GasEngine().final([session.scenario])
+        cells = final.cells if final.is_growing else final.cell_m
+        kept = folder.settings() or DesignSettings(cells=cells)
+        session.cells, session.view = kept.cells, kept.view
         session._choose(kept.threats)
         return session
 
     def keep(self) -> None:
-        """Save engine, threats and view, with which the design is opened again.
+        """Save cells, threats and view, with which the design is opened again.
 
         Raises:
             BlastEnvError: If they cannot be written.
         """
-        kept = DesignSettings(engine=self.engine, threats=self.threats, view=self.view)
+        kept = DesignSettings(cells=self.cells, threats=self.threats, view=self.view)
         self.folder.keep_settings(kept)
 
     def _choose(self, threats: Iterable[str]) -> None:
@@ -226,46 +229,35 @@ class Session:
             task = BlastTask(
                 **self._on_site(self.scenario.without_budget),
                 layout=placing.plain(self.design.layouts[slot]),
-                engine=self.engine,
+                cells=self.cells,
                 blasts=str(self.folder.blasts),
             )
-            folder = self._begin(task, f"blast of {SLOTS[slot]}, {self.engine.label}")
+            folder = self._begin(task, f"blast of {SLOTS[slot]}, {self.engine.words}")
         if folder is None:
             raise BlastEnvError(f"layouts: there are none to blast ({names})")
         return folder
 
-    def propose(self, proposer: str, is_run: bool = False) -> Path:
-        """Ask a rule, or the agent of a run, for a layout against the chosen threats.
-
-        Raises:
-            BlastEnvError: If there is no build zone.
-        """
-        _ = self.scenario.zone
-        task = ProposalTask(**self._on_site(), proposer=proposer, is_run=is_run)
-        return self._begin(task, f"proposal: {title_of(proposer)}")
-
-    def search(self, method: str, budget: int, *, from_layout: bool = False) -> Path:
-        """Search for a layout against the chosen threats.
+    def search(self, method: str, budget: int = 0) -> Path:
+        """Search for a layout against the chosen threats, or propose one without a blast.
 
         Args:
-            method: Name of the method.
-            budget: Most blasts.
-            from_layout: Whether to start from the active layout.
+            method: Name of the proposer.
+            budget: Most blasts, for a proposer that runs any.
 
         Raises:
-            BlastEnvError: If there is no build zone, or the budget is below 1.
+            UnknownNameError: If there is no such proposer.
+            BlastEnvError: If there is no build zone, or the budget of a search is below 1.
         """
         _ = self.scenario.zone
-        if budget < 1:
+        if not runs_blasts(method):
+            budget = 0
+        elif budget < 1:
             raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
-        task = SearchTask(
-            **self._on_site(),
-            method=method,
-            budget=budget,
-            engine=self._search_engine,
-            begin_with=placing.plain(self.design.layout) if from_layout else (),
-        )
-        return self._begin(task, f"{method} search, {budget} blasts, {task.engine.label}")
+        title = proposer_row(method).title
+        task = SearchTask(**self._on_site(), method=method, budget=budget, cells=self.cells)
+        if budget == 0:
+            return self._begin(task, f"proposal: {title}")
+        return self._begin(task, f"{method} search, {budget} blasts, {self._search_engine.words}")
 
     def report(
         self, page: Path, pdf: Path | None = None, choice: ReportChoice | None = None
@@ -302,11 +294,11 @@ class Session:
             budget: Most blasts of a search of advice.
 
         Raises:
-            BlastEnvError: If it cannot be answered: without gas dynamics or a facade, or, with
-                advice, without a budget of the build zone.
+            BlastEnvError: If it cannot be answered: without a facade, or, with advice, without a
+                budget of the build zone.
         """
         task = self._question(question, target, mass_error, budget)
-        return self._begin(task, f"{question} {task.name}, {self.engine.label}")
+        return self._begin(task, f"{question} {task.name}, {self.engine.words}")
 
     def cost_of_question(
         self, question: Question, target: LevelOfProtection, mass_error: float, budget: int
@@ -316,12 +308,12 @@ class Session:
         layouts = 2 if task.layout else 1
         fine = tuple(self._cost(each.charge) for each in task.threats)
         coarse = tuple(
-            task.search_engine.gas.cost(self.scenario, each.charge) for each in task.threats
+            self._search_engine.cost(self.scenario, each.charge) for each in task.threats
         )
         if question is Question.CAPACITY:
             return fine * (layouts * MOST_BLASTS)
         if question is Question.ASSESS:
-            return (fine + coarse[: task.engine.coarser is not None]) * layouts
+            return (fine + coarse[: self.engine.coarser is not None]) * layouts
         searches = len(kinds_for(self.scenario)) * ROUNDS
         searched = tuple(coarse[k % len(coarse)] for k in range(budget * searches))
         return searched + fine * searches
@@ -330,8 +322,6 @@ class Session:
         self, question: Question, target: LevelOfProtection, mass_error: float, budget: int
     ) -> AnswerTask:
         Uncertainty(mass=mass_error)  # refuses one that is out of bounds
-        if self.engine.is_first_look:
-            raise BlastEnvError("particles give no level of protection: choose gas as the engine")
         if not self.scenario.bays:
             raise BlastEnvError(NO_FACADE)
         if question is Question.ADVISE:
@@ -349,7 +339,7 @@ class Session:
             layout=placing.plain(self.design.layout),
             question=question,
             name=SLOTS[self.design.active],
-            engine=self.engine,
+            cells=self.cells,
             target=target,
             mass_error=mass_error,
             budget=budget,
@@ -406,9 +396,7 @@ class Session:
         }
 
     def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
-        """Return the costs of the missing blasts of layouts; none with particles."""
-        if self.engine.is_first_look:
-            return ()
+        """Return the costs of the missing blasts of layouts."""
         keys: dict[str, AnyCharge] = {}
         for threat in self.chosen_threats():
             for layout in ((), *(self.design.layouts[each] for each in slots)):
@@ -428,11 +416,16 @@ class Session:
             for layout in layouts
             if not any(self.key(layout, threat) in there for threat in threats)
         ]
-        cost = coarser.gas.cost(self.scenario, threats[0].charge)
+        cost = coarser.cost(self.scenario, threats[0].charge)
         return (cost,) * len(missing)
 
     @property
-    def _search_engine(self) -> EngineRecord:
+    def engine(self) -> GasEngine:
+        """Gas dynamics with the cells."""
+        return GasEngine.with_cells(self.cells)
+
+    @property
+    def _search_engine(self) -> GasEngine:
         """The engine of searches: with coarser cells than those of final statements."""
         return self.engine.coarser or self.engine
 
@@ -455,16 +448,13 @@ class Session:
         check_layout(self.scenario, self.design.layout)  # refuses one that costs too much
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
-        """Return the costs of the blasts of a search; none with particles."""
-        charges = [each.charge for each in self.chosen_threats()]
-        if self.engine.is_first_look or not charges:
-            return ()
-        engine = self._search_engine.gas
+        """Return the costs of the blasts of a search."""
+        engine, charges = self._search_engine, [each.charge for each in self.chosen_threats()]
         costs = [engine.cost(self.scenario, each) for each in charges]
         return tuple(costs[k % len(costs)] for k in range(max(budget, 0)))
 
     def _cost(self, charge: AnyCharge) -> CostGuess:
-        return self.engine.gas.cost(self.scenario, charge)
+        return self.engine.cost(self.scenario, charge)
 
     # Results.
 
@@ -484,26 +474,21 @@ class Session:
     def key(self, layout: Layout, threat: LoadCase) -> str:
         """Return the key of a blast."""
         charge = charge_against(self.scenario, layout, threat.charge)
-        return blast_key(self.scenario.without_budget, layout, charge, self.engine)
+        return blast_key(self.scenario.without_budget, layout, charge, self.cells)
 
     def comparison(self) -> AnswerTable:
         """Return the table of all blasts of the current design."""
-        records: list[tuple[str, float, BlastRecord]] = []
-        without: dict[str, BlastRecord] = {}
-        for threat in self.chosen_threats():
-            for each in self.shown(threat):
-                record = self.folder.record_of(each.key)
-                if record is None:
-                    continue
-                if each.name == BARE:
-                    without[record.threat] = record
-                records.append((each.name, placing.cost_of(self.scenario, each.layout), record))
-        coarse = {
-            record.key: loads
-            for _, _, record in records
-            if (loads := self.folder.coarse_of(record.key)) is not None
-        }
-        return comparison(records, without, self.scenario, coarse)
+        threats, folder = self.chosen_threats(), self.folder
+        layouts = []
+        for number, each in enumerate(self.shown(threats[0])):
+            keys = {threat.name: self.shown(threat)[number].key for threat in threats}
+            found = {name: folder.record_of(key) for name, key in keys.items()}
+            records = {name: own for name, own in found.items() if own is not None}
+            coarse = {own.key: folder.coarse_of(own.key) for own in records.values()}
+            known = {key: loads for key, loads in coarse.items() if loads is not None}
+            cost = placing.cost_of(self.scenario, each.layout)
+            layouts.append(Blasted(each.name, cost, records, known))
+        return comparison(layouts, [each.name for each in threats], self.scenario)
 
     def verdicts(self) -> AnswerTable:
         """Return the verdicts on the buildings in all blasts of the current design."""
@@ -551,13 +536,8 @@ class Session:
 
     def _facades(self, shown: Shown, threat: LoadCase) -> Consequences | None:
         folder = self.folder.blast_of(shown.key)
-        cell_m = self.engine.gas.smallest_m
+        cell_m = self.engine.smallest_m
         return stored_consequences(self.scenario, shown.layout, threat.charge, cell_m, folder)
-
-    def waves(self, threat: LoadCase) -> Sequence[tuple[str, BlastRecord]]:
-        """Return the blasts with gauges under a threat, by the names of the layouts."""
-        found = ((each.name, self.folder.record_of(each.key)) for each in self.shown(threat))
-        return [(name, record) for name, record in found if record is not None and record.waves]
 
 
 @dataclass

@@ -1,25 +1,22 @@
-"""The tasks of a worker: proposals, searches, answers, reports; blasts are in `blasts`.
+"""The tasks of a worker: searches, answers, reports; blasts are in `blasts`.
 
 Long work reports its progress through a `Teller`, and may be interrupted anywhere by
 `KeyboardInterrupt`.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, time
 from typing import Final
 
 from blast_env.app import placing
-from blast_env.app.blasts import run_blasts, warm_engines
+from blast_env.app.blasts import run_blasts, warm_engine
 from blast_env.app.cost import ReportCost
-from blast_env.app.offers import PACKAGED, proposed, title_of
 from blast_env.app.records import write_kept
 from blast_env.app.work import (
     ANSWER,
     Answer,
     AnswerTask,
     BlastTask,
-    ProposalTask,
     Question,
     ReportTask,
     SearchTask,
@@ -28,16 +25,15 @@ from blast_env.app.work import (
     read_task,
     write_status,
 )
-from blast_env.design.proposal import chosen_proposer
-from blast_env.design.search import DesignProblem, Progress, find_proposer
-from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, SeedRange
-from blast_env.evaluation.engines import JUDGE
+from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
+from blast_env.design.search.registry import proposer_row
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet
+from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
-from blast_env.site import Scenario
+from blast_env.site.vehicles import source_of
 
 _LEAST_PAUSE_S: Final = 0.1
 _WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
-_REALISATIONS: Final = 8  # of the particle model, divided among the charges
 
 
 class Teller:
@@ -78,7 +74,7 @@ class Teller:
 
 def warm_up() -> None:
     """Import modules and load compiled code in advance, so that the first task is not slow."""
-    warm_engines()
+    warm_engine()
 
 
 def run_task(folder: Path) -> None:
@@ -96,83 +92,50 @@ def run_task(folder: Path) -> None:
         _search(task, teller)
     elif isinstance(task, ReportTask):
         _report(task, teller)
-    elif isinstance(task, AnswerTask):
-        _answer(task, teller)
     else:
-        _propose(task, teller)
-
-
-def _propose(task: ProposalTask, teller: Teller) -> None:
-    scenario = task.site
-    layout, expectation = _proposed(task, scenario, teller)
-    words = placing.counted(scenario, layout)
-    text = f"{words}, proposed by {title_of(task.proposer)}{expectation and f', {expectation}'}"
-    teller.tell(state="done", share=1.0, text=text, layout=placing.plain(layout))
-
-
-def _proposed(task: ProposalTask, scenario: Scenario, teller: Teller) -> tuple[Layout, str]:
-    """Return the proposed layout, and its expected gain in words."""
-    known = [each.charge for each in task.threats]
-    if task.is_run:
-        from blast_agents.training import load_agent  # torch takes seconds to import
-
-        agent = load_agent(task.proposer)
-        return tuple(agent.propose(scenario, known[0] if len(known) == 1 else None)), ""
-    if task.proposer != PACKAGED:
-        return proposed(task.proposer, scenario, known)
-    case = LoadCaseSet(
-        scenario, tuple(LoadCase(each, SeedRange.SEARCH.value.start) for each in known)
-    )
-    problem = DesignProblem(BlastEvaluator(scenario, JUDGE, cache=task.cache), case)
-    report: Callable[[Progress], None] = lambda progress: teller.share(progress.share)  # noqa: E731
-    found = chosen_proposer().propose(problem, report=report)
-    return found.layout, found.expectation if found.layout else found.by
+        _answer(task, teller)
 
 
 def _search(task: SearchTask, teller: Teller) -> None:
-    scenario = task.site
-    begin_with = placing.layout_from(scenario, task.begin_with)
-    method = find_proposer(task.method, (begin_with,) if begin_with else ())
-    engine = task.engine.found
-    problem = DesignProblem(
-        BlastEvaluator(scenario, engine, cache=task.cache), search_case(scenario, task)
-    )
-    teller.tell(text="blasts without a barrier")
-    problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+    row, scenario = proposer_row(task.method), task.site
+    if row.kind is ProposerKind.RULE and Need.VEHICLE not in row.needs:
+        # One against vehicles plans for all of the site.
+        sources = tuple(source_of(each.charge) for each in task.threats)
+        scenario = scenario.model_copy(update={"charge": sources})
+    engine = GasEngine.with_cells(task.cells)
+    evaluator = BlastEvaluator(scenario, engine.coarser or engine, cache=task.cache)
+    problem = DesignProblem(evaluator, LoadCaseSet(scenario, task.threats))
+    if task.budget:
+        teller.tell(text="blasts without a barrier")
+        problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
 
     def report(progress: Progress) -> None:
-        share = progress.blasts / progress.budget
         if progress.best is None:
-            teller.share(share)
+            teller.share(progress.share)
             return
         best = placing.plain(progress.best.layout)
         reduction = 100.0 * progress.best.reduction(problem)
         text = f"{progress.blasts} of {progress.budget} blasts, best reduction {reduction:.1f} %"
         if best != teller.status.layout:
-            teller.tell(share=share, text=text, layout=best)
+            teller.tell(share=progress.share, text=text, layout=best)
         elif teller.is_due:
-            teller.tell(share=share, text=text)
+            teller.tell(share=progress.share, text=text)
 
-    result = method.propose(problem, task.budget, 0, report)
-    if result.load is None:
+    result = find_proposer(task.method).propose(problem, task.budget, 0, report)
+    if result.load is None and result.interrupted:
         raise KeyboardInterrupt
-    reduction = 100.0 * result.history[-1].reduction(problem)
-    text = (
-        f"reduction {reduction:.1f} % on the blasts of the search, after {result.blasts} of"
-        f" {result.budget} ({task.engine.label}); blast the layout to confirm it"
-    )
+    if result.load is None:
+        words = result.expectation if result.layout else result.by
+        text = f"{placing.counted(scenario, result.layout)}, proposed by {row.title}"
+        text += words and f", {words}"
+    else:
+        reduction = 100.0 * result.history[-1].reduction(problem)
+        text = (
+            f"reduction {reduction:.1f} % on the blasts of the search, after {result.blasts} of"
+            f" {result.budget} ({evaluator.engine.words}); blast the layout to confirm it"
+        )
     state = "stopped" if result.interrupted else "done"
     teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
-
-
-def search_case(scenario: Scenario, task: SearchTask) -> LoadCaseSet:
-    """Return the load cases of a search: the threats, with several seeds each for particles."""
-    charges = [each.charge for each in task.threats]
-    noisy = task.engine.is_first_look
-    realisations = max(_REALISATIONS // len(charges), 1) if noisy else 1
-    first = SeedRange.SEARCH.seeds(0, realisations * len(charges))
-    threats = [LoadCase(charges[k % len(charges)], seed) for k, seed in enumerate(first)]
-    return LoadCaseSet(scenario, tuple(threats), realisations)
 
 
 def _answer(task: AnswerTask, teller: Teller) -> None:
@@ -181,7 +144,7 @@ def _answer(task: AnswerTask, teller: Teller) -> None:
     from blast_env.evaluation.assessment import assess
     from blast_env.evaluation.capacity import capacity
 
-    scenario, engine = task.site, task.engine.gas
+    scenario, engine = task.site, GasEngine.with_cells(task.cells)
     charges = [each.charge for each in task.threats]
     layouts: dict[str, Layout] = {"no barrier": ()}
     if task.layout:
@@ -195,7 +158,7 @@ def _answer(task: AnswerTask, teller: Teller) -> None:
         parts = capacity(evaluator, layouts, charges, teller.share).answer()
     else:
         site = asked_site(scenario, task.level)
-        coarse = BlastEvaluator(site, task.search_engine.gas, cache=task.cache)
+        coarse = BlastEvaluator(site, engine.coarser or engine, cache=task.cache)
         judge = AdviceJudge(
             DesignProblem(coarse, LoadCaseSet(site, task.threats)),
             BlastEvaluator(site, engine, cache=task.cache),

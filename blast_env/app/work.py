@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, TypeAdapter
 
-from blast_env.app.records import MOST_BYTES, EngineRecord, Kept, write_kept
+from blast_env.app.records import MOST_BYTES, Kept, write_kept
 from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase
 from blast_env.evaluation.answers import AnswerTable
+from blast_env.gas.settings import Cells
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
 
@@ -64,43 +65,28 @@ class BlastTask(LayoutTask):
     """Blasts of one layout, one per threat.
 
     Attributes:
-        engine: The engine.
+        cells: The cells.
         blasts: Folder for the blasts, each under its key.
     """
 
     kind: Literal["blast"] = "blast"
-    engine: EngineRecord
+    cells: Cells
     blasts: str
 
 
 class SearchTask(SiteTask):
-    """A search for a layout.
+    """A search for a layout, or a proposal without a blast.
 
     Attributes:
-        method: Name of the method.
-        budget: Most blasts.
-        engine: The engine.
-        begin_with: A layout to start from, for methods that can.
+        method: Name of the proposer.
+        budget: Most blasts; 0 for a proposer that runs none.
+        cells: The cells of the page; the search has cells twice as large.
     """
 
     kind: Literal["search"] = "search"
     method: str
     budget: int
-    engine: EngineRecord
-    begin_with: tuple[tuple[Any, ...], ...] = ()
-
-
-class ProposalTask(SiteTask):
-    """A proposal of a layout without a search budget.
-
-    Attributes:
-        proposer: Name of a rule, or the folder of a trained agent's run.
-        is_run: Whether it is a folder.
-    """
-
-    kind: Literal["proposal"] = "proposal"
-    proposer: str
-    is_run: bool = False
+    cells: Cells
 
 
 class Question(StrEnum):
@@ -123,7 +109,7 @@ class AnswerTask(LayoutTask):
     Attributes:
         question: The question.
         name: Name of the layout.
-        engine: The engine; a search of advice has its coarser cells.
+        cells: The cells; a search of advice has cells twice as large.
         target: Required level of protection.
         mass_error: Uncertainty of the masses; see `Uncertainty`.
         budget: Most blasts of a search of advice.
@@ -134,7 +120,7 @@ class AnswerTask(LayoutTask):
     question: Question
     subject: str
     name: str
-    engine: EngineRecord
+    cells: Cells
     target: int
     mass_error: float
     budget: int
@@ -143,11 +129,6 @@ class AnswerTask(LayoutTask):
     def level(self) -> LevelOfProtection:
         """The required level of protection."""
         return LevelOfProtection(self.target)
-
-    @property
-    def search_engine(self) -> EngineRecord:
-        """The engine of a search of advice."""
-        return self.engine.coarser or self.engine
 
 
 class Answer(Kept):
@@ -204,7 +185,7 @@ class ReportTask(LayoutTask):
 
 
 Task = Annotated[
-    BlastTask | SearchTask | ProposalTask | ReportTask | AnswerTask,
+    BlastTask | SearchTask | ReportTask | AnswerTask,
     Field(discriminator="kind"),
 ]
 

@@ -21,9 +21,6 @@ def page(
         help="Another name under which browsers reach the page, with a port or without; more than "
         "one will do.",
     ),
-    runs: list[Path] = typer.Option(
-        [], "--run", help="Run folder of a trained agent to ask; may be given again."
-    ),
 ) -> None:
     """Open a local web page to design on: draw a site, place barriers, blast, compare, search.
 
@@ -34,8 +31,6 @@ def page(
     from blast_env.app.guard import Entrance
     from blast_env.app.server import LOOPBACK, serve
 
-    for each in runs:
-        check_run(each)
     entrance = Entrance(host, port, tuple(more_names))
     if host not in LOOPBACK:
         message_console().print(
@@ -45,11 +40,4 @@ def page(
             style="yellow",
         )
     print_line(f"blast-env app: {entrance.printed}  (designs in {folder})")
-    serve(entrance, folder, tuple(runs))
-
-
-def check_run(folder: Path) -> None:
-    """Refuse a folder that is no run, before anything is started."""
-    from blast_agents.training.run_folder import RunFolder  # here, because it imports torch
-
-    RunFolder(folder).configuration()
+    serve(entrance, folder)

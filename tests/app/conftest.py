@@ -10,10 +10,9 @@ from tests.figures import undrawn_package as undrawn_package
 
 @pytest.fixture(scope="session", autouse=True)
 def short_films() -> Iterator[None]:
-    """Draw few frames, yet more than after which a film can begin."""
+    """Draw few frames."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(blasts, "FRAMES", 3)
-        patch.setattr(blasts, "_FIRST_FRAMES", 2)
         yield
 
 

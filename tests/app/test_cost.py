@@ -8,7 +8,7 @@ import pytest
 
 from blast_env.app.cost import CostGuess, ReportCost, cost_words, time_words
 from blast_env.app.folder import WorkFolder
-from blast_env.app.records import RECORD, EngineRecord
+from blast_env.app.records import RECORD
 from blast_env.app.session import Sessions
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
@@ -54,8 +54,6 @@ def test_only_what_is_not_there_is_counted(tmp_path: Path) -> None:
     (there / RECORD).touch()
     assert len(session.cost([0])) == 1
     assert len(session.cost_of_search(50)) == 50
-    session.engine = EngineRecord()
-    assert session.cost([0]) == session.cost_of_search(50) == ()
 
 
 def test_a_report_costs_its_blasts_and_its_parts_are_shares_of_that() -> None:

@@ -12,7 +12,6 @@ from blast_env.app.folder import WorkFolder
 from blast_env.app.jobs import Workers
 from blast_env.app.page.fields import change_of, fields_of, value_of
 from blast_env.app.plan import PixelView, overlay_svg, plan_svg
-from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
 from blast_env.app.solids import boxes
 from blast_env.app.sources import blank_site
@@ -71,7 +70,7 @@ def test_an_opened_design_has_its_engine_threats_and_view_again(tmp_path: Path) 
     session = Session.opened(created, work, Workers())
     first, second = (each.name for each in threats_of(session.scenario))
     assert session.engine.cell_m == 0.25
-    session.engine, session.view = EngineRecord(name="gas", cell_m=0.5), "Results"
+    session.cells, session.view = 0.5, "Results"
     for chosen in ((second,), (first,)):
         session.threats = chosen
         session.keep()

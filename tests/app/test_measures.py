@@ -10,7 +10,6 @@ from nicegui.testing import User
 from blast_env.app import edits, placing
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
-from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session, Sessions
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation.consequences import consequences
@@ -46,7 +45,7 @@ def blasted(tmp_path_factory: pytest.TempPathFactory) -> Session:
     """The hut behind a wall, blasted by gas."""
     folder = WorkFolder(tmp_path_factory.mktemp("measures"))
     session = Sessions(folder, Here()).new(hardened_hut(), "begin")
-    session.engine = EngineRecord(name="gas", cell_m=0.5)
+    session.cells = 0.5
     session.put("wall", session.design.with_layout(WALL))
     session.blast([0])
     return session

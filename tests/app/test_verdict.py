@@ -9,7 +9,7 @@ from nicegui.testing import User
 
 from blast_env.app.jobs import Workers
 from blast_env.app.placing import plain
-from blast_env.app.records import EngineRecord, write_kept
+from blast_env.app.records import write_kept
 from blast_env.app.session import Session, Sessions
 from blast_env.app.work import ANSWER, Answer, Question, read_status
 from blast_env.design.search import advised
@@ -25,7 +25,6 @@ from tests.gas_sites import WALL, glazed_hut, hut
 from tests.site.test_hardening import glazed_yard
 
 LOW = LevelOfProtection.LOW
-COARSE = EngineRecord(name="gas", cell_m=0.5)
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +35,6 @@ def _few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def hut_with_wall(folder: Path) -> Session:
     session = session_on(folder, glazed_hut())
-    session.engine = COARSE
     session.put("wall", session.design.with_layout(WALL))
     return session
 
@@ -48,7 +46,7 @@ def test_the_page_assesses_as_the_command_does(tmp_path: Path) -> None:
     found = assessment.assess(
         *(session.scenario, {"no barrier": (), "layout A": WALL}),
         [each.charge for each in session.chosen_threats()],
-        COARSE.gas,
+        session.engine,
         cache=session.work.cache,  # no blast runs again
     )
     assert answer.parts == tuple(found.answer(LOW, 0.2))
@@ -61,7 +59,6 @@ def test_the_page_assesses_as_the_command_does(tmp_path: Path) -> None:
 
 def test_advice_can_be_used(tmp_path: Path) -> None:
     session = session_on(tmp_path, glazed_yard(charges="mean"))
-    session.engine = COARSE
     status = read_status(session.ask(Question.ADVISE, LOW, 0.1, 1))
     assert (status.state, status.text[:5]) == ("done", "Walls")
     ((answer, _),) = session.answers()
@@ -72,24 +69,21 @@ def test_advice_can_be_used(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("site", "engine", "question", "mass_error", "reason"),
+    ("site", "question", "mass_error", "reason"),
     [
-        (glazed_hut(), EngineRecord(), Question.ASSESS, 0.1, "particles give no level"),
-        (hut(), COARSE, Question.ASSESS, 0.1, "Give structures windows"),
-        (glazed_hut(), COARSE, Question.CAPACITY, 0.5, "mass is 0.5, must be at most 0.3"),
-        (glazed_hut(), COARSE, Question.ADVISE, 0.1, "the build zone has no budget"),
+        (hut(), Question.ASSESS, 0.1, "Give structures windows"),
+        (glazed_hut(), Question.CAPACITY, 0.5, "mass is 0.5, must be at most 0.3"),
+        (glazed_hut(), Question.ADVISE, 0.1, "the build zone has no budget"),
     ],
 )
 def test_a_question_without_an_answer_says_why(
     tmp_path: Path,
     site: Scenario,
-    engine: EngineRecord,
     question: Question,
     mass_error: float,
     reason: str,
 ) -> None:
     session = session_on(tmp_path, site)
-    session.engine = engine
     with pytest.raises(BlastEnvError, match=reason):
         session.ask(question, LOW, mass_error, 5)
     assert session.jobs() == []

@@ -55,7 +55,7 @@ def test_strangers_and_other_pages_get_nothing(entrance: Entrance) -> None:
     own = {"Host": f"localhost:{entrance.port}", "Origin": entrance.url}
     cookie = {"Cookie": f"{entrance.cookie}={entrance.token}"}
     websocket = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
-    for path in ("/", "/player.js", websocket):
+    for path in ("/", "/design/none", websocket):
         for headers in (
             own,
             own | {"Cookie": f"{entrance.cookie}=wrong"},
@@ -66,4 +66,4 @@ def test_strangers_and_other_pages_get_nothing(entrance: Entrance) -> None:
             status, said = answer(entrance, path, headers)
             assert status == 403, (path, headers)
             assert {name: said[name] for name in HEADERS} == dict(HEADERS)
-    assert answer(entrance, "/player.js", own | cookie)[0] == 200
+    assert answer(entrance, "/", own | cookie)[0] == 200

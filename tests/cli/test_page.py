@@ -60,9 +60,3 @@ def test_a_folder_that_is_open_elsewhere_is_a_message(tmp_path: Path) -> None:
         code, text = run("--port", str(free), "--folder", str(tmp_path))
     assert code == 2
     assert "is open already at http://127.0.0.1:1" in text
-
-
-def test_what_is_no_run_is_refused_before_anything_is_served(tmp_path: Path) -> None:
-    code, text = run("--run", str(tmp_path), "--folder", str(tmp_path / "designs"))
-    assert code == 2
-    assert str(tmp_path) in text.replace("\n", "")

@@ -24,7 +24,6 @@ from blast_env.design.search import (
 from blast_env.design.search.registry import ProposerRow
 from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError
-from blast_env.site.scene import Charge
 from blast_env.values import generator
 from tests.benchmark.row import RowEngine
 from tests.design.corner import fill_from_the_corner
@@ -104,16 +103,15 @@ def test_both_are_methods_of_the_benchmark(tmp_path: Path) -> None:
 
 def test_the_page_offers_both() -> None:
     offered = offers.offered(hut())
-    assert offered["rule corner"] == "rule: from the corner"
-    assert offered["search one_after_another"] == "search: one after another"
-    charge = Charge((2.0, 4.0), 5.0)
-    expected = fill_from_the_corner(hut(), charge)
-    assert offers.proposed("corner", hut(), [charge]) == (expected, "")
+    assert offered["corner"] == "rule: from the corner"
+    assert offered["one_after_another"] == "search: one after another"
+    assert offers.runs_blasts("one_after_another")
+    assert not offers.runs_blasts("corner")
 
 
 def test_what_lacks_something_is_not_offered_and_refused_by_name(site: Path) -> None:
     name = "ring_around_building"
-    assert f"rule {name}" not in offers.offered(hut())
+    assert name not in offers.offered(hut())
     result = CliRunner().invoke(app, ["search", "--scenario", str(site), "--method", name])
     assert result.exit_code == 2
     assert (

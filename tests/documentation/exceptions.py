@@ -69,14 +69,12 @@ GIVEN: Final = (
     Given(("docs/howto/report.md",), "site.toml", "site.toml", _SITE),
     Given(("docs/howto/report.md",), "layout.json", "wall/layout.json", _SITE),
     Given(("docs/engineers/gas.md",), "my_site.toml", "scenarios/courtyard.toml"),
-    Given(
-        ("docs/howto/app.md", "docs/researchers/benchmark.md"), "runs/courtyard", "agent", _AGENT
-    ),
+    Given(("docs/researchers/benchmark.md",), "runs/courtyard", "agent", _AGENT),
 )
 
 SERVERS: Final = {
     "blast-env app": Server(8080),
-    "blast-env app --port 8090 --folder designs --run runs/courtyard": Server(8090),
+    "blast-env app --port 8090 --folder designs": Server(8090),
     "tensorboard --logdir runs/courtyard/tensorboard": Server(6006),
 }
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.app.records import BlastRecord, EngineRecord, comparison
+from blast_env.app.records import Blasted, BlastRecord, comparison
 from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.gas.oblique_walls import stepped_buildings
@@ -99,14 +99,14 @@ def test_the_page(hall: Scenario, result: GasResult, load_pa_s: float) -> None:
     record = BlastRecord(
         key="",
         threat="T1",
-        engine=EngineRecord(),
+        cells=0.5,
         layout=(),
         loads=result.structure_loads,
         unchecked=(),
         seconds=0.0,
         repeat={},
     )
-    table = comparison([("no barrier", 0.0, record)], {"T1": record}, hall)
+    table = comparison([Blasted("no barrier", 0.0, {"T1": record})], ["T1"], hall)
     together, building = rows_of(table)
     assert building.structure == "hall"
     for row in (together, building):

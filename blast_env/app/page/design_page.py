@@ -1,7 +1,6 @@
 """The page of one design."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 from nicegui import ui
 
@@ -24,10 +23,9 @@ class DesignPage:
 
     Args:
         session: The design.
-        runs: Run folders of trained agents.
     """
 
-    def __init__(self, session: Session, runs: Sequence[Path]) -> None:
+    def __init__(self, session: Session) -> None:
         self.session = session
         self.editor = Editor(session)
         self._header()
@@ -55,7 +53,7 @@ class DesignPage:
                     with ui.tab_panel("Results").classes("p-0"):
                         self._results = ResultsView(session)
             self._tabs.on_value_change(lambda event: self._keep_view(event.value))
-            self._work = WorkPanel(self.editor, self.refresh, self.show_results, runs)
+            self._work = WorkPanel(self.editor, self.refresh, self.show_results)
         ui.context.client.on_delete(session.listen(self.refresh))
         self.refresh()
         ui.timer(_PERIOD_S, self._follow)

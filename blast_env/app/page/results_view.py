@@ -1,4 +1,4 @@
-"""Results beside each other: films, maps, walls, gauges, and the table."""
+"""Results beside each other: pictures, verdicts and the table of loads."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,41 +7,28 @@ from typing import Any, Final
 from nicegui import ui
 
 from blast_env.app.page.tables import cells, columns_of, text_table
-from blast_env.app.records import TOGETHER, BlastRecord, frames_in
+from blast_env.app.records import TOGETHER, BlastRecord
 from blast_env.app.session import BARE, Session, Shown
 from blast_env.evaluation import LoadCase
 
 _FILM: Final = "film"
-_GAUGES: Final = "gauges"
 _NOTHING: Final = "No results yet for the current layouts: press Blast."
 _RUNNING: Final = "Running: the panel Work shows the progress."
 _DAMAGE: Final = "damage of "
-# Okabe and Ito, with dashes, so that colour is not the only difference between lines.
-_LINES: Final = (
-    ("#000000", "solid"),
-    ("#0072B2", "solid"),
-    ("#D55E00", "dashed"),
-    ("#009E73", "dotted"),
-    ("#CC79A7", "dashed"),
-)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A blast with at least a part of its results.
+    """A blast with its pictures.
 
     Attributes:
         shown: The layout.
-        record: Its record; `None` while it runs.
-        frames: Number of frames of its film written so far.
-        film: Address of its film.
+        record: Its record.
         pictures: Addresses of its pictures, by their labels.
     """
 
     shown: Shown
-    record: BlastRecord | None
-    frames: int
-    film: str
+    record: BlastRecord
     pictures: Mapping[str, str]
 
 
@@ -81,12 +68,10 @@ class ResultsView:
                 "The level rests on peaks corrected for clipping by the cells. Where the level on "
                 "the cells is higher, use smaller cells."
             ).classes("be-quiet mb-2")
-            self._bar = ui.html(_BAR, sanitize=False).classes("w-full")
             self._cards = ui.element("div").classes("be-cards")
-            self._chart = ui.column().classes("w-full")
             self._unglazed = ui.label(
                 "For damage of windows and walls, give structures windows or wall panels (on the "
-                "left), and blast with gas dynamics."
+                "left), and blast."
             ).classes("be-quiet")
             self._table = text_table().classes("mt-2")
             self._errors = ui.label(
@@ -109,17 +94,15 @@ class ResultsView:
             self._threat = next(iter(threats))
         self._threats.set_options([*threats], value=self._threat)
         threat = threats[self._threat]
-        there = [
-            (each, frames_in(session.folder.blast_of(each.key))) for each in session.shown(threat)
-        ]
+        shown = session.shown(threat)
         running = session.is_at_work
         options = (self._what, self._threat, self._with_bare, self._large, running)
         blasts = session.folder.blasts_there(), session.folder.coarse_there()
-        state = (options, session.engine, there, tuple(threats), blasts, session.scenario)
+        state = (options, session.cells, shown, tuple(threats), blasts, session.scenario)
         if state == self._state:
             return
         self._state = state
-        found = [*self._found(there, threat)]
+        found = [*self._found(shown, threat)]
         compared, verdicts = session.comparison(), session.verdicts()
         at = next((k for k, each in enumerate(compared.headers) if "counts" in each), None)
         self._loads = {
@@ -127,10 +110,8 @@ class ResultsView:
             for row in compared.rows
             if row[2] == TOGETHER
         }
-        records = [each.record for each in found if each.record is not None]
         self._offer(found)
         self._show_cards([each for each in found if self._with_bare or each.shown.name != BARE])
-        self._show_chart(threat)
         self._sharp.visible = any("on the cells" in row[3] for row in verdicts.rows)
         self._unglazed.visible = bool(found) and not verdicts.rows
         for element, table, after in ((self._verdicts, verdicts, 0), (self._table, compared, 2)):
@@ -140,14 +121,14 @@ class ResultsView:
         self._errors.visible = any("\N{PLUS-MINUS SIGN}" in row[3] for row in compared.rows)
         self._empty.visible = not found
         self._empty.text = _RUNNING if running else _NOTHING
-        self._show_notes(records)
+        self._show_notes([each.record for each in found])
 
-    def _found(self, there: Sequence[tuple[Shown, int]], threat: LoadCase) -> Iterator[_Found]:
-        """Yield every blast with a record or frames, with the addresses of its pictures."""
+    def _found(self, shown: Sequence[Shown], threat: LoadCase) -> Iterator[_Found]:
+        """Yield every blast that is complete, with the addresses of its pictures."""
         session = self._session
-        for each, frames in there:
+        for each in shown:
             record = session.folder.record_of(each.key)
-            if record is None and not frames:
+            if record is None:
                 continue
             where = f"{session.folder.design_id}/{each.key}"
             damage = {
@@ -155,22 +136,17 @@ class ResultsView:
                 + session.damage_picture(each, number)
                 for number, verdict in enumerate(session.judged(each, threat))
             }
-            pictures = () if record is None else record.pictures
-            others = {own.label: f"/blasts/{where}/{own.file}" for own in pictures}
-            yield _Found(each, record, frames, f"/blasts/{where}/", damage | others)
+            others = {own.label: f"/blasts/{where}/{own.file}" for own in record.pictures}
+            yield _Found(each, record, others | damage)
 
     def _offer(self, found: Sequence[_Found]) -> None:
-        labels = dict.fromkeys(label for each in found for label in each.pictures)
-        gauges = [_GAUGES] if any(each.record and each.record.waves for each in found) else []
-        options = [_FILM, *labels, *gauges]
+        options = [*dict.fromkeys(label for each in found for label in each.pictures)] or [_FILM]
         if self._what not in options:
-            self._what = _FILM
+            self._what = options[0]
         self._pictures.set_options(options, value=self._what)
 
     def _show_cards(self, found: Sequence[_Found]) -> None:
         self._cards.clear()
-        self._bar.visible = self._what == _FILM and bool(found)
-        self._cards.visible = self._what != _GAUGES
         wide = self._what.startswith(_DAMAGE) or " on the walls of " in self._what
         columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
@@ -186,81 +162,21 @@ class ResultsView:
                 ui.label(title).style("font-weight: 600; white-space: nowrap")
                 ui.space()
                 ui.label(self._summary(name, found.record)).classes("be-quiet")
-            if self._what == _FILM:
-                if found.frames:
-                    image = ui.element("img")
-                    image.props(
-                        f'data-film="{found.film}" data-count={found.frames} alt="film, {title}"'
-                    )
-                else:
-                    ui.label("the film begins in a moment").classes("be-quiet")
-                return
             address = found.pictures.get(self._what)
             if address is None:
                 ui.label("not drawn yet").classes("be-quiet")
             else:
                 ui.element("img").props(f'src="{address}" alt="{self._what}, {title}"')
 
-    def _summary(self, name: str, record: BlastRecord | None) -> str:
-        if record is None or not record.loads:
-            return "" if record is not None else "loads not yet available"
+    def _summary(self, name: str, record: BlastRecord) -> str:
         noun = self._session.scenario.objective.noun
         noun = "mean impulse on protected facades" if noun == "impulse" else noun
         parts = sum(each.protected for each in self._session.scenario.structures)
         added = f" ({parts} structures, weighted)" if parts > 1 else ""
         return f"{noun}: {self._loads[name, record.threat]}{added}"
 
-    def _show_chart(self, threat: LoadCase) -> None:
-        self._chart.clear()
-        self._chart.visible = self._what == _GAUGES
-        if self._what != _GAUGES:
-            return
-        waves = self._session.waves(threat)
-        names = dict.fromkeys(wave.gauge for _, record in waves for wave in record.waves)
-        with self._chart:
-            for gauge in names:
-                ui.echart(_chart(gauge, waves)).classes("w-full").style("height: 300px")
-
     def _show_notes(self, records: list[BlastRecord]) -> None:
         self._notes.clear()
         with self._notes:
             for note in dict.fromkeys(note for each in records for note in each.notes):
                 ui.label(f"note: {note}").classes("be-quiet")
-
-
-def _chart(gauge: str, waves: Any) -> dict[str, Any]:
-    """Return the histories of all layouts at a gauge, in one diagram."""
-    series = []
-    for (name, record), (colour, dash) in zip(waves, _LINES, strict=False):
-        for wave in record.waves:
-            if wave.gauge == gauge:
-                points = [
-                    list(each) for each in zip(wave.time_ms, wave.overpressure_kpa, strict=True)
-                ]
-                series.append(
-                    {
-                        "name": f"{name}: {wave.peak_kpa:.3g} kPa, {wave.impulse_pa_s:.3g} Pa s",
-                        "type": "line",
-                        "showSymbol": False,
-                        "data": points,
-                        "lineStyle": {"color": colour, "type": dash, "width": 2},
-                        "itemStyle": {"color": colour},
-                    }
-                )
-    return {
-        "animation": False,
-        "title": {"text": f"gauge {gauge}", "left": 0, "textStyle": {"fontSize": 14}},
-        "legend": {"top": 28},
-        "grid": {"left": 60, "right": 20, "top": 74, "bottom": 46},
-        "tooltip": {"trigger": "axis"},
-        "xAxis": {"type": "value", "name": "time (ms)", "nameLocation": "middle", "nameGap": 28},
-        "yAxis": {"type": "value", "name": "overpressure (kPa)"},
-        "series": series,
-    }
-
-
-_BAR: Final = (
-    '<div class="be-film-bar"><button type="button" data-film-play>play</button>'
-    '<input type="range" min="0" max="47" value="0" step="1" data-film-slider'
-    ' aria-label="moment of all films"></div>'
-)

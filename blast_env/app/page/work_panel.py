@@ -14,36 +14,22 @@ from blast_env.app import placing
 from blast_env.app.cost import cost_words, time_words
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
-from blast_env.app.offers import offered
+from blast_env.app.offers import offered, runs_blasts
 from blast_env.app.page.numbers import NumberField
-from blast_env.app.records import EngineRecord
 from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.errors import BlastEnvError
+from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.site import Scenario
 
-_ENGINES: Final = {
-    "gas 0.25": (
-        EngineRecord(name="gas", cell_m=0.25),
-        "gas, cells of 0.25 m: final results, with the error of the cells",
-    ),
-    "gas fine": (
-        EngineRecord(name="gas", cells="fine"),
-        "gas, fine growing cells: the same on sites of 40 m and more",
-    ),
-    "gas 0.5": (
-        EngineRecord(name="gas", cell_m=0.5),
-        "gas, cells of 0.5 m: a look in a tenth of the time",
-    ),
-    "gas coarse": (
-        EngineRecord(name="gas", cells="coarse"),
-        "gas, coarse growing cells: the same on sites of 40 m and more",
-    ),
-    "particles": (EngineRecord(name="event"), "particles: a first look"),
+_CELLS: Final[dict[Cells, str]] = {
+    0.25: "cells of 0.25 m: final results, with the error of the cells",
+    "fine": "fine growing cells: the same on sites of 40 m and more",
+    0.5: "cells of 0.5 m: a look in a tenth of the time",
+    "coarse": "coarse growing cells: the same on sites of 40 m and more",
 }
-"""The engines on offer, gas dynamics first."""
 _SHOWN_JOBS: Final = 8
 _STATES: Final = {
     "waiting": ("hourglass_empty", "waiting"),
@@ -107,7 +93,6 @@ class WorkPanel:
         editor: The editor of the design.
         after: Called after the panel has changed something.
         results: Called to show the results.
-        runs: Run folders of trained agents, by name.
     """
 
     def __init__(
@@ -115,12 +100,10 @@ class WorkPanel:
         editor: Editor,
         after: Callable[[], None],
         results: Callable[[], None],
-        runs: Sequence[Path],
     ) -> None:
         self._editor = editor
         self._after = after
         self._results = results
-        self._runs = {each.name: each for each in runs}
         self._filling = False
         self._cards: list[_Card] | None = None
         self._refusal: ui.notification | None = None
@@ -170,16 +153,13 @@ class WorkPanel:
             one.props("dense no-caps color=red-9").mark("blast")
             every = ui.button("all", on_click=self.blast_all).props("dense outline no-caps")
             every.tooltip("blast every layout that is not empty")
-        self._engine = ui.select(
-            {name: words for name, (_, words) in _ENGINES.items()},
-            value="gas 0.25",
-            label="engine",
-            on_change=lambda e: self._use(e.value),
+        self._cells = ui.select(
+            _CELLS, value=0.25, label="gas dynamics", on_change=lambda e: self._use(e.value)
         )
         self._threats = ui.select(
             [], label="threats", multiple=True, on_change=lambda e: self._against(e.value)
         )
-        for element in (self._engine, self._threats):
+        for element in (self._cells, self._threats):
             element.props("dense outlined options-dense").classes("w-full be-whole")
         self._cost = ui.label().classes("be-quiet").props('aria-live="polite"')
 
@@ -195,9 +175,7 @@ class WorkPanel:
             self._proposer.props("dense outlined options-dense").classes("grow be-whole")
             self._budget = NumberField("blasts", 50, whole=True, least=1)
             self._budget.classes("w-20")
-        self._budget.bind_enabled_from(
-            self._proposer, "value", lambda value: str(value).startswith("search")
-        )
+        self._budget.bind_enabled_from(self._proposer, "value", runs_blasts)
         self._search_cost = ui.label().classes("be-quiet")
         for element in (self._proposer, self._budget):
             element.on_value_change(lambda: self._say_cost_of_search())
@@ -245,10 +223,10 @@ class WorkPanel:
             self._measures_shown = None  # its switch is wrong: draw it again
             self._after()
 
-    def _use(self, name: str) -> None:
+    def _use(self, cells: Cells) -> None:
         if self._filling:
             return
-        self._session.engine = _ENGINES[name][0]
+        self._session.cells = cells
         self._try(self._session.keep)
         self._after()
 
@@ -274,14 +252,8 @@ class WorkPanel:
 
     def propose(self) -> None:
         """Start the chosen proposer or search."""
-        kind, _, name = str(self._proposer.value).partition(" ")
-        session = self._session
-        if kind == "search":
-            self._try(lambda: session.search(name, int(self._budget.filled), from_layout=False))
-        elif kind == "run":
-            self._try(lambda: session.propose(str(self._runs[name]), is_run=True))
-        else:
-            self._try(lambda: session.propose(name))
+        name, session = str(self._proposer.value), self._session
+        self._try(lambda: session.search(name, int(self._budget.filled)))
         self.follow()
 
     def _take(self, status: Status) -> None:
@@ -335,8 +307,7 @@ class WorkPanel:
         self._offer_proposals(design.scenario)
         known = [each.name for each in threats_of(design.scenario)]
         self._threats.set_options(known, value=list(session.threats))
-        engine = session.engine
-        self._engine.value = next(name for name, (each, _) in _ENGINES.items() if each == engine)
+        self._cells.value = session.cells
         self._filling = False
         self._say_cost()
         self._say_cost_of_search()
@@ -344,7 +315,6 @@ class WorkPanel:
     def _say_cost(self) -> None:
         session = self._session
         self._there = self._files_there
-        self._cost.visible = not session.engine.is_first_look
         slots = [session.design.active]
         costs = session.cost(slots)
         self._cost.text = cost_words([*costs, *session.cost_of_error(slots)], drawn=len(costs))
@@ -356,7 +326,7 @@ class WorkPanel:
 
     def _say_cost_of_search(self) -> None:
         costs = []
-        if str(self._proposer.value).startswith("search"):
+        if runs_blasts(self._proposer.value):
             with suppress(BlastEnvError):  # the field shows the error
                 costs = [*self._session.cost_of_search(int(self._budget.filled))]
         self._search_cost.visible = bool(costs)
@@ -380,8 +350,8 @@ class WorkPanel:
                 switch.props("dense").classes("text-sm").tooltip(each.words)
 
     def _offer_proposals(self, scenario: Scenario) -> None:
-        """Offer rules, agents and searches for a site; keep the choice if it is still offered."""
-        offers = {**offered(scenario, self._runs)}
+        """Offer rules and searches for a site; keep the choice if it is still offered."""
+        offers = {**offered(scenario)}
         chosen = self._proposer.value
         value = chosen if chosen in offers else next(iter(offers), None)
         self._proposer.set_options(offers, value=value)

@@ -202,9 +202,9 @@ class Page:
         ActionChains(self.driver).send_keys(*keys).perform()
         sleep(0.15)
 
-    def film_widths(self) -> list[int]:
-        """Return how wide the frames are that are shown; 0 for one that is still to come."""
-        return [each.get_property("naturalWidth") for each in self.all("img[data-film]")]
+    def picture_widths(self) -> list[int]:
+        """Return how wide the pictures are that are shown; 0 for one that is still to come."""
+        return [each.get_property("naturalWidth") for each in self.all(".be-card img")]
 
     def shoot(self, name: str) -> None:
         PICTURES.mkdir(parents=True, exist_ok=True)
@@ -257,7 +257,7 @@ WALL_NEAR = [(13.25, 16.25 + 0.5 * k) for k in range(8)]
 WALL_FAR = [(20.25, 16.25 + 0.5 * k) for k in range(8)]
 
 
-def test_place_blast_and_compare_by_particles(page: Page) -> None:
+def test_place_blast_and_compare(page: Page) -> None:
     courtyard = load_scenario("courtyard")
     page.open()
     page.shoot("start")
@@ -272,21 +272,11 @@ def test_place_blast_and_compare_by_particles(page: Page) -> None:
     page.drag(courtyard, *WALL_FAR)
     page.sees("8 of 16 modules")
 
-    page.choose("engine", "particles: a first look")
+    page.choose("gas dynamics", "cells of 0.5 m")
     page.button("all").click()
-    page.until(lambda: len(page.all("img[data-film]")) == 3)
+    page.until(lambda: page.picture_widths() == [640, 640, 640], 1800.0)
     page.until(lambda: len(page.all(".q-table tbody tr")) == 6)
-    if "pause" in page.text():
-        page.all("[data-film-play]")[0].click()
-    slider = page.all("input[data-film-slider]")[0]
-    page.driver.execute_script(
-        "arguments[0].value = 14; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))",
-        slider,
-    )
-    page.until(lambda: page.film_widths() == [640, 640, 640])
-    frames = {each.get_attribute("src").rpartition("/")[2] for each in page.all("img[data-film]")}
-    assert frames == {"014.jpg"}  # all films at the same moment
-    page.shoot("results_particles")
+    page.shoot("results")
     assert not page.faults()
 
 
@@ -334,35 +324,6 @@ def test_the_view_in_3d_is_drawn_only_while_it_is_seen(page: Page) -> None:
     page.until(lambda: drawn() > hidden + 3)
 
 
-FILM_CLOCK = """
-window.filmSeconds = null;
-document.addEventListener("click", () => { window.pressedMs = performance.now(); }, true);
-document.addEventListener("load", (event) => {
-  if (event.target.matches("img[data-film]"))
-    window.filmSeconds ??= (performance.now() - window.pressedMs) / 1000;
-}, true);
-"""
-
-
-def test_a_film_of_particles_comes_soon(page: Page) -> None:
-    """From *Blast* to the first frame that is seen, by the browser's clock; it is written down."""
-    lines = []
-    for name in ("visitor_entrance", "courtyard"):
-        page.begin(name)
-        page.choose("engine", "particles: a first look")
-        page.choose("by", "rule: wall near the building")
-        page.button("Propose").click()
-        page.button("use it").click()
-        page.sees("last: proposal")
-        page.driver.execute_script(FILM_CLOCK)
-        page.button("Blast").click()
-        seconds = page.until(lambda: page.driver.execute_script("return window.filmSeconds"))
-        lines.append(f"{name}: {seconds:.2f} s from Blast to the film\n")
-        assert seconds < 15.0  # with two quiet cores about 1 s; here anything may run beside
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    (PICTURES / "film_seconds.txt").write_text("".join(lines))
-
-
 def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -> None:
     site = high_courtyard()
     save_scenario(site, tmp_path / "courtyard_high.toml")
@@ -387,16 +348,9 @@ def test_gas_with_heights_from_a_file_of_one_s_own(page: Page, tmp_path: Path) -
     sleep(4.0)
     page.shoot("gas_running")
     page.until(lambda: len(page.all(".q-table tbody tr")) == 4, 1800.0)
-    sleep(1.0)
-    page.all("[data-film-play]")[0].click()
-    slider = page.all("input[data-film-slider]")[0]
-    page.driver.execute_script(
-        "arguments[0].value = 20; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))",
-        slider,
-    )
-    page.until(lambda: page.film_widths() == [640, 640])
+    page.until(lambda: page.picture_widths() == [640, 640])
     page.shoot("results_gas_film")
-    for number, picture in enumerate(("peak over", "impulse on the walls", "gauges")):
+    for number, picture in enumerate(("peak over", "impulse on the walls", "gauge door")):
         page.choose("picture", picture)
         sleep(1.5)
         page.shoot(("results_gas_map", "results_gas_walls", "results_gas_gauges")[number])
@@ -433,7 +387,7 @@ def test_numbers_are_read_as_they_are_meant_or_refused(page: Page) -> None:
 def test_search_stop_keep_save_and_lose_nothing(page: Page, server: Server, tmp_path: Path) -> None:
     page.begin("courtyard")
     address = page.driver.current_url.removeprefix(server.url)
-    page.choose("engine", "particles: a first look")
+    page.choose("gas dynamics", "cells of 0.5 m")
     page.choose("by", "search: random")
     budget = next(
         each for each in page.all("input[inputmode=numeric]") if each.get_attribute("value") == "50"
@@ -580,7 +534,7 @@ def test_from_a_public_extract_to_the_verdict(page: Page) -> None:
     page.button("Screening").click()
     page.sees("worst place of each threat by damage", 300.0)
     reached("stand-offs")
-    page.choose("engine", "gas, coarse growing cells")
+    page.choose("gas dynamics", "coarse growing cells")
     page.button("Propose").click()
     page.sees("proposed by the package", 900.0)
     page.button("use it").click()
@@ -662,13 +616,13 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     page.shoot("large_plan")
     reached("a layout by rule")
     page.sees("4 blasts of gas: about")  # two layouts; each on two sizes of cells
-    page.choose("engine", "gas, coarse growing cells")
+    page.choose("gas dynamics", "coarse growing cells")
     page.sees("2 blasts of gas: about")
     page.button("Blast").click()
     page.until(lambda: re.search(r", [\d.]+ (s|min) left", page.text()), 300.0)
     page.shoot("large_running")
     page.until(lambda: len(verdicts()) == 2, 1800.0)
-    page.until(lambda: page.film_widths() == [640, 640])
+    page.until(lambda: page.picture_widths() == [640, 640])
     page.shoot("large_verdict")
     reached("the verdict of gas dynamics, without and with the layout")
     before = verdicts()
@@ -676,7 +630,7 @@ def test_the_road_of_an_engineer_on_a_site_of_100_m(page: Page, tmp_path: Path) 
     page.until(lambda: len(verdicts()) == 2 and verdicts()[1] != before[1])
     assert verdicts()[0] == before[0]
     page.choose("picture", "damage of")
-    page.until(lambda: [each.get_property("naturalWidth") > 0 for each in page.all(".be-card img")])
+    page.until(lambda: all(page.picture_widths()))
     sleep(3.0)
     page.shoot("large_damage")
     reached("the verdict with better glass, without a blast")
@@ -721,7 +675,7 @@ def test_a_site_too_large_for_gas_is_told_and_kept(page: Page, tmp_path: Path) -
 def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.begin("courtyard")
     address = page.driver.current_url
-    page.choose("engine", "particles: a first look")
+    page.choose("gas dynamics", "cells of 0.5 m")
     page.choose("by", "search: random")
     page.button("Propose").click()
     page.sees("search", 120.0)
@@ -732,7 +686,7 @@ def test_a_closed_tab_leaves_its_work_running(page: Page) -> None:
     page.driver.switch_to.window(second)
     sleep(2.0)
     page.driver.get(address)
-    page.sees("of 50 (particles", 300.0)
+    page.sees("of 50 (gas", 1800.0)
     page.button("use it").click()
     page.sees("16 of 16 modules")
 
