@@ -11,10 +11,9 @@ parameter to fit:
   t^(1/(D + 1)) of Jabeen, Rajesh and Ray, Europhys. Lett. 89 (2010) 34001, for D = 2.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -102,85 +101,42 @@ class FrontCase:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class FrontTrace:
-    """What a front did.
+class Front(NamedTuple):
+    """The front at some times: each field an array (n,).
 
     Attributes:
-        time_s: Times (n,).
-        radius: Where the air is densest, spacings (n,).
-        law: What the law says, spacings (n,).
-        compression: Density there over that of the air before (n,).
+        radius: Of the place where the air is densest, spacings.
+        compression: Density there over that of the air before.
+        momentum: Sum of all momenta outwards.
     """
 
-    time_s: FloatArray
     radius: FloatArray
-    law: FloatArray
     compression: FloatArray
+    momentum: FloatArray
 
-    @property
-    def exponent(self) -> float:
-        """Of the power of the time that fits the radii best."""
-        return float(np.polyfit(np.log(self.time_s), np.log(self.radius), 1)[0])
-
-    @property
-    def ratio(self) -> float:
-        """Geometric mean of simulated over predicted radii."""
-        return float(np.exp(np.log(self.radius / self.law).mean()))
+    def exponent(self, time_s: FloatArray) -> float:
+        """Return that of the power of the time that fits the radii best."""
+        return float(np.polyfit(np.log(time_s), np.log(self.radius), 1)[0])
 
 
-def elastic_front(case: FrontCase, radii_spacings: Sequence[float], seed: int) -> FrontTrace:
-    """Run an elastic case; look where the front is when the law says it is at certain radii.
-
-    Args:
-        case: The case; its restitution is 1.
-        radii_spacings: Radii by the law for a gas, spacings.
-        seed: Draws the air.
-    """
-    law = np.asarray(radii_spacings, dtype=np.float64)
-    time_s = (law * SPACING_UNITS) ** 2 * (SEDOV_GAS * AIR_DENSITY / case.energy) ** 0.5
-    run = EventEngine().start(case.scene(seed))
-    peaks = []
+def front_at(case: FrontCase, time_s: FloatArray) -> Front:
+    """Run a case, with air drawn by seed 0, and look at the front at these times."""
+    run = EventEngine().start(case.scene(0))
+    found = []
     for end_s in time_s.tolist():
         run.advance(end_s)
-        peaks.append(density_peak(run.balls(), run.scene))
-    radius, compression = np.array(peaks).T
-    return FrontTrace(time_s, radius, law, compression)
+        found.append(_front_of(run.balls(), run.scene))
+    return Front(*np.array(found).T)
 
 
-def inelastic_front(case: FrontCase, radii_spacings: Sequence[float], seed: int) -> FrontTrace:
-    """Run an inelastic case; `law` is with the radial momentum that there is at each time.
-
-    That is not quite the charge's: as long as the swept air is hot, its pressure adds to it.
-    """
-    momentum = case.ball_count * case.speed_units_per_s
-    volume = (np.asarray(radii_spacings) * SPACING_UNITS) ** 3 * pi * AIR_DENSITY / 3.0
-    time_s: FloatArray = volume / momentum
-    run = EventEngine().start(case.scene(seed))
-    peaks, law = [], []
-    for end_s in time_s.tolist():
-        run.advance(end_s)
-        balls = run.balls()
-        peaks.append(density_peak(balls, run.scene))
-        momentum = radial_momentum(balls, run.scene)
-        law.append((3.0 * momentum * end_s / (pi * AIR_DENSITY)) ** (1.0 / 3.0) / SPACING_UNITS)
-    radius, compression = np.array(peaks).T
-    return FrontTrace(time_s, radius, np.array(law), compression)
-
-
-def density_peak(balls: BallStates, scene: Scene) -> tuple[float, float]:
-    """Return where the mass per area is highest, spacings, and how high above the air's."""
-    distance = np.hypot(*(balls.position - scene.charge_centre).T) / SPACING_UNITS
+def _front_of(balls: BallStates, scene: Scene) -> tuple[float, float, float]:
+    from_centre = balls.position - scene.charge_centre
+    distance = np.hypot(*from_centre.T)
     outermost = 0.5 * (scene.site.right - scene.site.left) / SPACING_UNITS
     edges = np.exp(np.arange(np.log(_INNERMOST_SPACINGS), np.log(outermost), _BIN))
-    mass, _ = np.histogram(distance, edges, weights=balls.mass)
+    mass, _ = np.histogram(distance / SPACING_UNITS, edges, weights=balls.mass)
     density = gaussian_filter1d(mass / (pi * np.diff(edges**2)), _SMOOTHING / _BIN)
     place = int(density.argmax())
-    return float((edges[place] * edges[place + 1]) ** 0.5), float(density[place])
-
-
-def radial_momentum(balls: BallStates, scene: Scene) -> float:
-    """Return the sum of the momenta outwards."""
-    from_centre = balls.position - scene.charge_centre
-    outwards = (balls.velocity * from_centre).sum(axis=1) / np.hypot(*from_centre.T)
-    return float((balls.mass * outwards).sum())
+    outwards = (balls.velocity * from_centre).sum(axis=1) / distance
+    momentum = float((balls.mass * outwards).sum())
+    return float((edges[place] * edges[place + 1]) ** 0.5), float(density[place]), momentum

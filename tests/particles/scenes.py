@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from blast_env.evaluation.engines import ParticleEngine
 from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
+from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.particles.run import BallStates, BlastRun
 from blast_env.site.balls import Balls, CollisionType
 from blast_env.site.parameters import SimulationParameters, with_overrides
@@ -147,3 +148,8 @@ def hot_cloud(
         structures,
         settings,
     )
+
+
+def step_s(run: BlastRun) -> float:
+    """Return how far behind an event the engine may notice it."""
+    return run.time_step_s if isinstance(run, PymunkRun) else 1e-12

@@ -155,22 +155,6 @@ def test_at_a_corner_the_normal_goes_through_the_centre(share: float, radius: fl
     assert run.balls().velocity[0] == pytest.approx(velocity, abs=1e3 * rounding)
 
 
-@pytest.mark.parametrize("y", [91.7, 91.999, 92.0, 92.001, 95.0, 99.99, 100.0, 107.95, 109.999])
-@pytest.mark.parametrize("across", [0.0, 250.0])
-def test_a_seam_is_no_corner(y: float, across: float) -> None:
-    """No ghost hit: one hit, the normal exactly along x, in the module at the contact point."""
-    radius = 1.0
-    wait = (100.0 - radius - 90.0) / 400.0
-    start = balls([AIR], [(90.0, y - across * wait)], [(400.0, across)], 1.0, radius)
-    run = EVENT.start(scene(start, [FACADE], rules(1.0, 0.5)))
-    run.advance(0.03)
-    (hit,) = run.log.to_array()
-    assert (hit["normal_x"], hit["normal_y"]) == (-1.0, 0.0)
-    assert run.balls().velocity.tolist() == [[-200.0, across]]
-    at_seam = y % 2.0 == 0.0
-    assert hit["module"] in ((int(y - 90.0) // 2 - at_seam), int(y - 90.0) // 2)
-
-
 def test_a_ball_that_slides_along_a_wall_meets_no_seam() -> None:
     """In touch from end to end, corners included, but pressed on by nothing: no hit at all."""
     start = balls([AIR], [(99.0, 85.0)], [(0.0, 300.0)])

@@ -13,8 +13,6 @@ from tests.particles.scenes import (
     EXPLOSIVE,
     KEEP_MASS,
     balls,
-    closed_box,
-    hot_cloud,
     parameters,
     scene,
     states_at,
@@ -35,13 +33,6 @@ def settings(coefficient: float, inertia_factor: float = 0.5) -> SimulationParam
     }
     contact = {"module_restitution": RESTITUTION, "module_friction": sqrt(coefficient)}
     return parameters(explosive=of_ball, air=of_ball, contact=KEEP_MASS | contact)
-
-
-def test_without_friction_nothing_ever_spins() -> None:
-    box = closed_box((58.0, 66.0), (24, 18))
-    after = WorldRun(hot_cloud(settings(0.0), box)).balls_at(0.2)
-    assert after["collisions"].sum() > 4000
-    assert (after["spin"] == 0.0).all()
 
 
 @pytest.mark.parametrize("along", [0.0, 123.456789, -1e-7, 3e4])

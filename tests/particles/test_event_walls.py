@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
-from blast_env.particles.event.state import walls_of
 from blast_env.site.scene import Scene, StructureOutline
 from tests.particles.scenes import EVENT, EXPLOSIVE, KEEP_MASS, balls, parameters, scene, wall
 
@@ -167,31 +166,6 @@ def test_first_hits_on_a_solid_block_and_in_a_yard() -> None:
     centred = 100.0 + rng.uniform(-1.0, 1.0, (RAYS, 2)) * (6.0 - radius[:, None]) * 0.99
     of_balls = replace(inside.balls, position=centred, radius=radius)
     assert check_first_hits(replace(inside, balls=of_balls)) == RAYS
-
-
-def test_a_wall_is_one_face_however_many_modules() -> None:
-    """A block has four faces and four corners, whatever the number of modules; their modules are
-    those of its rim, in order.
-    """
-    centres = np.array([(2.0 * x, 2.0 * y) for y in range(5) for x in range(7)])
-    surfaces, modules = walls_of(centres, np.arange(35))
-    assert len(surfaces) == 8
-    counts = (surfaces["modules_to"] - surfaces["modules_from"]).tolist()
-    assert counts == [5, 5, 7, 7, 1, 1, 1, 1]
-    rim = modules.tolist()
-    assert rim[:5] == [0, 7, 14, 21, 28]
-    assert rim[5:10] == [6, 13, 20, 27, 34]
-    assert rim[10:17] == [0, 1, 2, 3, 4, 5, 6]
-    assert rim[17:24] == [28, 29, 30, 31, 32, 33, 34]
-    assert rim[24:] == [0, 6, 28, 34]
-
-
-def test_modules_that_do_not_stand_are_not_there() -> None:
-    centres = np.array([(0.0, 0.0), (2.0, 0.0), (4.0, 0.0)])
-    surfaces, modules = walls_of(centres, np.array([0, 2]))
-    assert len(surfaces) == 16
-    assert sorted(set(modules.tolist())) == [0, 2]
-    assert len(walls_of(centres, np.array([], dtype=np.int64)).surfaces) == 0
 
 
 @pytest.mark.parametrize("seed", range(4))

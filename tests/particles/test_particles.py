@@ -17,12 +17,14 @@ def kinetic_energy(balls: Balls) -> float:
     return float(0.5 * (balls.mass * (balls.velocity**2).sum(axis=1)).sum())
 
 
-def test_without_a_thermal_share_every_ball_flies_straight_out() -> None:
-    balls = fan(ExplosiveParameters(ball_count=36))
+def test_every_ball_flies_straight_out_in_its_own_direction() -> None:
+    balls = fan(ExplosiveParameters(ball_count=720))
     outwards = balls.position - (50.0, 60.0)
-    across = balls.velocity[:, 0] * outwards[:, 1] - balls.velocity[:, 1] * outwards[:, 0]
-    assert across == pytest.approx(0.0, abs=1e-9)
-    assert np.hypot(*balls.velocity.T) == pytest.approx(2000.0)
+    assert np.hypot(*outwards.T) == pytest.approx(KEPT.offset_units)
+    assert balls.velocity == pytest.approx(2000.0 / KEPT.offset_units * outwards)
+    angle = np.sort(np.arctan2(*balls.velocity.T[::-1]))
+    assert np.diff(angle) == pytest.approx(2.0 * np.pi / 720)
+    assert balls.mass == pytest.approx(KEPT.mass)
 
 
 @pytest.mark.parametrize("share", [0.25, 0.75, 1.0])

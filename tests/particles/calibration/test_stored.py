@@ -14,13 +14,11 @@ from blast_env.evaluation.engines import CALIBRATED_ENGINES
 from blast_env.geometry import Rectangle
 from blast_env.particles.calibration.free_field import (
     FreeFieldStudy,
-    calibrate,
     free_field,
     kingery_bulmash_reference,
     paper_reference,
 )
 from blast_env.particles.calibration.model import (
-    Calibration,
     CalibrationError,
     calibrated_engines,
     load_calibration,
@@ -33,27 +31,10 @@ from blast_env.site.parameters import preset, with_overrides
 from tests.scenarios import BALLISTIC_COURTYARD
 
 CALIBRATION = load_calibration("ballistic_kb_100kg")
-SLOW = (("collisional", "pymunk"), ("collisional_fine", "event"))
-"""Presets and engines with which a blast takes seconds."""
-BY_KIND = {
-    (load_calibration(name, engine).preset, engine): (name, engine)
-    for name in stored_calibrations()
-    for engine in calibrated_engines(name)
-}
 of_every_engine = pytest.mark.parametrize("engine", CALIBRATED_ENGINES)
 of_every_calibration = pytest.mark.parametrize(
     ("name", "engine"),
     [(name, engine) for name in stored_calibrations() for engine in calibrated_engines(name)],
-)
-
-of_every_collisional = pytest.mark.parametrize(
-    ("name", "engine"),
-    [
-        (name, engine)
-        for name in stored_calibrations()
-        if name.startswith("collisional")
-        for engine in calibrated_engines(name)
-    ],
 )
 
 
@@ -67,9 +48,11 @@ def test_the_ballistic_preset_meets_its_bounds_on_held_out_seeds() -> None:
     assert ufc.distances_m == tuple(15.0 * n for n in range(1, 9))
 
 
-@of_every_collisional
+@of_every_calibration
 def test_the_collisional_preset_meets_its_bounds_on_held_out_seeds(name: str, engine: str) -> None:
     """An exponent far from 1 would mean that the law hides a wrong decay."""
+    if not name.startswith("collisional"):
+        return
     stored = load_calibration(name, engine)
     assert stored.metrics.mape_percent <= 6.0
     assert stored.metrics.integral_error_percent <= 1.5
@@ -80,7 +63,9 @@ def test_the_collisional_preset_meets_its_bounds_on_held_out_seeds(name: str, en
 
 
 @of_every_calibration
-def test_stored_metrics_follow_from_the_stored_columns(name: str, engine: str) -> None:
+def test_every_engine_has_its_own_calibration_whose_metrics_follow_from_its_columns(
+    name: str, engine: str
+) -> None:
     stored = load_calibration(name, engine)
     i_sim, reference = np.array(stored.i_sim), np.array(stored.i_reference_psi_s)
     exponent, intercept = np.polyfit(np.log(i_sim), np.log(reference), 1)
@@ -89,15 +74,10 @@ def test_stored_metrics_follow_from_the_stored_columns(name: str, engine: str) -
     assert pytest.approx((np.exp(intercept), exponent)) == (law.A, law.B)
     mape = 100.0 * np.mean(np.abs(law(i_sim) / reference - 1.0))
     assert stored.metrics.mape_percent == pytest.approx(mape)
-    for key, (low, high) in stored.coefficient_intervals.items():
-        assert low < stored.coefficients[key] < high
-
-
-@of_every_calibration
-def test_every_engine_has_its_own_calibration(name: str, engine: str) -> None:
-    stored = load_calibration(name, engine)
     assert (stored.name, stored.engine) == (name, engine)
     stored.check(preset(stored.preset), engine)
+    for key, (low, high) in stored.coefficient_intervals.items():
+        assert low < stored.coefficients[key] < high
 
 
 def test_settings_of_the_other_engine_do_not_matter() -> None:
@@ -208,27 +188,21 @@ def test_the_width_is_the_one_that_the_charge_sees() -> None:
     assert seen_width_m(building, (17.0, 10.0)) == pytest.approx((10.0 + 4.0) / np.sqrt(2.0))
 
 
-def test_saving_and_loading_round_trips(tmp_path: Path) -> None:
+def test_saving_and_loading_round_trips_and_damage_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     save_calibration(CALIBRATION, path)
     assert load_calibration(path) == CALIBRATION
-
-
-def damage(content: dict) -> dict[str, str]:
-    return {
-        "was edited": json.dumps(content | {"facade_width_m": 99.0}),
-        "the checksum does not match": json.dumps({}),
-    }
-
-
-@pytest.mark.parametrize("words", list(damage({})))
-def test_damaged_files_are_refused(words: str, tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    save_calibration(CALIBRATION, path)
-    path.write_text(damage(json.loads(path.read_text()))[words])
-    with pytest.raises(CalibrationError, match=words) as caught:
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"facade_width_m": 99.0}))
+    with pytest.raises(CalibrationError, match=r"mine\.json: .*was edited"):
         load_calibration(path)
-    assert "mine.json" in str(caught.value)
+    path.write_text(json.dumps({}))
+    with pytest.raises(CalibrationError, match=r"mine\.json: .*the checksum does not match"):
+        load_calibration(path)
+    with pytest.raises(CalibrationError, match="there is no such file"):
+        load_calibration(tmp_path / "none.json")
+    with pytest.raises(UnknownNameError, match="did you mean 'ballistic_ufc'"):
+        load_calibration("balistic_ufc")
 
 
 @pytest.mark.parametrize(
@@ -250,13 +224,6 @@ def test_values_that_do_not_fit_are_refused(changes: dict, words: str, tmp_path:
         load_calibration(path)
 
 
-def test_missing_files_and_names_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(CalibrationError, match="there is no such file"):
-        load_calibration(tmp_path / "none.json")
-    with pytest.raises(UnknownNameError, match="did you mean 'ballistic_ufc'"):
-        load_calibration("balistic_ufc")
-
-
 def test_references_refuse_distances_that_they_do_not_have() -> None:
     with pytest.raises(BlastEnvError, match="no value at 20 m"):
         paper_reference((15.0, 20.0))
@@ -264,22 +231,13 @@ def test_references_refuse_distances_that_they_do_not_have() -> None:
         kingery_bulmash_reference((0.1,), 100.0)
 
 
-def test_calibrating_gives_a_calibration_that_converts_its_own_runs() -> None:
-    scenario = load_scenario("free_field").with_simulation(
-        overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}
-    )
-    study = FreeFieldStudy(scenario, (8.0, 11.0, 15.0, 20.0), (1, 2, 3), "event")
-    report = calibrate(study, study.run(), kingery_bulmash_reference(study.distances_m, 100.0))
-    stored: Calibration = report.calibration("small")
-    stored.check(scenario.parameters, "event")
-    row = report.table().iloc[1]
-    converted = stored.convert(row.i_sim, stored.facade_width_m, 11.0, 100.0)
-    assert converted.psi_s == pytest.approx(row.power_psi_s)
-    assert converted.in_range
-
-
 @pytest.mark.parametrize(
-    ("name", "engine"), [pair for kind, pair in BY_KIND.items() if kind not in SLOW]
+    ("name", "engine"),
+    [
+        ("ballistic_ufc", "pymunk"),
+        ("ballistic_ufc", "event"),
+        ("collisional_kb_20kg", "event"),
+    ],
 )
 def test_the_simulator_still_gives_what_the_calibration_was_made_from(
     name: str, engine: str

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from blast_env.evaluation.engines.particles import PymunkEngine
 from blast_env.geometry import Rectangle
 from blast_env.site.balls import Balls, air_lattice, explosion_fan
 from blast_env.site.scene import Scene
@@ -82,6 +83,13 @@ def test_a_turned_blast_is_the_same_blast(turn: Turn, contact: dict[str, object]
     assert (before.index == after.index).all()
     assert (turn.points(before.position) == after.position + 0.0).all()
     assert (turn.points(before.velocity) == after.velocity + 0.0).all()
+
+
+def test_a_mirrored_blast_loads_modules_alike_in_steps() -> None:
+    air: dict[str, object] = {"spacing_units": 8.0}
+    plain, mirrored = (finished(blast(t, air, {}), PymunkEngine()) for t in (None, TURNS[0]))
+    assert plain.obstacles[0].hits + plain.obstacles[5].hits > 0
+    assert [o.impulse for o in plain.obstacles] == [o.impulse for o in mirrored.obstacles]
 
 
 @pytest.mark.parametrize("turn", TURNS, ids=lambda turn: turn.name)

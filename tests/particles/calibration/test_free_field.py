@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
@@ -9,7 +10,15 @@ from scipy import stats
 from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.particles.calibration import free_field as study_module
-from blast_env.particles.calibration.free_field import FreeFieldStudy, impulse_by_seed, summarise
+from blast_env.particles.calibration.free_field import (
+    CalibrationReport,
+    FreeFieldStudy,
+    calibrate,
+    impulse_by_seed,
+    kingery_bulmash_reference,
+    summarise,
+)
+from blast_env.plots.calibration_figures import calibration_figure
 from blast_env.store import Store
 
 SMALL = load_scenario("free_field").with_simulation(
@@ -101,3 +110,36 @@ def test_bad_studies_are_refused(
 ) -> None:
     with pytest.raises(BlastEnvError, match=words):
         FreeFieldStudy(SMALL, distances, seeds)
+
+
+@pytest.fixture(scope="module")
+def report() -> CalibrationReport:
+    scenario = load_scenario("free_field").with_simulation(
+        overrides={"explosive": {"ball_count": 180}, "stepping": {"time_limit_s": 0.12}}
+    )
+    study = FreeFieldStudy(scenario, (8.0, 11.0, 15.0, 20.0), (1, 2, 3), "event")
+    return calibrate(study, study.run(), kingery_bulmash_reference(study.distances_m, 100.0))
+
+
+def test_a_calibration_converts_the_runs_it_was_made_of(report: CalibrationReport) -> None:
+    stored = report.calibration("small")
+    stored.check(report.study.scenario.parameters, "event")
+    row = report.table().iloc[1]
+    converted = stored.convert(row.i_sim, stored.facade_width_m, 11.0, 100.0)
+    assert converted.psi_s == pytest.approx(row.power_psi_s)
+    assert converted.in_range
+
+
+def test_a_calibration_figure_draws_means_laws_and_residuals(report: CalibrationReport) -> None:
+    simulated, scaled, in_pa_s, residuals = calibration_figure(report, "small").axes
+    means = np.asarray(simulated.lines[0].get_ydata())
+    assert means == pytest.approx(report.summary.i_sim.to_numpy())
+    assert scaled.get_ylabel() == "impulse (psi·s)"
+    assert in_pa_s.get_ylabel() == "impulse (Pa·s)"
+    assert in_pa_s.get_ylim()[0] == pytest.approx(6894.757 * scaled.get_ylim()[0])
+    legend = scaled.get_legend()
+    assert legend is not None
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert f"power: MAPE {report.metrics['power'].mape_percent:.1f} %" in texts
+    power = np.asarray(residuals.lines[2].get_ydata())
+    assert power == pytest.approx(report.table().power_error_percent.to_numpy())
