@@ -107,3 +107,15 @@ def play(env: gym.Env, seed: int, policy_seed: int = 0, **options: Any) -> list[
 def same(first: Any, second: Any) -> bool:
     """Whether two things that an environment gave are equal to the last bit."""
     return data_equivalence(first, second, exact=True)
+
+
+def watch(env: gym.Env, seed: int, **options: object) -> tuple[list, list[float], dict]:
+    """Return the observations, the rewards and the last information of an episode of a blast."""
+    observation, info = env.reset(seed=seed, options=options)
+    observations, rewards, ended = [observation], [], False
+    while not ended:
+        observation, reward, ended, truncated, info = env.step(0)
+        assert not truncated
+        observations.append(observation)
+        rewards.append(float(reward))
+    return observations, rewards, info

@@ -1,4 +1,4 @@
-"""Action spaces that choose step by step: the same layouts and rewards as place by place."""
+"""Action spaces and masks: a choice is offered exactly if it can be taken."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ import pytest
 from blast_env.envs.actions import ACTIONS, ActionChoice, ItemThenPlace, NumberedActions
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.envs.observations import GridObservation
-from blast_env.errors import BlastEnvError
+from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.geometry import Element, Layout
-from blast_env.layout import LayoutState
-from blast_env.site import Scenario
+from blast_env.layout import LayoutState, check_layout
+from blast_env.site import BuildZone, Scenario, bundled_scenarios, load_scenario
 from tests.catalogue_sites import WALL, yard
-from tests.envs.small import make, same, small_scenario
+from tests.envs.small import make, restricted_scenario, same, small_scenario
 from tests.evaluation.engines.shade import ShadeEngine
 from tests.site.test_hardening import glazed_yard
 
@@ -57,12 +57,8 @@ def test_there_are_as_many_actions_as_items_and_places() -> None:
     assert yard_env(action="item_then_place").action_space == gym.spaces.Discrete(4 + 84 + 1)
     zone = yard().zone.model_copy(update={"rows": 112, "columns": 43})
     large = yard().model_copy(update={"build_zone": zone})
-    assert [NumberedActions.of(each, large).finish for each in ACTIONS.values()] == [
-        4 * 4816,
-        4 + 4816,
-        4 + 14 * 6 + 64,
-        4 * 43,
-    ]
+    counts = [4 * 4816, 4 + 4816, 4 + 14 * 6 + 64, 4 * 43]
+    assert [numbered(name, large).finish for name in ACTIONS] == counts
     # Without a catalogue there is no item to choose, and 8 x 5 cells are one block.
     assert [numbered(name, small_scenario()).finish for name in ACTIONS] == [40, 40, 40, 5]
 
@@ -145,16 +141,6 @@ def test_observations_show_what_is_still_possible() -> None:
     in_block, *_ = env.step(4)
     assert 0.0 < in_block[legal[2]].sum() < chosen[legal[2]].sum()
     assert (in_block[channels.index("free")] == in_block[legal[2]]).all()
-
-
-def test_a_measure_needs_no_place() -> None:
-    scenario = glazed_yard()
-    actions = numbered("item_then_block", scenario)
-    catalogue, placement = scenario.zone.catalogue, LayoutState.empty(scenario)
-    measure = next(i for i, each in enumerate(catalogue.variants) if each.is_measure)
-    assert actions.narrowed(ActionChoice(placement.legal), measure) == catalogue.element_at(
-        measure, 0, 0
-    )
 
 
 def test_a_strategy_of_ones_own_is_taken_and_a_wrong_one_is_told() -> None:
@@ -281,3 +267,103 @@ def test_block_and_cell_mean_the_nearest_ones() -> None:
     env.step(1)
     env.step(4 + 9)  # taken: the cell below, before the equally near ones
     assert env.placement.layout == ((1, 9), (0, 9))
+
+
+# --- A cell is offered exactly if a module may be placed on it.
+
+
+SCENARIOS = {
+    "small": small_scenario(),
+    "restricted": restricted_scenario(),
+    **{
+        name: scenario
+        for name in bundled_scenarios()
+        if (scenario := load_scenario(name)).build_zone is not None and not scenario.zone.items
+    },
+}
+EPISODES = 5
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_an_action_is_legal_exactly_if_the_layout_with_it_is_accepted(name: str) -> None:
+    """Hundreds of states; in each, some cells are tried that are legal and some that are not.
+
+    Whether a layout is accepted is for `check_layout` to say, which looks at it as a whole.
+    """
+    scenario = SCENARIOS[name]
+    env = make(scenario, invalid_action="penalty", invalid_action_limit=1000)
+    rng = np.random.default_rng(0)
+    states = 0
+    for episode in range(EPISODES):
+        _, info = env.reset(seed=episode)
+        ended = False
+        while not ended:
+            mask = env.action_masks()
+            assert (mask == info["action_mask"]).all()
+            assert mask[-1]
+            layout = env.placement.cells
+            for action in _some_of_each(mask[:-1], rng):
+                cell = divmod(action, _zone(scenario).columns)
+                _check(env.explain(cell), mask[action])
+                assert _is_accepted(scenario, (*layout, cell)) == mask[action]
+            if not mask.all():
+                _, _, ended, _, info = env.step(rng.choice(np.flatnonzero(~mask)))
+                assert not ended
+                assert env.placement.cells == layout
+            states += 1
+            if len(layout) + 1 == _zone(scenario).stock:
+                break  # the next module would set off the charge, which costs time
+            action = rng.choice(np.flatnonzero(mask[:-1]))
+            _, _, ended, _, info = env.step(action)
+            assert env.placement.cells == (*layout, divmod(action, _zone(scenario).columns))
+    assert states >= EPISODES * min(3, _zone(scenario).stock)
+
+
+def _check(reason: str | None, is_legal: bool) -> None:
+    assert (reason is None) == is_legal
+    if reason is not None:
+        assert len(reason) > 20
+
+
+def _some_of_each(mask: np.ndarray, rng: np.random.Generator) -> list[int]:
+    """Return an action that is legal and one that is not, where there are such."""
+    kinds = (np.flatnonzero(mask), np.flatnonzero(~mask))
+    return [int(rng.choice(kind)) for kind in kinds if len(kind)]
+
+
+def _zone(scenario: Scenario) -> BuildZone:
+    assert scenario.build_zone is not None
+    return scenario.build_zone
+
+
+def _is_accepted(scenario: Scenario, layout: tuple) -> bool:
+    try:
+        check_layout(scenario, layout)
+    except LayoutError:
+        return False
+    return True
+
+
+def test_finishing_stays_legal_when_the_stock_is_not_used_up_but_no_cell_is_left() -> None:
+    # A budget for two modules, though there are three: the second one ends the episode.
+    env = make(small_scenario(budget=2.0))
+    env.reset(seed=0)
+    _, _, ended, _, _ = env.step(0)
+    assert not ended
+    assert env.step(1)[2]
+    assert env.placement.stock_left == 1
+    assert env.placement.is_full
+
+
+def test_the_mask_of_the_information_is_what_a_space_samples_with() -> None:
+    env = make(restricted_scenario())
+    _, info = env.reset(seed=0)
+    assert env.action_masks().dtype == np.bool_  # as MaskablePPO wants it
+    assert info["action_mask"].dtype == np.int8
+    env.action_space.seed(0)
+    sampled = {int(env.action_space.sample(mask=info["action_mask"])) for _ in range(500)}
+    assert sampled < set(np.flatnonzero(env.action_masks()))
+    assert len(sampled) > 50
+    _, _, _, _, info = env.step(min(sampled))
+    assert info["action_mask"].dtype == np.int8
+    assert env.action_space.sample(mask=info["action_mask"]) != min(sampled)

@@ -1,4 +1,8 @@
-"""Episodes of the barrier environment: actions, rewards, information, options."""
+"""Episodes of the barrier environment: actions, rewards, information, options, sites, memory."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -9,28 +13,25 @@ import blast_env
 from blast_env.envs.observations import Observable
 from blast_env.envs.strategies import Transition
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation import BlastStore, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
 from blast_env.units import PA_PER_PSI
-from tests.envs.small import ThinEngine, make, play, same, small_scenario
+from tests.envs.small import ThinEngine, make, play, same, small_document, small_scenario
+from tests.gas_sites import WALL, hut
 
 COLUMNS = 5
 FINISH = 8 * COLUMNS
 HYDRANT = 4 * COLUMNS  # a cell that is kept out
 
 
-def test_placing_the_stock_sets_off_the_charge() -> None:
+def test_placing_the_stock_or_finishing_sets_off_the_charge_with_what_stands() -> None:
     env = make()
     env.reset(seed=1)
-    ended = [env.step(cell)[2] for cell in (7, 8, 9)]
-    assert ended == [False, False, True]
+    assert [env.step(cell)[2] for cell in (7, 8, 9)] == [False, False, True]
     assert env.placement.cells == ((1, 2), (1, 3), (1, 4))
-
-
-def test_finishing_sets_off_the_charge_with_what_stands() -> None:
-    env = make()
     env.reset(seed=1)
     env.step(7)
     _, _, ended, truncated, info = env.step(FINISH)
@@ -160,15 +161,6 @@ def test_relative_rewards_add_up_to_the_reduction(threat: str) -> None:
     assert env.step(FINISH)[1] == 0.0  # no barrier, no reduction
 
 
-def test_who_finishes_at_once_pays_the_impulse_exactly() -> None:
-    for reward in ("terminal", "incremental"):
-        env = make(reward=reward)
-        env.reset(seed=1)
-        _, paid, ended, _, info = env.step(FINISH)
-        assert ended
-        assert paid == -info["impulse_psi_s"]
-
-
 def test_a_module_earns_what_it_takes_off_the_impulse() -> None:
     env = make(reward="incremental", invalid_action="penalty")
     env.reset(seed=1, options={"charge_position_m": (3.0, 9.0), "layout": [(0, 4)]})
@@ -228,7 +220,7 @@ class CountOfModules:
     """An observation of a user's: a number, and how it is made for an episode."""
 
     def space(self, scenario: Scenario) -> spaces.Box:
-        return spaces.Box(0.0, float(scenario.zone.stock), (1,), np.float32)
+        return spaces.Box(0.0, 1e6, (1,), np.float32)
 
     def episode(self, observable: Observable) -> "CountOfModules":
         assert len(observable.sources) == 1  # the charge is visible
@@ -333,3 +325,126 @@ def test_modules_keep_clear_of_a_charge_that_an_option_puts_into_the_zone() -> N
     assert "closer than the charge's radius" in str(env.explain((5, 2)))
     assert info["action_mask"].sum() > 20
     assert play(env, seed=1, charge_position_m=(8.0, 10.0))[-1][4]["impulse_psi_s"] > 0.0
+
+
+# --- Environments that draw a scenario at every reset.
+
+
+def site(shift: int) -> Scenario:
+    """Return a small site with its house somewhere else, and another stock."""
+    document = small_document(stock=2 + shift % 3)
+    document["structures"][1]["corner_m"] = (14.0, 5.0 + 0.5 * (shift % 8))
+    return Scenario.model_validate(document)
+
+
+@dataclass
+class Sites:
+    """Draws small sites, or always the one that is given."""
+
+    drawn: Scenario | None = None
+    representative: Scenario = field(default_factory=small_scenario)
+
+    def sample(self, rng: np.random.Generator) -> Scenario:
+        return self.drawn or site(int(rng.integers(1000)))
+
+
+def test_every_reset_draws_a_site_by_the_seed() -> None:
+    env, twin = make(Sites()), make(Sites())
+    hashes = []
+    for seed in range(6):
+        first, second = play(env, seed), play(twin, seed)
+        assert same(first, second)
+        hashes.append(first[-1][4]["scenario_hash"])
+        assert len(first[-1][4]["layout"]) == env.observable.scenario.zone.stock
+    assert len(set(hashes)) > 3
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"site": {"width_m": 20.0, "height_m": 18.0}}, r"site .* is \(20.0, 18.0\), must be"),
+        (
+            {"build_zone": small_document(rows=7)["build_zone"]},
+            r"build zone .* is \(7, 5\), must be \(8, 5\)",
+        ),
+        ({"build_zone": None}, "has no build zone"),
+    ],
+)
+def test_a_site_of_another_size_is_an_error(change: dict, words: str) -> None:
+    env = make(Sites(Scenario.model_validate(small_document() | change)))
+    with pytest.raises(BlastEnvError, match=words):
+        env.reset(seed=0)
+
+
+# --- What environments, evaluations and searches remember of each other's blasts.
+
+
+COUNTS = ("blasts", "cache_hits", "cache_hit_rate")
+
+
+def without_counts(steps: list[tuple]) -> tuple[list[tuple], dict[str, Any]]:
+    """Return the steps of an episode without the counts of blasts, and these."""
+    return steps, {name: steps[-1][4].pop(name) for name in COUNTS}
+
+
+def test_the_hit_rate_is_told() -> None:
+    env = make()
+    env.reset(seed=3)
+    first = env.step(FINISH)[4]  # the layout is the empty one: one blast, asked for once
+    assert {name: first[name] for name in COUNTS} == dict(zip(COUNTS, (1, 0, 0.0), strict=True))
+    env.reset(seed=3)
+    second = env.step(FINISH)[4]
+    assert {name: second[name] for name in COUNTS} == dict(zip(COUNTS, (1, 1, 0.5), strict=True))
+
+
+@pytest.mark.parametrize("kind", ["folder", "memory"])
+def test_a_second_environment_needs_no_blast_and_says_the_same(kind: str, tmp_path: Path) -> None:
+    cache = tmp_path / "blasts" if kind == "folder" else BlastStore(size=100)
+    unprotected, _ = without_counts(play(make(), seed=5))
+    first, first_counts = without_counts(play(make(cache=cache), seed=5))
+    second, second_counts = without_counts(play(make(cache=cache), seed=5))
+    assert same(unprotected, first)
+    assert same(first, second)
+    assert first_counts["cache_hit_rate"] == 0.0
+    assert (second_counts["blasts"], second_counts["cache_hit_rate"]) == (0, 1.0)
+
+
+def test_sites_that_the_memory_has_let_go_are_still_in_the_cache(tmp_path: Path) -> None:
+    env = make(Sites(), cache=tmp_path)
+    for seed in (*range(8), *range(8)):
+        env.reset(seed=seed)
+        info = env.step(FINISH)[4]
+    assert info["cache_hit_rate"] >= 0.5
+
+
+# --- The environment on gas dynamics: the same rules, one realisation, no calibration.
+
+
+HUT = hut()
+
+
+def on_gas(**options: Any) -> gym.Env:
+    return gym.make("BlastBarrierGas-v0", scenario=HUT, disable_env_checker=True, **options)
+
+
+def test_an_episode_pays_the_loads_of_gas_dynamics() -> None:
+    env = on_gas(render_mode="rgb_array")
+    env.reset(seed=0, options={"layout": WALL[:-1]})
+    zone = HUT.zone
+    _, reward, ended, _, info = env.step(WALL[-1][0] * zone.columns + WALL[-1][1])
+    assert ended
+    expected = evaluate_layout(HUT, WALL, [0], engine="gas", cell_m=0.5)
+    assert info["impulse_pa_s"] == pytest.approx(expected.impulse_pa_s.value)
+    assert info["reduction"] == pytest.approx(expected.mean_reduction)
+    assert reward == pytest.approx(-info["impulse_psi_s"])
+    assert info["calibration"] == "none"
+    assert "impulse_sim" not in info
+    assert info["blasts"] == 2
+    picture = env.render()
+    assert isinstance(picture, np.ndarray)
+    assert picture.ndim == 3
+
+
+def test_more_realisations_are_refused() -> None:
+    with pytest.raises(BlastEnvError, match="realisations is 2, must be 1: gas has no noise"):
+        on_gas(realisations=2)

@@ -1,6 +1,5 @@
 """Environments in one batch: the same episodes as single ones, to the last bit."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -9,28 +8,11 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from blast_env.design.surrogate.engine import SurrogateEngine
-from blast_env.envs.observations import Observable
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
-from blast_env.layout import LayoutState
-from blast_env.site import Scenario
 from tests.envs.small import ThinEngine, restricted_scenario, same, small_scenario
+from tests.envs.test_barrier_env import CountOfModules
 from tests.evaluation.engines.shade import ShadeEngine
-
-
-@dataclass(frozen=True)
-class OneNumber:
-    """An observation as a user writes one: the number of modules."""
-
-    def space(self, scenario: Scenario) -> gym.spaces.Box:
-        return gym.spaces.Box(0.0, 1e6, (1,), np.float32)
-
-    def episode(self, observable: Observable) -> "OneNumber":
-        return self
-
-    def observe(self, placement: LayoutState) -> np.ndarray:
-        return np.array([len(placement.layout)], dtype=np.float32)
-
 
 COUNTS = ("blasts", "cache_hits", "cache_hit_rate")
 """Of all environments together in a batch, of each one otherwise."""
@@ -94,7 +76,7 @@ def test_episodes_are_truncated_with_their_last_observation() -> None:
 
 def test_a_strategy_without_batches_and_sites_of_an_episode_each() -> None:
     """Observations of one's own are stacked; every episode has a site of its own."""
-    check_same(scenario="sites", observation=OneNumber(), engine=ShadeEngine(), least=1)
+    check_same(scenario="sites", observation=CountOfModules(), engine=ShadeEngine(), least=1)
 
 
 @pytest.mark.parametrize(
