@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.benchmark import DEFINITIONS, LayoutSpace, make
+from blast_env.benchmark import LayoutSpace, make
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Measure, Piece
 from blast_env.layout import LayoutState
@@ -81,9 +81,3 @@ def test_reasons_name_each_piece_that_cannot_stand() -> None:
     assert "is taken by" in reasons[0]
     assert "outside" in reasons[1]
     assert problem.check([]) == ()
-
-
-def test_every_problem_has_a_space() -> None:
-    for definition in DEFINITIONS.values():
-        if definition.site in SITES:
-            assert LayoutSpace(definition.scenario).keys % 3 == 0

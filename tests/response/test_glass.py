@@ -1,4 +1,4 @@
-"""Panes: E1300's loads, order of kinds and sizes, flight, and GSA's conditions."""
+"""Panes: E1300's loads, order of kinds and sizes, flight, GSA's conditions, the table of plates."""
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from blast_env.response.glass import (
     flight_condition,
     glazing_responses,
 )
+from blast_env.response.plate_table import plate_curve
 
 # Read by others from the charts of ASTM E1300, annealed, four sides held: least thickness (mm),
 # long and short side (m), non-factored load (kPa).
@@ -149,7 +150,9 @@ def test_a_broken_laminated_pane_pulls_at_its_frame() -> None:
     assert found.edge_force_n_m[0] >= 16_000.0
 
 
-def test_ratings_of_iso_go_with_the_conditions_of_gsa() -> None:
-    assert [each.words for each in GlazingCondition] == [
-        *("1, A", "2, B", "3a, D", "3b, E", "4, F", "5, F")
-    ]
+# --- The table of glass plates.
+
+
+def test_an_aspect_ratio_between_two_of_the_table() -> None:
+    low, between, high = (plate_curve(ratio).load for ratio in (1.5, 1.6, 1.75))
+    assert np.all((between - low) * (high - between) >= 0.0)

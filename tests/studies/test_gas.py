@@ -12,6 +12,7 @@ from blast_env.site import Scenario
 from studies.gas.cells import CellLoads, difference
 from studies.gas.corners import BlockGeometry, corner_waves
 from studies.gas.ending import ending, sites
+from studies.gas.judgement import Judgement
 from studies.gas.loads import impulse_until, yard
 from studies.gas.reference import free_field, wide_wall
 from tests.gas_sites import glazed_hut
@@ -97,3 +98,17 @@ def test_the_first_wave_is_weaker_behind_corners() -> None:
 def test_a_block_below_a_module_is_named() -> None:
     with pytest.raises(BlastEnvError, match=r"height_m is 0\.2, must be at least 0\.5"):
         corner_waves(0.5, 0.2)
+
+
+# --- What is said of two models' reductions: order, overstatement, regret.
+
+
+def test_order_overstatement_and_regret() -> None:
+    """Four layouts, two charges: the first charge is ordered alike, the second the other way."""
+    particle = np.array([[0.2, 0.8], [0.4, 0.6], [0.6, 0.4], [0.8, 0.2]])
+    gas = np.array([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3], [0.4, 0.4]])
+    found = Judgement(particle, gas)
+    assert found.means == pytest.approx((0.5, 0.25))
+    assert found.overstatement == pytest.approx(2.0)
+    assert found.regret.value == pytest.approx(0.5 * (0.0 + 0.3))
+    assert found.all_pairs == pytest.approx(0.0, abs=0.2)
