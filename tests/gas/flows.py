@@ -1,13 +1,15 @@
 """Small flows for the tests of the gas."""
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from blast_env.gas.faces import Faces, exposed_faces
 from blast_env.gas.grid import FaceKind, GasGrid
+from blast_env.gas.probes import FaceLoads
 from blast_env.gas.solver import GasSolver
 
 CLOSED: dict[str, Any] = dict.fromkeys(
@@ -15,6 +17,7 @@ CLOSED: dict[str, Any] = dict.fromkeys(
 )
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Kind = TypeVar("Kind")
 BLAST_PA = 5e7
 BLAST_KG_M3 = 50.0
 
@@ -54,19 +57,35 @@ def blast(
     *,
     radius: float = 2.5,
     cell_m: float = 0.5,
-    setup: Callable[[GasGrid], dict[str, Any]] | None = None,
+    loaded: Callable[[GasGrid], Faces] | None = None,
+    looking: Callable[[GasGrid, int], Sequence[Any]] | None = None,
     faces: dict[str, Any] | None = None,
     pressure_pa: float = BLAST_PA,
     density_kg_m3: float = BLAST_KG_M3,
     **options: Any,
 ) -> GasSolver:
-    """Return a solver with a hot ball in still air; lengths in cells."""
+    """Return a solver with a hot ball in still air; lengths in cells.
+
+    Args:
+        solid: Solid cells.
+        centre: Of the ball.
+        radius: Of the ball.
+        cell_m: Side of a cell.
+        loaded: Chooses the faces whose loads are wanted.
+        looking: Makes recorders for the grid and as many faces.
+        faces: Kinds of the grid's faces.
+        pressure_pa: Of the ball.
+        density_kg_m3: Of the ball.
+        options: Of the solver.
+    """
     grid = GasGrid(cell_m, solid, **(faces or {}))
     places = np.indices(solid.shape) + 0.5
     distance = np.sqrt(sum((places[k] - centre[k]) ** 2 for k in range(3)))
     hot = (distance < radius) & ~solid
-    if setup is not None:
-        options |= setup(grid)
+    if loaded is not None:
+        options["faces"] = loaded(grid)
+    if looking is not None:
+        options["recorders"] = looking(grid, len(options.get("faces", ())))
     solver = GasSolver(grid, **options)
     solver.set_state(
         density_kg_m3=np.where(hot, density_kg_m3, solver.density_kg_m3),
@@ -94,3 +113,19 @@ def check_nothing_is_lost(solver: GasSolver) -> None:
     assert solver.floored_cells == 0
     assert after.mass_kg == pytest.approx(before.mass_kg, rel=1e-12)
     assert after.energy_j == pytest.approx(before.energy_j, rel=1e-12)
+
+
+def all_faces(grid: GasGrid) -> Faces:
+    """Return the faces of all solid cells."""
+    return exposed_faces(grid, grid.solid)
+
+
+def face_loads(_: GasGrid, faces: int) -> list[FaceLoads]:
+    """Return a recorder of the loads on faces."""
+    return [FaceLoads(faces)]
+
+
+def recorder(solver: GasSolver, kind: type[Kind]) -> Kind:
+    """Return the recorder of this kind."""
+    (found,) = (each for each in solver.recorders if isinstance(each, kind))
+    return found

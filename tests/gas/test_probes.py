@@ -1,7 +1,5 @@
 """Loads on faces, gauges, maps and pictures."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -21,7 +19,7 @@ from blast_env.gas.probes import (
     Snapshots,
     positive_phases,
 )
-from tests.gas.flows import blast, street
+from tests.gas.flows import all_faces, blast, face_loads, recorder, street
 
 STEP_S = 1e-3
 HISTORY_PA = np.array([0.0, 50.0, 250.0, 400.0, 100.0, -50.0, -20.0, 30.0, 500.0, 0.0])
@@ -121,18 +119,16 @@ def test_faces_are_loaded_from_their_own_side() -> None:
         np.moveaxis(solid, axis, 0)[12] = True
         centre = [10.5, 10.5, 10.5]
         centre[axis] = 6.5
-        recorders: list[FaceLoads] = []
-
-        def setup(grid: GasGrid, recorders: list[FaceLoads] = recorders) -> dict[str, Any]:
-            faces = exposed_faces(grid, grid.solid)
-            recorders.append(FaceLoads(len(faces)))
-            return {"faces": faces, "recorders": recorders}
-
         solver = blast(
-            solid, (centre[0], centre[1], centre[2]), setup=setup, faces={"z_low": FaceKind.OPEN}
+            solid,
+            (centre[0], centre[1], centre[2]),
+            loaded=all_faces,
+            looking=face_loads,
+            faces={"z_low": FaceKind.OPEN},
         )
         solver.advance(0.01)
-        load = recorders[0].impulse_pa_s
+        loads = recorder(solver, FaceLoads)
+        load = loads.impulse_pa_s
         near = solver.faces.side == -1
         assert (load[near] > 0.0).all()
         assert (load[~near] == 0.0).all()
@@ -145,19 +141,15 @@ def test_faces_are_loaded_from_their_own_side() -> None:
 
 def test_patches_keep_the_mean_history_of_their_faces() -> None:
     """Their running impulse is the mean of the faces', and a patch without a face is refused."""
-    made: list[FaceLoads | PatchHistories] = []
 
-    def setup(grid: GasGrid) -> dict[str, Any]:
-        faces = exposed_faces(grid, grid.solid)
+    def looking(grid: GasGrid, count: int) -> tuple[FaceLoads, PatchHistories]:
+        faces = all_faces(grid)
         patch = np.where(faces.axis == 2, -1, faces.side > 0)
-        made.extend((FaceLoads(len(faces)), PatchHistories(patch, 2)))
-        return {"faces": faces, "recorders": made}
+        return FaceLoads(count), PatchHistories(patch, 2)
 
-    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver = blast(street(), (6, 9, 0), loaded=all_faces, looking=looking)
     solver.advance(0.03)
-    loads, patches = made
-    assert isinstance(loads, FaceLoads)
-    assert isinstance(patches, PatchHistories)
+    loads, patches = recorder(solver, FaceLoads), recorder(solver, PatchHistories)
     assert patches.history_pa.shape == (2, solver.steps)
     assert (np.diff(patches.time_s) > 0.0).all()
     whole = loads.net_impulse_pa_s
@@ -169,15 +161,13 @@ def test_patches_keep_the_mean_history_of_their_faces() -> None:
 
 
 def test_gauges_keep_the_history() -> None:
-    made: list[Gauges] = []
-
-    def setup(grid: GasGrid) -> dict[str, Any]:
-        made.append(Gauges(grid, [grid.cell_at((8.0, 4.5, 0.1)), (27, 4, 2)]))
-        return {"recorders": made}
-
-    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver = blast(
+        street(),
+        (6, 9, 0),
+        looking=lambda grid, _: [Gauges(grid, [grid.cell_at((8.0, 4.5, 0.1)), (27, 4, 2)])],
+    )
     solver.advance(0.03)
-    (gauges,) = made
+    gauges = recorder(solver, Gauges)
     history, time_s = gauges.history_pa, gauges.time_s
     assert history.shape == (solver.steps, 2)
     assert time_s[-1] == solver.time_s
@@ -198,15 +188,11 @@ def test_gauges_keep_the_history() -> None:
 
 def test_maps_agree_with_gauges() -> None:
     cells = [(16, 9, 0), (3, 20, 0)]
-    made: list[Any] = []
-
-    def setup(grid: GasGrid) -> dict[str, Any]:
-        made.extend((Gauges(grid, cells), GroundMap(grid)))
-        return {"recorders": made}
-
-    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver = blast(
+        street(), (6, 9, 0), looking=lambda grid, _: (Gauges(grid, cells), GroundMap(grid))
+    )
     solver.advance(0.03)
-    gauges, ground = made
+    gauges, ground = recorder(solver, Gauges), recorder(solver, GroundMap)
     for k, (x, y, _) in enumerate(cells):
         assert ground.peak_pa[x, y] == pytest.approx(gauges.peak_pa[k], rel=1e-5)
         impulse = gauges.impulse_pa_s[k]
@@ -218,15 +204,15 @@ def test_maps_agree_with_gauges() -> None:
 
 def test_pictures_are_taken_once_at_their_times() -> None:
     times = [0.0, 0.002, 0.0020001, 0.01, 1.0]
-    made: list[Snapshots] = []
-
-    def setup(grid: GasGrid) -> dict[str, Any]:
-        made.extend((Snapshots(grid, 2, 1, times), Snapshots(grid, 1, 12, times)))
-        return {"recorders": made}
-
-    solver = blast(street(), (6, 9, 0), setup=setup)
+    solver = blast(
+        street(),
+        (6, 9, 0),
+        looking=lambda grid, _: [Snapshots(grid, 2, 1, times), Snapshots(grid, 1, 12, times)],
+    )
     solver.advance(0.02)
-    plan, section = made
+    plan, section = solver.recorders
+    assert isinstance(plan, Snapshots)
+    assert isinstance(section, Snapshots)
     assert len(plan.frames) == len(section.frames) == 3
     assert plan.frames[0].overpressure_pa.shape == (30, 26)
     assert section.frames[0].overpressure_pa.shape == (30, 10)

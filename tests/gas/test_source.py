@@ -49,10 +49,13 @@ def laid(
 def laid_over_given(charge: GasCharge, radius_m: float, grid: GasGrid) -> list[float]:
     """Return energy and fuel on the grid over those of the whole sphere."""
     profile = charge.profile(radius_m)
-    _, _, energy, fuel = laid(profile, grid, charge)
-    _, energy_j, fuel_kg = profile.totals()
+    density, _, energy, fuel = laid(profile, grid, charge)
+    mass_kg, energy_j, fuel_kg = profile.totals()
     volume = grid.cell_m**3
-    return [(energy - STILL_J_M3).sum() * volume / energy_j, fuel.sum() * volume / fuel_kg]
+    laid_kg = (density - 1.225).sum() * volume
+    given = laid_kg / mass_kg, fuel.sum() * volume / fuel_kg
+    assert given[0] == pytest.approx(given[1], rel=5e-3)
+    return [(energy - STILL_J_M3).sum() * volume / energy_j, given[1]]
 
 
 @pytest.mark.parametrize("radius_m", [1.0, 2.0, 4.0, 8.0])
@@ -73,29 +76,6 @@ def test_what_has_passed_through_the_ground_comes_back() -> None:
     assert not charge.on_ground
     assert largest_radius_m(grid, charge) == LEAST_RADIUS_CELLS * grid.cell_m
     assert laid_over_given(charge, 1.0, grid) == pytest.approx([1.0, 1.0], rel=1e-3)
-
-
-def test_mass_of_a_charge_is_laid() -> None:
-    charge = GasCharge(20.0, (0.1, 0.2, 3.3))
-    grid = empty_grid()
-    profile = charge.profile(2.0)
-    density, _, _, _ = laid(profile, grid, charge)
-    laid_kg = (density - 1.225).sum() * grid.cell_m**3
-    assert laid_kg == pytest.approx(profile.totals()[0], rel=5e-3)
-
-
-def test_a_mirrored_charge_is_laid_as_the_mirror_image() -> None:
-    grid = empty_grid()
-    one = GasCharge(50.0, (0.25, -1.5, 2.0))
-    other = GasCharge(50.0, (-0.25, -1.5, 2.0))
-    profile = one.profile(2.0)
-    density, momentum, energy, fuel = laid(profile, grid, one)
-    density2, momentum2, energy2, fuel2 = laid(profile, grid, other)
-    assert np.array_equal(density, density2[::-1])
-    assert np.array_equal(energy, energy2[::-1])
-    assert np.array_equal(fuel, fuel2[::-1])
-    assert np.array_equal(momentum[0], -momentum2[0, ::-1])
-    assert np.array_equal(momentum[1:], momentum2[1:, ::-1])
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (0.0, 0.0, 3.0), (0.25, 0.25, 2.75)])

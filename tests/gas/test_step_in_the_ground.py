@@ -7,14 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from blast_env.gas.engine import GasRun
-from blast_env.gas.faces import Faces, exposed_faces
-from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import FaceLoads
 from blast_env.gas.settings import GasSettings
 from blast_env.layout.build_scene import build_site
 from tests import builders
 from tests.builders import block, point
-from tests.gas.flows import blast, check_nothing_is_lost
+from tests.gas.flows import all_faces, blast, check_nothing_is_lost, face_loads, recorder
 from tests.test_terraces import WALL, terraced
 
 NEAR = GasSettings(border_m=0.0)
@@ -25,17 +23,9 @@ def test_a_closed_box_with_a_step_loses_nothing() -> None:
     """Mass and energy stay; all its walls, the terrace's too, take up the change of momentum."""
     open_box = GasRun(NEAR, build_site(terraced(), WALL)).grid.solid
     box = np.pad(open_box, 1, constant_values=True)
-    loads: list[FaceLoads] = []
-    walls: list[Faces] = []
-
-    def setup(grid: GasGrid) -> dict[str, Any]:
-        walls.append(exposed_faces(grid, grid.solid))
-        loads.append(FaceLoads(len(walls[0])))
-        return {"faces": walls[0], "recorders": loads}
-
-    solver = blast(box, (9, 17, 3), setup=setup, precision="double")
+    solver = blast(box, (9, 17, 3), loaded=all_faces, looking=face_loads, precision="double")
     check_nothing_is_lost(solver)
-    (load,), (faces,) = loads, walls
+    load, faces = recorder(solver, FaceLoads), solver.faces
     impulse = load.net_impulse_pa_s
     area_m2 = solver.grid.cell_m**2
     pushed = [

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from blast_env.gas import kernels
 from blast_env.gas import solver as solver_module
 from blast_env.gas.faces import exposed_faces
-from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import FaceLoads
-from blast_env.gas.solver import GasSolver
-from tests.gas.flows import blast, street
+from tests.gas.flows import blast, face_loads, recorder, street
 
 Turn = Callable[[NDArray[Any]], NDArray[Any]]
 TIME_S = 0.02
@@ -135,19 +133,17 @@ def test_single_precision_gives_the_loads_of_double() -> None:
     """To 1e-4, on every face of the house."""
 
     def loads(precision: str) -> FaceLoads:
-        solid = street()
-        house = np.zeros_like(solid)
+        house = np.zeros_like(street())
         house[20:25, 10:15, 0:8] = True
-        recorders: list[FaceLoads] = []
-
-        def setup(grid: GasGrid) -> dict[str, Any]:
-            faces = exposed_faces(grid, house)
-            recorders.append(FaceLoads(len(faces)))
-            return {"faces": faces, "recorders": recorders}
-
-        solver: GasSolver = blast(solid, (6, 9, 0), setup=setup, precision=precision)
+        solver = blast(
+            street(),
+            (6, 9, 0),
+            loaded=lambda grid: exposed_faces(grid, house),
+            looking=face_loads,
+            precision=precision,
+        )
         solver.advance(0.05)
-        return recorders[0]
+        return recorder(solver, FaceLoads)
 
     single, double = loads("single"), loads("double")
     assert double.impulse_pa_s.min() > 10.0

@@ -1,14 +1,20 @@
+"""Films of one blast and of two beside each other."""
+
+import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import imageio.v2 as imageio
 import numpy as np
 import pytest
+from imageio.plugins import ffmpeg
 from PIL import Image
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.plots.film import FilmPlan, plan_film, write_film
+from blast_env.plots.frames import FramePainter
 from blast_env.plots.style import shown_until_s
 
 
@@ -46,13 +52,9 @@ def test_a_gif_loops_and_states_the_real_time_factor(blast: Blast, tmp_path: Pat
         last = np.asarray(film.convert("RGB")).astype(int)
     assert first.shape[1] == 400
     assert (np.abs(first - last).max(axis=2) > 50).mean() > 0.005
-
-
-def test_a_wide_gif_is_made_narrower(blast: Blast, tmp_path: Path) -> None:
-    path = tmp_path / "blast.gif"
     write_film(blast, path, frames_per_s=5.0, slow_motion=20.0, width_px=1200)
     with Image.open(path) as film:
-        assert film.size[0] == 640
+        assert film.size[0] == 640  # made narrower
 
 
 def test_ctrl_c_leaves_nothing_behind(blast: Blast, tmp_path: Path) -> None:
@@ -91,3 +93,54 @@ def test_slow_motion_must_be_positive(result: BlastResult, slow_motion: float) -
 def test_a_film_without_end_is_refused(result: BlastResult) -> None:
     with pytest.raises(BlastEnvError, match="lower slow_motion or frames_per_s"):
         plan_film(result, slow_motion=1e6)
+
+
+# --- Two blasts in one film: the same moment, the same colours, nothing shifted.
+
+
+WIDTH_PX = 640
+
+
+def frames_of(path: Path) -> np.ndarray:
+    """Return all frames (frames, height, width, 3), as ffmpeg reads them."""
+    untyped: Any = ffmpeg
+    command = [untyped.get_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    size = re.search(r"yuv420p.*?, (\d+)x(\d+)", done.stderr.decode())
+    assert size is not None
+    width, height = int(size[1]), int(size[2])
+    return np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, height, width, 3)
+
+
+def write(left: Blast, right: Blast, path: Path, **changes: Any) -> tuple[Any, ...]:
+    options: dict[str, Any] = {"frames_per_s": 5.0, "slow_motion": 40.0, "width_px": WIDTH_PX}
+    return write_film(right, path, beside=left, **(options | changes))
+
+
+def test_two_blasts_in_one_film_are_shown_to_the_end_of_the_longer_one(
+    blast: Blast, barrier_blast: Blast, tmp_path: Path
+) -> None:
+    """The same moment, the same colours, nothing shifted; the barrier is in its own half alone."""
+    path = tmp_path / "both.mp4"
+    results = write(blast, barrier_blast, path)
+    frames = frames_of(path)
+    assert [each.digest for each in results] == [blast.run().digest, barrier_blast.run().digest]
+    plans = [plan_film(each, 5.0, 40.0) for each in results]
+    assert len(frames) == max(plan.frame_count for plan in plans) > 3
+    assert frames.shape[2] == WIDTH_PX
+    assert frames.shape[1] % 2 == 0
+    assert list(tmp_path.iterdir()) == [path]
+    first = frames[0].astype(int)
+    painter = FramePainter(barrier_blast, width_px=WIDTH_PX // 2)
+    part = barrier_blast.scene.obstacles()[-1].parts[0]
+    across, down = painter.sheet.pixel(part.rectangle_m.left, part.centre_m[1])
+    left, right = first[down, across], first[down, across + WIDTH_PX // 2]
+    assert np.abs(left - right).max() > 50  # a black edge beside the ground
+
+
+def test_what_is_no_film_of_two_is_refused(blast: Blast, tmp_path: Path) -> None:
+    with pytest.raises(BlastEnvError, match=r"suffix '.avi', must be .mp4 or .gif"):
+        write(blast, blast, tmp_path / "film.avi")
+    with pytest.raises(BlastEnvError, match="width_px is 300, must be 320"):
+        write(blast, blast, tmp_path / "film.mp4", width_px=600)
+    assert list(tmp_path.iterdir()) == []

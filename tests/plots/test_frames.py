@@ -1,21 +1,29 @@
+"""Frames of blasts and of a site on which modules are placed, and the window that shows them."""
+
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import numpy as np
+import pygame
 import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
+from blast_env.layout import LayoutState
 from blast_env.plots.canvas import Frame
 from blast_env.plots.frames import FramePainter
-from blast_env.plots.plan import BARRIER, EXPLOSIVE, PROTECTED
+from blast_env.plots.placing import PlacingPainter, sources_text
+from blast_env.plots.plan import BARRIER, EXPLOSIVE, FREE_CELL, PROTECTED
 from blast_env.plots.style import AIR
+from blast_env.plots.window import Window
+from blast_env.site import RectangleSource, SegmentSource
 from blast_env.site.balls import CollisionType
 from blast_env.site.structure import load_colour
 from blast_env.units import UNITS_PER_M
-from tests.plots.scenes import balls_at_start
+from tests.plots.scenes import LAYOUT, balls_at_start, small_scenario
 
 
 def pixel_at(painter: FramePainter, frame: Frame, x: float, y: float) -> tuple[int, ...]:
@@ -157,3 +165,106 @@ def test_frames_need_no_display() -> None:
     )
     assert done.stdout.startswith("(")
     assert done.stderr == ""
+
+
+# --- Frames of a site on which modules are being placed.
+
+
+SCENARIO = small_scenario()
+ROAD = SegmentSource(kind="segment", start_m=(2.0, 5.0), end_m=(2.0, 15.0), tnt_kg=50.0)
+FREE = FREE_CELL.look.fill or EXPLOSIVE
+PARK = RectangleSource(kind="rectangle", corner_m=(2.0, 2.0), size_m=(4.0, 3.0), tnt_kg=5.0)
+
+
+def pixels_of(frame: np.ndarray, colour: tuple[int, int, int]) -> int:
+    return int((frame == colour).all(axis=2).sum())
+
+
+def test_free_cells_are_told_from_cells_that_are_not() -> None:
+    painter = PlacingPainter(SCENARIO, SCENARIO.charge)
+    empty = pixels_of(painter.paint(LayoutState.empty(SCENARIO)), FREE)
+    one = pixels_of(painter.paint(LayoutState.of(SCENARIO, LAYOUT[:1])), FREE)
+    full = pixels_of(
+        painter.paint(LayoutState.of(SCENARIO, [(r, 0) for r in range(10)][:10])), FREE
+    )
+    assert empty > one > full > 0
+
+
+@pytest.mark.parametrize("width_px", [400, 640, 961])
+def test_frames_of_the_blast_have_the_same_size(width_px: int) -> None:
+    painter = PlacingPainter(SCENARIO, SCENARIO.charge, width_px=width_px)
+    width, height = painter.size_px
+    assert painter.paint(LayoutState.empty(SCENARIO)).shape == (height, width, 3)
+    for layout in ((), LAYOUT):
+        blast = Blast(SCENARIO, layout)
+        frames = FramePainter(blast, width_px=width_px, height_px=height)
+        assert frames.size_px == (width, height)
+
+
+def test_a_known_charge_is_a_star_and_a_hidden_one_a_line_or_a_veil() -> None:
+    placement = LayoutState.empty(SCENARIO)
+    known = PlacingPainter(SCENARIO, SCENARIO.charge).paint(placement)
+    road = PlacingPainter(SCENARIO, (ROAD,)).paint(placement)
+    park = PlacingPainter(SCENARIO, (PARK,)).paint(placement)
+    assert 50 < pixels_of(known, EXPLOSIVE) < 400
+    assert pixels_of(road, EXPLOSIVE) > 2 * pixels_of(known, EXPLOSIVE)
+    red, green, blue = (park[..., channel].astype(int) for channel in range(3))
+    reddish = (red - green > 60) & (red - blue > 60)
+    assert reddish.sum() > 10_000
+
+
+@pytest.mark.parametrize(
+    ("sources", "words"),
+    [
+        (SCENARIO.charge, "charge 100 kg TNT at (6.0 m, 10.0 m)"),
+        ((ROAD,), "hidden charge of 50 kg TNT"),
+        ((ROAD, PARK), "hidden charge of 5 to 50 kg TNT"),
+    ],
+)
+def test_what_is_known_of_the_charge_in_words(sources: tuple, words: str) -> None:
+    assert sources_text(sources) == words
+
+
+# ---
+
+
+FRAME = np.full((120, 200, 3), 77, dtype=np.uint8)
+
+
+@pytest.fixture
+def window() -> Iterator[Window]:
+    window = Window(frames_per_s=1000.0)
+    yield window
+    window.close()
+
+
+def test_a_frame_is_shown(window: Window) -> None:
+    assert window.show(FRAME)
+    screen = pygame.display.get_surface()
+    assert screen is not None
+    assert screen.get_size() == (200, 120)
+    assert tuple(screen.get_at((5, 5)))[:3] == (77, 77, 77)
+
+
+def test_closing_by_the_user_is_no_error(window: Window) -> None:
+    window.show(FRAME)
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    assert not window.show(FRAME)
+    assert window.closed
+    assert not window.show(FRAME)
+    assert not pygame.display.get_init()
+
+
+def test_close_may_be_called_again_and_before_any_frame(window: Window) -> None:
+    window.close()
+    window.close()
+    assert not window.show(FRAME)
+
+
+def test_without_a_screen_the_error_names_another_way(
+    window: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    pygame.display.quit()
+    with pytest.raises(BlastEnvError, match='render_mode="rgb_array"'):
+        window.show(FRAME)

@@ -1,0 +1,301 @@
+"""Figures of evaluations: of one layout, of many cases, of the probability over the mass."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from blast_env import Charge, load_scenario
+from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet, evaluate_layout
+from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.plots.capacity import capacity_figure
+from blast_env.plots.evaluation_figures import MOST_SHOWN, comparison_figure, evaluation_figure
+from blast_env.plots.figures import save_figure
+from blast_env.plots.plan import Kinds
+from blast_env.site import Scenario
+from blast_env.sites import generate_site
+from blast_env.units import MODULE_SIDE_M
+from tests.evaluation.cases import loads_of
+from tests.gas_sites import WALL as WALL_OF_HUT
+from tests.gas_sites import hut
+
+WALL = [(row, 0) for row in range(22, 32)]
+THREATS = (
+    LoadCase(Charge((5.0, 20.0), 100.0), 0),
+    LoadCase(Charge((5.0, 9.0), 100.0), 1),
+    LoadCase(Charge((5.0, 14.0), 15.0), 2),  # no mass that the calibration was made for
+)
+
+THREATS_OF_HUT = (LoadCase(Charge((2.0, 4.0), 5.0), 0),)
+
+
+@pytest.fixture(scope="module")
+def evaluation() -> Evaluation:
+    return evaluate_layout(load_scenario("courtyard"), WALL, engine="event", threats=THREATS)
+
+
+@pytest.fixture(scope="module")
+def figure(evaluation: Evaluation) -> Figure:
+    return evaluation_figure(evaluation)
+
+
+def test_charges_are_where_they_were_in_the_colour_of_their_reductions(
+    figure: Figure, evaluation: Evaluation
+) -> None:
+    plan = figure.axes[0]
+    circles, squares = (each for each in plan.collections if isinstance(each, PathCollection))
+    drawn = {
+        tuple(place): share
+        for each in (circles, squares)
+        for place, share in zip(
+            np.asarray(each.get_offsets()).tolist(), np.asarray(each.get_array()), strict=True
+        )
+    }
+    expected = {o.charge.position_m: 100.0 * o.reduction for o in evaluation.outcomes}
+    assert drawn == pytest.approx(expected)
+    assert len(np.asarray(squares.get_offsets())) == 1
+    ring = plan.lines[-1]
+    worst = evaluation.worst.charge.position_m
+    assert tuple(np.ravel(ring.get_xydata())) == worst
+
+
+def test_every_threat_has_its_pair_and_the_worst_comes_first(
+    figure: Figure, evaluation: Evaluation
+) -> None:
+    panel = figure.axes[1]
+    without, with_barrier = (
+        np.asarray(line.get_ydata()) for line in panel.lines if line.get_linestyle() == "None"
+    )
+    table = evaluation.threat_table.sort_values("impulse_pa_s", ascending=False)
+    assert with_barrier == pytest.approx(table.impulse_pa_s.to_numpy())
+    assert without == pytest.approx(table.unprotected_impulse_pa_s.to_numpy())
+    assert [text.get_text() for text in panel.get_xticklabels()] == [str(s) for s in table.seed]
+    assert "(Pa·s)" in panel.get_ylabel()
+    legend = panel.get_legend()
+    assert legend is not None
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts == [
+        f"without barrier, mean {evaluation.unprotected_impulse_pa_s.value:,.0f} Pa·s",
+        f"with barrier, mean {evaluation.impulse_pa_s.value:,.0f} Pa·s",
+        f"mean of the worst 20 % with barrier, {evaluation.cvar_pa_s:,.0f} Pa·s",
+    ]
+
+
+def test_both_facades_have_their_mean_loads_on_one_scale(
+    figure: Figure, evaluation: Evaluation
+) -> None:
+    panels = figure.axes[2:4]
+    modules = [
+        each for axes in panels for each in axes.collections if isinstance(each, PolyCollection)
+    ]
+    for each, column in zip(modules, ("unprotected_impulse_sim", "impulse_sim"), strict=True):
+        shown = each.get_array()
+        assert isinstance(shown, np.ma.MaskedArray)
+        loads = shown.filled(0.0)
+        assert loads == pytest.approx(evaluation.module_table[column].to_numpy())
+    assert modules[0].get_clim() == modules[1].get_clim()
+    assert panels[0].get_title().startswith("building without barrier\n")
+
+
+def test_title_and_legend_say_how_much_how_sure_and_where_not_to_trust_it(
+    figure: Figure, evaluation: Evaluation
+) -> None:
+    title = figure.get_suptitle()
+    low, high = (f"{100.0 * end:.0f} %" for end in evaluation.ci95)
+    share = f"{100.0 * evaluation.mean_reduction:.0f} %"
+    assert f"reduction of the impulse {share} (95 %: {low} to {high})" in title
+    assert any("outside the validated range" in text.get_text() for text in figure.axes[0].texts)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[:3] == [
+        "charge",
+        "charge outside the validated range",
+        "charge with the largest impulse",
+    ]
+    assert "barrier module, as high as the air: 10 of 16" in labels
+
+
+def test_an_empty_layout_and_a_single_threat_can_be_drawn(tmp_path: Path) -> None:
+    evaluation = evaluate_layout(
+        load_scenario("courtyard"), [], engine="event", threats=THREATS[:1]
+    )
+    figure = evaluation_figure(evaluation)
+    assert "no barrier: reduction of the impulse 0 %" in figure.get_suptitle()
+    assert "95 %" not in figure.get_suptitle()
+    path = save_figure(figure, tmp_path / "empty.png")
+    assert path.stat().st_size > 10_000
+
+
+def test_the_parts_of_a_building_are_drawn_together() -> None:
+    document = hut().model_dump(exclude_none=True)
+    (whole,) = document["structures"]
+    left, bottom = whole["corner_m"]
+    part = {**whole, "rows": 1, "building": "hall", "weight": 0.25}
+    north = {**part, "name": "north", "rows": 3, "weight": 0.75, "corner_m": (left, bottom + 0.5)}
+    document["structures"] = [{**part, "name": "south"}, north]
+    scenario = Scenario.from_document(document, "halves")
+    engine = GasEngine(border_m=0.0, until=0.01)
+    found = evaluate_layout(scenario, WALL_OF_HUT, threats=THREATS_OF_HUT, engine=engine)
+    figure = evaluation_figure(found)
+    panels = figure.axes[2:4]
+    assert figure.axes[1].get_xlabel().startswith("charge of the threat (m)")
+    bar = next(each for each in figure.axes if "per module" in each.get_ylabel())
+    assert bar.get_ylabel() == "mean momentum per module\n(N·s); white: not hit"
+    words = [each.get_text() for axes in figure.axes for each in axes.texts]
+    assert not any("calibration" in each for each in words)
+    table = found.table.set_index("structure")
+    (hall,) = found.building_table.to_dict("records")
+    assert (hall["structure"], hall["weight"], hall["protected"]) == ("hall", 1.0, True)
+    assert hall["reduction"] == pytest.approx(found.mean_reduction)
+    assert hall["peak_pa"] == table["peak_pa"].max()
+    for axes, column in zip(panels, ("unprotected_impulse_pa_s", "impulse_pa_s"), strict=True):
+        # Of eight sides of modules that look out, south has three, north five.
+        mean = 0.375 * table[column]["south"] + 0.625 * table[column]["north"]
+        assert mean == pytest.approx(hall[column])
+        assert axes.get_title().startswith("hall with")
+        assert f"{mean:,.0f} Pa·s" in axes.get_title()
+        assert axes.get_ylim() == (bottom - 0.25, bottom + 2.25)
+        drawn = [each for each in axes.collections if isinstance(each, PolyCollection)]
+        assert sum(len(each.get_paths()) for each in drawn) >= 16
+
+
+# --- The picture of many cases shows the layouts and numbers that it was given.
+
+
+COURTYARD = load_scenario("courtyard")
+
+
+def comparison(
+    *reductions: float, scenarios: Sequence[Scenario] = (COURTYARD,), in_range: Sequence[bool] = ()
+) -> Evaluation:
+    """Return a comparison: case k has k + 1 modules, its charge on the road of the courtyard."""
+    cases = []
+    for number in range(len(reductions)):
+        threat = LoadCase(Charge((5.0, 8.0 + number), 100.0), number)
+        cases.append(LoadCaseSet(scenarios[number % len(scenarios)], (threat,)))
+    return Evaluation(
+        cases=tuple(cases),
+        layouts=tuple(tuple((row, 0) for row in range(index + 1)) for index in range(len(cases))),
+        blasts=tuple(
+            (loads_of(case.scenario, 600.0 * (1.0 - share), in_range=within),)
+            for case, share, within in zip(
+                cases, reductions, in_range or [True] * len(cases), strict=True
+            )
+        ),
+        unprotected_blasts=tuple((loads_of(case.scenario, 600.0),) for case in cases),
+        engine=find_engine("event"),
+    )
+
+
+def panels(figure: Figure) -> list[Axes]:
+    return [axes for axes in figure.axes if axes.get_visible()]
+
+
+def all_words(figure: Figure) -> str:
+    """Return everything that stands in a figure."""
+    return "\n".join(text.get_text() for text in figure.findobj(Text) if isinstance(text, Text))
+
+
+def test_every_panel_has_its_own_charge_modules_and_reduction() -> None:
+    reductions = (0.851, 0.63, -0.04)
+    figure = comparison_figure(comparison(*reductions))
+    drawn = panels(figure)
+    assert [axes.get_title() for axes in drawn] == [
+        "case 1: reduction 85 %",
+        "case 2: reduction 63 %",
+        "case 3: reduction -4 %",
+    ]
+    zone = COURTYARD.build_zone
+    assert zone is not None
+    for number, axes in enumerate(drawn):
+        (star,) = axes.lines
+        assert tuple(np.ravel(star.get_xydata())) == (5.0, 8.0 + number)
+        (modules,) = (each for each in axes.patches if each.get_zorder() == Kinds.BARRIER.level)
+        squares = np.asarray(modules.get_path().vertices).reshape(-1, 5, 2)
+        corners = {tuple(square.min(axis=0).tolist()) for square in squares}
+        left_m, low_m = zone.corner_m
+        assert corners == {(left_m, low_m + row * MODULE_SIDE_M) for row in range(number + 1)}
+        noun = "module" if number == 0 else "modules"
+        assert axes.texts[0].get_text() == (
+            f"{number + 1} {noun}\n100 kg TNT at (5.0, {8.0 + number:.1f}) m"
+        )
+
+
+def test_the_heading_has_the_mean_with_its_interval() -> None:
+    both = comparison(0.7, 0.8, 0.8)
+    _, low, high = both.reduction.scaled(100.0)
+    title = comparison_figure(both).get_suptitle().strip()
+    assert title == (
+        "courtyard: a layout for each case, mean reduction 77 % "
+        f"(95 %: {low:.0f} % to {high:.0f} %)"
+    )
+    one = comparison_figure(comparison(0.5)).get_suptitle().strip()
+    assert one == "courtyard: reduction 50 %"
+
+
+def test_it_says_how_many_of_the_cases_are_shown() -> None:
+    """Whoever sees twelve of thirteen must not take them for all."""
+    figure = comparison_figure(comparison(*[0.5] * (MOST_SHOWN + 1)))
+    assert len(panels(figure)) == MOST_SHOWN == 12
+    assert panels(figure)[-1].get_title().startswith("case 12:")
+    assert "mean over all 13 cases, of which the first 12 are shown" in all_words(figure)
+    all_shown = all_words(comparison_figure(comparison(*[0.5] * MOST_SHOWN)))
+    assert "; 12 cases" in all_shown
+    assert "are shown" not in all_shown
+
+
+def test_numbers_that_are_not_to_be_trusted_say_so() -> None:
+    figure = comparison_figure(comparison(0.5, 0.5, in_range=(False, True)))
+    titles = [axes.get_title() for axes in panels(figure)]
+    assert titles == ["case 1: reduction 50 % ~", "case 2: reduction 50 %"]
+    assert "~ outside the validated range" in all_words(figure)
+    assert "~" not in all_words(comparison_figure(comparison(0.5)))
+
+
+def test_different_sites_have_their_names_and_their_own_scales(tmp_path: Path) -> None:
+    """A legend for all of them, and a site without a no-build area keeps that of another."""
+    sites = [generate_site(1), generate_site(2), COURTYARD]
+    figure = comparison_figure(comparison(0.5, 0.5, 0.5, scenarios=sites))
+    assert figure.get_suptitle().startswith("different sites: a layout for each case")
+    for axes, site in zip(panels(figure), sites, strict=True):
+        assert axes.texts[0].get_text().startswith(f"{site.name}, ")
+        low, high = axes.get_xlim()
+        assert low < 0.0 < site.site.width_m < high < 1.1 * site.site.width_m
+    assert "no-build area" in all_words(figure)
+    assert save_figure(figure, tmp_path / "cases.png").stat().st_size > 10_000
+
+
+@pytest.mark.usefixtures("laid_out")
+@pytest.mark.parametrize("count", [2, 12])
+def test_no_text_covers_another_or_leaves_the_page(count: int) -> None:
+    """Long names and masses: what a panel says stays within its own column."""
+    scenario = COURTYARD.model_copy(update={"name": "a_scenario_whose_name_is_forty_signs_lon"})
+    figure = comparison_figure(comparison(*[0.5] * count, scenarios=(COURTYARD, scenario)))
+    figure.draw_without_rendering()
+    page = figure.bbox
+    texts = [axes.title for axes in panels(figure)] + [a.texts[-1] for a in panels(figure)]
+    boxes = [text.get_window_extent() for text in texts]
+    for index, box in enumerate(boxes):
+        assert box.x0 >= page.x0
+        assert box.x1 <= page.x1
+        assert box.y1 <= page.y1
+        assert box.count_overlaps(boxes[:index]) == 0
+
+
+# --- The picture of the probability of a level over the mass.
+
+
+def test_each_layout_is_a_curve_beside_the_charge_of_the_scenario() -> None:
+    curves = {"no barrier": [(10.0, 1.0), (20.0, 0.4)], "6 walls": [(10.0, 1.0), (40.0, 0.2)]}
+    (axes,) = capacity_figure(curves, "medium", 31.0, "yard").axes
+    *drawn, mark = axes.lines
+    assert [each.get_label() for each in drawn] == list(curves)
+    for line, points in zip(drawn, curves.values(), strict=True):
+        np.testing.assert_array_equal(np.asarray(line.get_xydata()), points)
+    np.testing.assert_array_equal(mark.get_xdata(), [31.0, 31.0])
+    assert axes.get_ylabel() == "probability of level 'medium'"
