@@ -1,47 +1,36 @@
 """Checks of the consistency between the sections of a scenario."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
 
 from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, stacked_runs
-from blast_env.response.components import Component, Glazing, Wall
 from blast_env.site.balls import lattice_capacity
 from blast_env.site.boxes import TOLERANCE_M
 from blast_env.site.driving import places_shape
 from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
-from blast_env.site.heights import (
-    air_height_m,
-    depth_inside_m,
-    highest_grounds_m,
-    is_over_or_below,
-)
-from blast_env.site.objective import ObjectiveSection
-from blast_env.site.parameters import AirParameters, SimulationParameters, for_charge
+from blast_env.site.heights import depth_inside_m, highest_grounds_m, is_over_or_below
+from blast_env.site.parameters import AirParameters, for_charge
 from blast_env.site.problems import Problem, extent, unknown_name
 from blast_env.site.reach import places_on
 from blast_env.site.sections import (
     MOST_MODULES,
-    AnySource,
     AnyStructure,
     GaugeSection,
     Ground,
     PlaceSource,
     PointM,
-    SimulationSection,
     Site,
     VehicleSource,
 )
 from blast_env.site.structure import BARRIER_NAME
 from blast_env.site.terraces import terrace_problems
-from blast_env.site.vehicles import MOST_PLACES, Obstacles, RatedPiece, VehicleGround
+from blast_env.site.vehicles import MOST_PLACES, Obstacles, VehicleGround
 from blast_env.site.zone import (
     BuildZone,
     EmptyZone,
@@ -53,7 +42,8 @@ from blast_env.site.zone import (
 from blast_env.site.zone_checks import build_zone_problems, place_count_problems
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
-Checked = TypeVar("Checked")
+if TYPE_CHECKING:  # the scenario calls these checks
+    from blast_env.site.models import Scenario
 
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""
@@ -61,117 +51,40 @@ MOST_AIR_BALLS: Final = 1_000_000
 MOST_SPEED_PLACES: Final = 400_000
 """Most places of the speeds of all vehicles: a site of 300 m x 300 m takes 2 s a search."""
 
-_MOST_ITEMS: Final = 100
-"""Most items of an array that are examined; longer arrays are errors anyway."""
 
-_SITE: Final = TypeAdapter(Site)
-_SOURCE: Final[TypeAdapter[AnySource]] = TypeAdapter(AnySource)
-_STRUCTURE: Final[TypeAdapter[AnyStructure]] = TypeAdapter(AnyStructure)
-_BUILD_ZONE: Final = TypeAdapter(BuildZone)
-_GAUGE: Final = TypeAdapter(GaugeSection)
-_COMPONENTS: Final[TypeAdapter[Mapping[str, Glazing | Wall]]] = TypeAdapter(dict[str, Component])
-_SIMULATION: Final = TypeAdapter(SimulationSection)
-_OBJECTIVE: Final = TypeAdapter(ObjectiveSection)
-
-
-@dataclass(frozen=True)
-class Parts:
-    """The sections of a scenario that are valid by themselves.
-
-    Attributes:
-        site: The site, if it is valid.
-        sources: The valid sources, by index.
-        structures: The valid structures, by index.
-        all_structures: Whether all structures are valid.
-        build_zone: The build zone, if there is one and it is valid.
-        parameters: The parameters of the particle model, if they are valid.
-        gauges: The valid gauges, by index.
-        components: The components, by name; `None` if one of them is invalid.
-        objective: The objective, if it is valid.
-    """
-
-    site: Site | None
-    sources: Mapping[int, AnySource]
-    structures: Mapping[int, AnyStructure]
-    all_structures: bool
-    build_zone: BuildZone | None
-    parameters: SimulationParameters | None
-    gauges: Mapping[int, GaugeSection]
-    components: Mapping[str, Glazing | Wall] | None = field(default_factory=dict)
-    objective: ObjectiveSection | None = None
-
-    @property
-    def air_height_m(self) -> float:
-        """Height of the air, m; infinite if it may depend on an invalid section."""
-        if self.site is None or (self.site.air_height_m is None and not self.all_structures):
-            return math.inf
-        return air_height_m(self.site, self.structures.values(), self.build_zone)
-
-    @property
-    def charge_radius_m(self) -> float:
-        """Radius of the charge, m; if unknown, a length below that of any charge."""
-        return 1e-6 if self.parameters is None else charge_radius_m(self.parameters)
-
-
-def charge_radius_m(parameters: SimulationParameters) -> float:
-    """Return the radius of the charge's disc at the start, m."""
-    explosive = parameters.explosive
-    return (explosive.offset_units + explosive.radius_units) / UNITS_PER_M
-
-
-def sound_parts(document: Mapping[str, Any]) -> Parts:
-    """Return the sections of a scenario file that are valid by themselves."""
-    listed = document.get("structures")
-    structures = _sound_items(_STRUCTURE, listed)
-    simulation = _sound(_SIMULATION, document.get("simulation", {}))
-    return Parts(
-        site=_sound(_SITE, document.get("site")),
-        sources=_sound_items(_SOURCE, document.get("charge")),
-        structures=structures,
-        all_structures=isinstance(listed, list | tuple) and len(structures) == len(listed) > 0,
-        build_zone=_sound(_BUILD_ZONE, document.get("build_zone")),
-        parameters=None if simulation is None else simulation.parameters,
-        gauges=_sound_items(_GAUGE, document.get("gauges")),
-        components=_sound(_COMPONENTS, document.get("components", {})),
-        objective=_sound(_OBJECTIVE, document.get("objective", {})),
-    )
-
-
-def check_parts(parts: Parts) -> tuple[Problem, ...]:
-    """Return all problems between the sections.
+def check_sections(scenario: "Scenario") -> tuple[Problem, ...]:
+    """Return all problems between the sections of a scenario, each of which is valid by itself.
 
     Whatever takes memory or time is counted first; too much of it is the only problem then.
     """
-    counted = tuple(_count_problems(parts))
+    counted = tuple(_count_problems(scenario))
     return counted or (
-        *_name_problems(parts),
-        *_structure_problems(parts),
-        *_charge_problems(parts),
-        *_build_zone_problems(parts),
-        *_simulation_problems(parts),
-        *_height_problems(parts),
-        *_gauge_problems(parts),
-        *_facade_problems(parts),
-        *_removable_problems(parts),
-        *terrace_problems(parts.structures),
-        *_objective_problems(parts),
+        *_name_problems(scenario),
+        *_structure_problems(scenario),
+        *_charge_problems(scenario),
+        *_build_zone_problems(scenario),
+        *_simulation_problems(scenario),
+        *_height_problems(scenario),
+        *_gauge_problems(scenario),
+        *_facade_problems(scenario),
+        *_removable_problems(scenario),
+        *terrace_problems(scenario.structures),
+        *_objective_problems(scenario),
     )
 
 
-def _count_problems(parts: Parts) -> Iterator[Problem]:
+def _count_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Yield the problems of products of counts: bays, places of pieces, places of vehicles."""
-    yield from bay_count_problems(parts.structures)
-    if parts.build_zone is not None:
-        yield from place_count_problems(parts.build_zone)
-    yield from _vehicle_count_problems(parts)
+    yield from bay_count_problems(scenario.structures)
+    if scenario.build_zone is not None:
+        yield from place_count_problems(scenario.build_zone)
+    yield from _vehicle_count_problems(scenario)
 
 
-def _vehicle_count_problems(parts: Parts) -> Iterator[Problem]:
+def _vehicle_count_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Yield the problems of too many places of vehicles, with and without a motion."""
-    vehicles = [each for each in parts.sources.values() if isinstance(each, VehicleSource)]
-    if parts.site is None:
-        return
-    places = len(vehicles) * places_on(parts.site)
+    vehicles = [each for each in scenario.charge if isinstance(each, VehicleSource)]
+    places = len(vehicles) * places_on(scenario.site)
     if places > MOST_PLACES:
         yield Problem(
             "charge",
@@ -179,7 +92,7 @@ def _vehicle_count_problems(parts: Parts) -> Iterator[Problem]:
             f" site, must have at most {MOST_PLACES:,}",
         )
     moved = sum(each.motion is not None for each in vehicles)
-    rows, columns = places_shape(parts.site.width_m, parts.site.height_m)
+    rows, columns = places_shape(scenario.site.width_m, scenario.site.height_m)
     if moved * rows * columns > MOST_SPEED_PLACES:
         yield Problem(
             "charge",
@@ -189,24 +102,22 @@ def _vehicle_count_problems(parts: Parts) -> Iterator[Problem]:
         )
 
 
-def _facade_problems(parts: Parts) -> Iterator[Problem]:
+def _facade_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check facades and the measures that harden them, if the sections that they use are valid."""
-    if parts.components is None:
-        return
-    problems = list(facade_problems(parts.structures, parts.components))
+    problems = list(facade_problems(scenario.structures, scenario.components))
     yield from problems
-    if parts.build_zone is not None and parts.all_structures and not problems:
-        measures = parts.build_zone.hardening
-        yield from hardening_problems(parts.structures, parts.components, measures)
+    if scenario.build_zone is not None and not problems:
+        measures = scenario.build_zone.hardening
+        yield from hardening_problems(scenario.structures, scenario.components, measures)
 
 
-def _removable_problems(parts: Parts) -> Iterator[Problem]:
+def _removable_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that removable structures exist, and are neither protected nor otherwise needed."""
-    if parts.build_zone is None or not parts.all_structures:
+    if scenario.build_zone is None:
         return
-    structures = {each.name: each for each in parts.structures.values()}
+    structures = {each.name: each for each in scenario.structures}
     first_use: dict[str, str] = {}
-    for number, removable in enumerate(parts.build_zone.removable):
+    for number, removable in enumerate(scenario.build_zone.removable):
         for place, name in enumerate(removable.structures):
             where = f"build_zone.removable[{number}].structures[{place}]"
             used = first_use.setdefault(name, where)
@@ -222,15 +133,15 @@ def _removable_problems(parts: Parts) -> Iterator[Problem]:
                 yield Problem(where, f"is {name!r}, which {used} removes already")
 
 
-def _objective_problems(parts: Parts) -> Iterator[Problem]:
+def _objective_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that a response objective has facades, and a target has a budget."""
-    objective, zone = parts.objective, parts.build_zone
-    if objective is None or not objective.is_response:
+    objective, zone = scenario.objective, scenario.build_zone
+    if not objective.is_response:
         return
-    facades = [each.facade for each in parts.structures.values() if each.protected]
+    facades = [each.facade for each in scenario.structures if each.protected]
     keys = [key for facade in facades if facade is not None for key, _ in facade.names()]
     wanted = "glazing" if objective.measure == "glazing" else ""
-    if parts.all_structures and not any(key.endswith(wanted) for key in keys):
+    if not any(key.endswith(wanted) for key in keys):
         what = "facade with glazing" if wanted else "facade"
         message = f"is 'response', but no protected structure has a {what}"
         yield Problem("objective.kind", message)
@@ -239,72 +150,56 @@ def _objective_problems(parts: Parts) -> Iterator[Problem]:
         yield Problem("build_zone.budget", message)
 
 
-def check_sources(parts: Parts) -> tuple[Problem, ...]:
+def check_sources(scenario: "Scenario") -> tuple[Problem, ...]:
     """Return the problems between the sources of the charge and the other sections.
 
-    They are the result of `check_parts` if the other sections are consistent.
+    They are the result of `check_sections` if the other sections are consistent.
     """
-    counted = tuple(_vehicle_count_problems(parts))
-    return counted or (*_charge_problems(parts), *_build_zone_problems(parts))
+    counted = tuple(_vehicle_count_problems(scenario))
+    return counted or (*_charge_problems(scenario), *_build_zone_problems(scenario))
 
 
-def _sound(adapter: TypeAdapter[Checked], value: object) -> Checked | None:
-    """Return the section, or `None` if it is missing or invalid."""
-    try:
-        return adapter.validate_python(value)
-    except ValidationError:
-        return None
-
-
-def _sound_items(adapter: TypeAdapter[Checked], values: object) -> dict[int, Checked]:
-    """Return the valid items of an array by index."""
-    if not isinstance(values, list | tuple):
-        return {}
-    items = ((index, _sound(adapter, value)) for index, value in enumerate(values[:_MOST_ITEMS]))
-    return {index: item for index, item in items if item is not None}
-
-
-def _name_problems(parts: Parts) -> Iterator[Problem]:
+def _name_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check the names of the structures, and that at least one is protected."""
-    for index, structure in parts.structures.items():
+    for index, structure in enumerate(scenario.structures):
         if structure.name == BARRIER_NAME:
             message = f"is {BARRIER_NAME!r}, the name of the modules of a layout"
             yield Problem(f"structures[{index}].name", message)
-    yield from _repeated_names("structures", parts.structures)
-    protected = any(structure.protected for structure in parts.structures.values())
-    if parts.all_structures and not protected:
+    yield from _repeated_names("structures", scenario.structures)
+    protected = any(structure.protected for structure in scenario.structures)
+    if not protected:
         yield Problem("structures", "none is protected, at least one must have protected = true")
 
 
 def _repeated_names(
-    key: str, items: Mapping[int, AnyStructure] | Mapping[int, GaugeSection]
+    key: str, items: Sequence[AnyStructure] | Sequence[GaugeSection]
 ) -> Iterator[Problem]:
     """Yield the problems of names that an earlier item of the array has."""
     first_use: dict[str, int] = {}
-    for index, item in items.items():
+    for index, item in enumerate(items):
         used = first_use.setdefault(item.name, index)
         if used != index:
             message = f"is {item.name!r}, already the name of {key}[{used}]"
             yield Problem(f"{key}[{index}].name", message)
 
 
-def _structure_problems(parts: Parts) -> Iterator[Problem]:
+def _structure_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that structures lie inside the site without overlaps, and their number of modules."""
-    stock = 0 if parts.build_zone is None else parts.build_zone.stock
-    modules = sum(each.modules for each in parts.structures.values()) + stock
+    stock = 0 if scenario.build_zone is None else scenario.build_zone.stock
+    modules = sum(each.modules for each in scenario.structures) + stock
     if modules > MOST_MODULES:
         with_stock = f", the stock of {stock:,} among them" if stock else ""
         message = f"have {modules:,} modules together{with_stock}, must have at most"
         yield Problem("structures", f"{message} {MOST_MODULES:,}")
-    for index, structure in parts.structures.items():
+    for index, structure in enumerate(scenario.structures):
         plans_m = [structure.rectangle_m]
         if structure.footprint is not None:
             plans_m.append(Rectangle(*structure.footprint.polygon.bounds))
         described = _described(structure)
         yield from _outside_site(
-            parts, f"structures[{index}]", described, Rectangle.around(plans_m)
+            scenario, f"structures[{index}]", described, Rectangle.around(plans_m)
         )
-    for (i, one), (j, other) in combinations(parts.structures.items(), 2):
+    for (i, one), (j, other) in combinations(enumerate(scenario.structures), 2):
         if _overlap(one, other) and not _are_above_each_other(one, other):
             message = f"{_described(other)} overlaps structures[{i}], {_described(one)}"
             yield Problem(f"structures[{j}]", message)
@@ -325,26 +220,26 @@ def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
     )
 
 
-def _charge_problems(parts: Parts) -> Iterator[Problem]:
+def _charge_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that every place of the charge is clear of structures and border."""
-    for index, source in parts.sources.items():
+    for index, source in enumerate(scenario.charge):
         if isinstance(source, VehicleSource):
-            yield from _vehicle_problems(parts, f"charge[{index}]", source)
+            yield from _vehicle_problems(scenario, f"charge[{index}]", source)
         else:
-            yield from _place_problems(parts, f"charge[{index}]", source)
-        yield from _above_the_air(parts, f"charge[{index}].height_m", source.height_m)
+            yield from _place_problems(scenario, f"charge[{index}]", source)
+        yield from _above_the_air(scenario, f"charge[{index}].height_m", source.height_m)
 
 
-def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Problem]:
+def _place_problems(scenario: "Scenario", key: str, source: PlaceSource) -> Iterator[Problem]:
     """Check a charge whose places do not depend on the layout."""
-    radius = parts.charge_radius_m
-    words = "" if parts.parameters is None else f" by {radius:g} m, the charge's radius"
+    radius = scenario.charge_radius_m
+    words = f" by {radius:g} m, the charge's radius"
     bounds = source_bounds_m(source)
-    if parts.site and not parts.site.rectangle_m.contains(bounds.grown(radius)):
-        where, site = extent(bounds), extent(parts.site.rectangle_m)
+    if not scenario.site.rectangle_m.contains(bounds.grown(radius)):
+        where, site = extent(bounds), extent(scenario.site.rectangle_m)
         message = f"its centre may be at {where}, must lie inside the site ({site}){words}"
         yield Problem(key, message)
-    for j, structure in parts.structures.items():
+    for j, structure in enumerate(scenario.structures):
         distance = min(distance_m(source, box) for box in structure.boxes_m)
         if distance < radius - TOLERANCE_M and not is_over_or_below(source.height_m, structure):
             message = (
@@ -358,9 +253,12 @@ def _place_problems(parts: Parts, key: str, source: PlaceSource) -> Iterator[Pro
             yield Problem(key, message)
 
 
-def _vehicle_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+def _vehicle_problems(scenario: "Scenario", key: str, source: VehicleSource) -> Iterator[Problem]:
     """Check that a vehicle fits on the site and can enter, and that barriers can stop it."""
-    problems = [*_vehicle_size_problems(parts, key, source), *_entry_problems(parts, key, source)]
+    problems = [
+        *_vehicle_size_problems(scenario, key, source),
+        *_entry_problems(scenario, key, source),
+    ]
     listed: dict[str, Sequence[Ground]] = {
         "drivable": source.drivable,
         "keep_outs": source.keep_outs,
@@ -368,34 +266,33 @@ def _vehicle_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator
     for name, areas in listed.items():
         for index, area in enumerate(areas):
             where = f"the ground ({extent(area.rectangle_m)})"
-            problems += _outside_site(parts, f"{key}.{name}[{index}]", where, area.rectangle_m)
+            problems += _outside_site(scenario, f"{key}.{name}[{index}]", where, area.rectangle_m)
     yield from problems
-    if parts.site is not None and parts.all_structures and not problems:
-        yield from _way_problems(parts, key, vehicle_ground(parts, source))
+    if not problems:
+        yield from _way_problems(scenario, key, scenario.vehicle_ground(source))
 
 
-def _vehicle_size_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+def _vehicle_size_problems(
+    scenario: "Scenario", key: str, source: VehicleSource
+) -> Iterator[Problem]:
     """Check that the vehicle is at least as wide as its charge and no larger than the site."""
-    least_m = 2.0 * parts.charge_radius_m
+    least_m = 2.0 * scenario.charge_radius_m
     if source.width_m < least_m - TOLERANCE_M:
         message = f"is {source.width_m:g}, must be at least {least_m:g}, the charge's diameter"
         yield Problem(f"{key}.width_m", message)
-    if parts.site is not None:
-        most_m = min(parts.site.width_m, parts.site.height_m)
-        if source.width_m > most_m + TOLERANCE_M:
-            message = f"is {source.width_m:g}, must be at most {most_m:g}, the site's shorter side"
-            yield Problem(f"{key}.width_m", message)
+    most_m = min(scenario.site.width_m, scenario.site.height_m)
+    if source.width_m > most_m + TOLERANCE_M:
+        message = f"is {source.width_m:g}, must be at most {most_m:g}, the site's shorter side"
+        yield Problem(f"{key}.width_m", message)
 
 
-def _entry_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[Problem]:
+def _entry_problems(scenario: "Scenario", key: str, source: VehicleSource) -> Iterator[Problem]:
     """Check that entries lie on the border and are wide enough."""
-    if parts.site is None:
-        return
     for index, entry in enumerate(source.entries):
-        if entry.side(parts.site) is None:
+        if entry.side(scenario.site) is None:
             message = (
                 f"runs from {_place(entry.start_m)} to {_place(entry.end_m)}, must lie on one side"
-                f" of the site's border ({extent(parts.site.rectangle_m)})"
+                f" of the site's border ({extent(scenario.site.rectangle_m)})"
             )
             yield Problem(f"{key}.entries[{index}]", message)
         elif entry.length_m < source.width_m - TOLERANCE_M:
@@ -406,7 +303,7 @@ def _entry_problems(parts: Parts, key: str, source: VehicleSource) -> Iterator[P
             yield Problem(f"{key}.entries[{index}]", message)
 
 
-def _way_problems(parts: Parts, key: str, ground: VehicleGround) -> Iterator[Problem]:
+def _way_problems(scenario: "Scenario", key: str, ground: VehicleGround) -> Iterator[Problem]:
     """Check that a vehicle can enter, approach a protected structure, and be stopped."""
     width = f"{ground.source.width_m:g} m, its width"
     reach = ground.reach()
@@ -425,15 +322,15 @@ def _way_problems(parts: Parts, key: str, ground: VehicleGround) -> Iterator[Pro
                 f" no gap of {width}"
             )
             yield Problem(key, message)
-        elif parts.build_zone is not None:
-            yield from _stopping_problems(parts, key, ground, parts.build_zone)
+        elif scenario.build_zone is not None:
+            yield from _stopping_problems(scenario, key, ground, scenario.build_zone)
 
 
 def _stopping_problems(
-    parts: Parts, key: str, ground: VehicleGround, zone: BuildZone
+    scenario: "Scenario", key: str, ground: VehicleGround, zone: BuildZone
 ) -> Iterator[Problem]:
     """Check that a barrier can increase the stand-off of a vehicle over the empty site's."""
-    cells = _stopping_cells(empty_zone(_surroundings(parts, zone)), ground.source)
+    cells = _stopping_cells(empty_zone(_surroundings(scenario, zone)), ground.source)
     if not cells.any():
         message = "nothing can stop the vehicle: no item in stock stops vehicles"
         if ground.source.motion is not None:
@@ -466,43 +363,27 @@ def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
     return cells
 
 
-def vehicle_ground(parts: Parts, source: VehicleSource) -> VehicleGround:
-    """Return a vehicle's ground on the empty site, which must be valid."""
-    assert parts.site is not None
-    way = None if parts.build_zone is None else parts.build_zone.access_way
-    closed: tuple[Rectangle, ...] = ()
-    rated: tuple[RatedPiece, ...] = ()
-    if way is not None and way.gate is not None:
-        where, rating = way.gate.rectangle_m, way.gate.crash_rating
-        if rating is None:
-            closed = (where,)
-        else:
-            rated = (RatedPiece(where, rating, "the gate"),)
-    structures = tuple(parts.structures.values())
-    return VehicleGround(source, parts.site, structures, closed, rated, parts.charge_radius_m)
-
-
-def _build_zone_problems(parts: Parts) -> Iterator[Problem]:
+def _build_zone_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that the build zone lies inside the site, and that barriers can be built in it."""
-    zone = parts.build_zone
+    zone = scenario.build_zone
     if zone is None:
         return
     yield from _outside_site(
-        parts, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
+        scenario, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
     )
-    yield from build_zone_problems(_surroundings(parts, zone))
+    yield from build_zone_problems(_surroundings(scenario, zone))
 
 
-def _surroundings(parts: Parts, zone: BuildZone) -> Surroundings:
-    structures, sources = tuple(parts.structures.values()), tuple(parts.sources.values())
-    return Surroundings(zone, structures, sources, parts.charge_radius_m, parts.site)
+def _surroundings(scenario: "Scenario", zone: BuildZone) -> Surroundings:
+    structures, sources = tuple(scenario.structures), tuple(scenario.charge)
+    return Surroundings(zone, structures, sources, scenario.charge_radius_m, scenario.site)
 
 
-def _height_problems(parts: Parts) -> Iterator[Problem]:
+def _height_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that structures and barriers do not exceed the height of the air."""
-    for index, structure in parts.structures.items():
-        yield from _above_the_air(parts, f"structures[{index}].height_m", structure.height_m)
-        top_m = parts.air_height_m if structure.height_m is None else structure.height_m
+    for index, structure in enumerate(scenario.structures):
+        yield from _above_the_air(scenario, f"structures[{index}].height_m", structure.height_m)
+        top_m = scenario.air_height_m if structure.height_m is None else structure.height_m
         if structure.base_m > max(top_m - MODULE_SIDE_M, 0.0) + TOLERANCE_M:
             what = "the air" if structure.height_m is None else "height_m"
             message = (
@@ -510,24 +391,24 @@ def _height_problems(parts: Parts) -> Iterator[Problem]:
                 f" ({top_m:g})"
             )
             yield Problem(f"structures[{index}].base_m", message)
-    if parts.build_zone is not None:
-        zone = parts.build_zone
-        grounds_m = highest_grounds_m(zone, parts.structures.values())
-        yield from _above_the_air(parts, "build_zone.height_m", zone.height_m, grounds_m[0])
+    if scenario.build_zone is not None:
+        zone = scenario.build_zone
+        grounds_m = highest_grounds_m(zone, scenario.structures)
+        yield from _above_the_air(scenario, "build_zone.height_m", zone.height_m, grounds_m[0])
         for index, item in enumerate(zone.items):
             where = f"build_zone.items[{index}].height_m"
-            yield from _above_the_air(parts, where, item.height_m, grounds_m[index])
+            yield from _above_the_air(scenario, where, item.height_m, grounds_m[index])
 
 
-def _gauge_problems(parts: Parts) -> Iterator[Problem]:
+def _gauge_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that gauges have unique names, and lie in the air or at most a module inside."""
-    yield from _repeated_names("gauges", parts.gauges)
-    for index, gauge in parts.gauges.items():
+    yield from _repeated_names("gauges", scenario.gauges)
+    for index, gauge in enumerate(scenario.gauges):
         key, (x_m, y_m, z_m) = f"gauges[{index}].position_m", gauge.position_m
         place = f"({x_m:g}, {y_m:g})"
-        yield from _outside_site(parts, key, place, Rectangle(x_m, y_m, x_m, y_m))
-        yield from _above_the_air(parts, f"{key}[2]", z_m)
-        for j, structure in parts.structures.items():
+        yield from _outside_site(scenario, key, place, Rectangle(x_m, y_m, x_m, y_m))
+        yield from _above_the_air(scenario, f"{key}[2]", z_m)
+        for j, structure in enumerate(scenario.structures):
             depth_m = depth_inside_m(gauge.position_m, structure)
             if depth_m > MODULE_SIDE_M + TOLERANCE_M:
                 top = "" if structure.height_m is None else f", {structure.height_m:g} m high"
@@ -539,23 +420,21 @@ def _gauge_problems(parts: Parts) -> Iterator[Problem]:
 
 
 def _above_the_air(
-    parts: Parts, key: str, height_m: float | None, ground_m: float = 0.0
+    scenario: "Scenario", key: str, height_m: float | None, ground_m: float = 0.0
 ) -> Iterator[Problem]:
     """Yield a problem if a height above its ground, such as a terrace, exceeds the air."""
-    if height_m is not None and ground_m + height_m > parts.air_height_m + TOLERANCE_M:
+    if height_m is not None and ground_m + height_m > scenario.air_height_m + TOLERANCE_M:
         terrace = f" on a terrace of {ground_m:g}" if ground_m > 0.0 else ""
         message = (
-            f"is {height_m:g}{terrace}, must be at most {parts.air_height_m:g}, the height of the"
-            " air (which site.air_height_m can raise)"
+            f"is {height_m:g}{terrace}, must be at most {scenario.air_height_m:g}, the height of"
+            " the air (which site.air_height_m can raise)"
         )
         yield Problem(key, message)
 
 
-def _simulation_problems(parts: Parts) -> Iterator[Problem]:
+def _simulation_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Check that no balls overlap at the start."""
-    if parts.parameters is None:
-        return
-    air, explosive = parts.parameters.air, parts.parameters.explosive
+    air, explosive = scenario.parameters.air, scenario.parameters.explosive
     if 0.0 < air.spacing_units < 2.0 * air.radius_units:
         yield Problem(
             "simulation.overrides.air.spacing_units",
@@ -563,7 +442,7 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
             f" {2.0 * air.radius_units:g}, twice radius_units: the balls would overlap",
         )
     else:
-        yield from _too_much_air(parts.site, air)
+        yield from _too_much_air(scenario.site, air)
     if explosive.collide_within_charge and explosive.ball_count > 1:
         sine = math.sin(math.pi / explosive.ball_count)
         if 2.0 * explosive.offset_units * sine < 2.0 * explosive.radius_units - TOLERANCE_M:
@@ -576,19 +455,13 @@ def _simulation_problems(parts: Parts) -> Iterator[Problem]:
             )
 
 
-def particle_problems(
-    parameters: SimulationParameters,
-    sources: Sequence[AnySource],
-    structures: Sequence[AnyStructure],
-) -> Iterator[Problem]:
+def particle_problems(scenario: "Scenario") -> Iterator[Problem]:
     """Yield the features of a scenario that particles cannot simulate, unlike gas dynamics.
 
-    Args:
-        parameters: Parameters of the particle model, which bound the mass of every charge.
-        sources: The sources of the charges.
-        structures: The structures; all must stand on the ground, and none be a terrace.
+    All structures must stand on the ground, and none be a terrace; the parameters of the particle
+    model bound the mass of every charge.
     """
-    for index, structure in enumerate(structures):
+    for index, structure in enumerate(scenario.structures):
         if structure.base_m > 0.0:
             message = (
                 f"is {structure.base_m:g}, must be 0 for particles: they know no heights, and"
@@ -601,17 +474,15 @@ def particle_problems(
                 f" stand on {structure.name!r}; engine 'gas' takes it"
             )
             yield Problem(f"structures[{index}].carries", message)
-    for index, source in enumerate(sources):
+    for index, source in enumerate(scenario.charge):
         try:
-            for_charge(parameters, source.tnt_kg)
+            for_charge(scenario.parameters, source.tnt_kg)
         except BlastEnvError as error:
             yield Problem(f"charge[{index}].tnt_kg", str(error).removeprefix("tnt_kg "))
 
 
-def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
+def _too_much_air(site: Site, air: AirParameters) -> Iterator[Problem]:
     """Check the number of air balls, which memory limits."""
-    if site is None:
-        return
     balls = lattice_capacity(air, site.rectangle_m.scaled(UNITS_PER_M))
     if balls > MOST_AIR_BALLS:
         yield Problem(
@@ -622,11 +493,11 @@ def _too_much_air(site: Site | None, air: AirParameters) -> Iterator[Problem]:
 
 
 def _outside_site(
-    parts: Parts, key: str, description: str, rectangle: Rectangle
+    scenario: "Scenario", key: str, description: str, rectangle: Rectangle
 ) -> Iterator[Problem]:
     """Yield a problem if a rectangle is not inside the site."""
-    if parts.site and not parts.site.rectangle_m.contains(rectangle):
-        site = extent(parts.site.rectangle_m)
+    if not scenario.site.rectangle_m.contains(rectangle):
+        site = extent(scenario.site.rectangle_m)
         yield Problem(key, f"{description} must lie inside the site ({site})")
 
 

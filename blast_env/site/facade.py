@@ -19,7 +19,7 @@ Measures of the build zone may put stronger components in some bays at a cost (`
 Loads do not depend on a facade; the response of the building does.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -106,9 +106,9 @@ def with_glass(window: Glazing, glass: Glazing) -> Glazing:
     return glass.model_copy(update=kept)
 
 
-def bay_count_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem]:
+def bay_count_problems(structures: Iterable[AnyStructure]) -> Iterator[Problem]:
     """Yield a problem if the facades have too many bays, which are counted but not made."""
-    bays = sum(_bay_count(each) for each in structures.values())
+    bays = sum(map(_bay_count, structures))
     if bays > MOST_BAYS:
         yield Problem("structures", f"have {bays:,} bays in all, must be at most {MOST_BAYS:,}")
 
@@ -162,15 +162,15 @@ def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:
     return tuple(named)
 
 
-def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> Iterator[Problem]:
+def facade_problems(structures: Iterable[AnyStructure], own: Components) -> Iterator[Problem]:
     """Yield the problems of the facades of a scenario without `bay_count_problems`.
 
     Args:
-        structures: The valid structures, by index.
+        structures: The structures.
         own: The components that the scenario defines.
     """
     known = {**catalogue(), **own}
-    for index, structure in structures.items():
+    for index, structure in enumerate(structures):
         facade = structure.facade
         if facade is None:
             continue
@@ -190,18 +190,18 @@ def facade_problems(structures: Mapping[int, AnyStructure], own: Components) -> 
 
 
 def hardening_problems(
-    structures: Mapping[int, AnyStructure], own: Components, measures: Sequence[Hardening]
+    structures: Sequence[AnyStructure], own: Components, measures: Sequence[Hardening]
 ) -> Iterator[Problem]:
     """Yield the problems of the measures that harden facades.
 
     Args:
-        structures: The valid structures, by index.
+        structures: The structures.
         own: The components that the scenario defines.
         measures: The measures.
     """
     known = {**catalogue(), **own}
-    names = [each.name for each in structures.values()]
-    bays = [bay for each in structures.values() for bay in named_bays(each)]
+    names = [each.name for each in structures]
+    bays = [bay for each in structures for bay in named_bays(each)]
     for index, measure in enumerate(measures):
         where = f"build_zone.hardening[{index}]"
         unknown = {i: name for i, name in enumerate(measure.structures or ()) if name not in names}

@@ -8,7 +8,7 @@ import numpy as np
 
 from blast_env.site.access_way import any_in_windows, counts_before
 from blast_env.site.scene import WALLS
-from blast_env.site.sections import AnySource, AnyStructure, GaugeSection, Site
+from blast_env.site.sections import AnySource, AnyStructure, GaugeSection
 from blast_env.site.terraces import ground_m
 from blast_env.site.zone import BuildZone, Surroundings, usable_cells
 
@@ -65,13 +65,6 @@ def _grounds_m(zone: BuildZone, structures: tuple[AnyStructure, ...]) -> tuple[f
             if not any_in_windows(taken, variant.rows, variant.columns).all():
                 found[variant.item] = height_m
     return tuple(found)
-
-
-def air_height_m(site: Site, structures: Iterable[AnyStructure], zone: BuildZone | None) -> float:
-    """Return the height of the air, m."""
-    if site.air_height_m is not None:
-        return site.air_height_m
-    return default_air_height_m(structures, zone)
 
 
 def is_over_or_below(height_m: float, structure: AnyStructure) -> bool:

@@ -6,7 +6,6 @@ heights are above the ground.
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from hashlib import sha256
 from typing import Annotated, Any, Final, Self
@@ -23,22 +22,14 @@ from pydantic import (
 )
 
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.geometry import Cell, Element, Measure
+from blast_env.geometry import Cell, Element, Measure, Rectangle
 from blast_env.response.components import Component, Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
 from blast_env.response.facade import FilledBay
 from blast_env.site.catalogue import RIGID_KEYS, Hardening
-from blast_env.site.checks import (
-    Parts,
-    charge_radius_m,
-    check_parts,
-    check_sources,
-    particle_problems,
-    sound_parts,
-    vehicle_ground,
-)
+from blast_env.site.checks import check_sections, check_sources, particle_problems
 from blast_env.site.facade import NamedBay, named_bays
-from blast_env.site.heights import air_height_m, default_air_height_m, height_notes
+from blast_env.site.heights import default_air_height_m, height_notes
 from blast_env.site.objective import ObjectiveSection
 from blast_env.site.parameters import SimulationParameters
 from blast_env.site.problems import Problem, ScenarioError, problems_from
@@ -65,7 +56,7 @@ from blast_env.site.sections import (
     StructureSection,
     VehicleSource,
 )
-from blast_env.site.vehicles import AnyCharge, VehicleCharge, VehicleGround, ranked
+from blast_env.site.vehicles import AnyCharge, RatedPiece, VehicleCharge, VehicleGround, ranked
 from blast_env.site.zone import (
     BuildZone,
     KeepOut,
@@ -236,7 +227,7 @@ class Scenario(Section):
     @property
     def charge_radius_m(self) -> float:
         """Radius of the charge's disc at the start, m."""
-        return charge_radius_m(self.parameters)
+        return self.parameters.charge_radius_m
 
     @property
     def air_height_m(self) -> float:
@@ -244,7 +235,9 @@ class Scenario(Section):
 
         The default is 12 m, or 6 m more than the highest structure or barrier if that is more.
         """
-        return air_height_m(self.site, self.structures, self.build_zone)
+        if self.site.air_height_m is not None:
+            return self.site.air_height_m
+        return default_air_height_m(self.structures, self.build_zone)
 
     @property
     def height_notes(self) -> tuple[str, ...]:
@@ -254,7 +247,7 @@ class Scenario(Section):
     @property
     def particle_problems(self) -> tuple[Problem, ...]:
         """The reasons why particle engines cannot run the scenario; `gas` has no such limits."""
-        return tuple(particle_problems(self.parameters, self.charge, self.structures))
+        return tuple(particle_problems(self))
 
     def check_for_particles(self) -> None:
         """Refuse a scenario that particle engines cannot run.
@@ -351,14 +344,14 @@ class Scenario(Section):
             source: Name of the file, for the error.
 
         Raises:
-            ScenarioError: If it is invalid; the error has all problems.
+            ScenarioError: If it is invalid; the error has all problems of the sections or, if each
+                is valid, all problems between them.
         """
         try:
             return cls.model_validate(document)
         except ValidationError as error:
             problems = problems_from(error, cls)
-        # Pydantic skips the checks between sections if any section is invalid.
-        raise ScenarioError(source, (*problems, *check_parts(sound_parts(document))))
+        raise ScenarioError(source, problems)
 
     def at_stand_off(self, distance_m: float) -> "Scenario":
         """Return the scenario with the structure at another distance from the charge.
@@ -432,10 +425,11 @@ class Scenario(Section):
             return Scenario.from_document(
                 self.model_dump() | {"charge": [*own, *document]}, self.name
             )
-        problems = check_sources(self._parts(together))
+        changed = self.model_copy(update={"charge": together})
+        problems = check_sources(changed)
         if problems:
             raise ScenarioError(self.name, problems)
-        return self.model_copy(update={"charge": together})
+        return changed
 
     def with_simulation(
         self, preset: str | None = None, overrides: Mapping[str, Mapping[str, Any]] | None = None
@@ -481,8 +475,17 @@ class Scenario(Section):
         self, source: VehicleSource, layout: Iterable[Element] = ()
     ) -> VehicleGround:
         """Return a vehicle's ground without barriers and the structures that a layout removes."""
-        ground = vehicle_ground(self._parts((source,)), source)
-        return replace(ground, structures=self.structures_with(layout))
+        way = None if self.build_zone is None else self.build_zone.access_way
+        closed: tuple[Rectangle, ...] = ()
+        rated: tuple[RatedPiece, ...] = ()
+        if way is not None and way.gate is not None:
+            where, rating = way.gate.rectangle_m, way.gate.crash_rating
+            if rating is None:
+                closed = (where,)
+            else:
+                rated = (RatedPiece(where, rating, "the gate"),)
+        structures = self.structures_with(layout)
+        return VehicleGround(source, self.site, structures, closed, rated, self.charge_radius_m)
 
     def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
         """Draw independent charges: a source by its weight, then a place in it.
@@ -504,24 +507,10 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check_sections_together(self) -> Self:
         """Refuse a scenario with inconsistent sections."""
-        problems = check_parts(self._parts(self.charge))
+        problems = check_sections(self)
         if problems:
             raise ScenarioError(self.name, problems)
         return self
-
-    def _parts(self, sources: Sequence[AnySource]) -> Parts:
-        """Return the sections for the checks between them, with the given sources."""
-        return Parts(
-            site=self.site,
-            sources=dict(enumerate(sources)),
-            structures=dict(enumerate(self.structures)),
-            all_structures=True,
-            build_zone=self.build_zone,
-            parameters=self.parameters,
-            gauges=dict(enumerate(self.gauges)),
-            components=self.components,
-            objective=self.objective,
-        )
 
 
 _SOURCES: Final = TypeAdapter(Sources)

@@ -22,6 +22,7 @@ from pydantic import (
 )
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.units import UNITS_PER_M
 
 Fraction = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
 Positive = Annotated[StrictFloat, Field(gt=0.0, le=1e9, allow_inf_nan=False)]
@@ -161,6 +162,11 @@ class SimulationParameters(Parameters):
     air: AirParameters = AirParameters()
     contact: ContactParameters = ContactParameters()
     stepping: SteppingParameters = SteppingParameters()
+
+    @property
+    def charge_radius_m(self) -> float:
+        """Radius of the charge's disc at the start, m."""
+        return (self.explosive.offset_units + self.explosive.radius_units) / UNITS_PER_M
 
 
 ENGINE_SETTINGS: Final[Mapping[str, frozenset[str]]] = MappingProxyType(

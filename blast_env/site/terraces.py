@@ -1,6 +1,6 @@
 """Raised ground: terraces and podiums that carry barriers and other structures."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from blast_env.site.problems import Problem
 from blast_env.site.sections import AnyStructure
 
 
-def terrace_problems(structures: Mapping[int, AnyStructure]) -> Iterator[Problem]:
+def terrace_problems(structures: Iterable[AnyStructure]) -> Iterator[Problem]:
     """Yield the problems of terraces, each of which must be solid and have a height."""
-    for index, each in structures.items():
+    for index, each in enumerate(structures):
         if each.carries and each.height_m is None:
             message = "is true, needs the structure's height_m: barriers stand on its top"
             yield Problem(f"structures[{index}].carries", message)

@@ -29,7 +29,6 @@ from blast_env.provenance import package_version
 from blast_env.reading import read_apart
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario, SimulationSection
-from blast_env.site.checks import charge_radius_m
 from blast_env.site.models import MOST_NOTE, MOST_NOTES, SCHEMA_VERSION
 from blast_env.site.sections import SegmentSource
 from blast_env.values import STEERING, path_of
@@ -127,7 +126,7 @@ def _imported(path: Path, options: ImportOptions) -> ImportedSite:
     left_out = (*left_out, *site.faulty)
     buildings = protected_as_asked(fitted, left_out, site, options, ledger)
     simulation = SimulationSection(preset=options.preset)
-    radius_m = charge_radius_m(simulation.parameters)
+    radius_m = simulation.parameters.charge_radius_m
     sources, streets = charge_sources(site, buildings, radius_m, options, ledger)
     zone = build_zone(site, buildings, options)
     used = {
