@@ -259,13 +259,6 @@ class Scenario(Section):
         if problems:
             raise ScenarioError(self.name, problems)
 
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Return a copy with other values, without the hash of the original."""
-        copied = super().model_copy(update=update, deep=deep)
-        for cached in ("content_hash", "unlimited"):
-            copied.__dict__.pop(cached, None)
-        return copied
-
     @property
     def without_budget(self) -> "Scenario":
         """The scenario with any budget, on which no load depends."""

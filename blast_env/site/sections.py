@@ -86,6 +86,13 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values, without the cached properties of the original."""
+        copied = super().model_copy(update=update, deep=deep)
+        for name in copied.__dict__.keys() - type(self).model_fields.keys():
+            del copied.__dict__[name]
+        return copied
+
 
 class Site(Section):
     """The simulated area, with open borders.
@@ -195,27 +202,6 @@ class SegmentSource(ChargeSource):
         return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
 
 
-class RectangleSource(ChargeSource):
-    """A charge uniformly distributed in a rectangle: a parking area."""
-
-    kind: Literal["rectangle"]
-    corner_m: PointM
-    size_m: SizeM
-
-    @property
-    def rectangle_m(self) -> Rectangle:
-        """The area of the charge's places."""
-        return Rectangle.from_corner(self.corner_m, self.size_m)
-
-    def sample_position_m(self, rng: np.random.Generator) -> PointM:
-        """Draw a point of the rectangle."""
-        x_share, y_share = rng.random(2)
-        return (
-            self.corner_m[0] + float(x_share) * self.size_m[0],
-            self.corner_m[1] + float(y_share) * self.size_m[1],
-        )
-
-
 class Ground(Section):
     """A rectangle of the site."""
 
@@ -226,6 +212,20 @@ class Ground(Section):
     def rectangle_m(self) -> Rectangle:
         """The rectangle."""
         return Rectangle.from_corner(self.corner_m, self.size_m)
+
+
+class RectangleSource(ChargeSource, Ground):
+    """A charge uniformly distributed in a rectangle: a parking area."""
+
+    kind: Literal["rectangle"]
+
+    def sample_position_m(self, rng: np.random.Generator) -> PointM:
+        """Draw a point of the rectangle."""
+        x_share, y_share = rng.random(2)
+        return (
+            self.corner_m[0] + float(x_share) * self.size_m[0],
+            self.corner_m[1] + float(y_share) * self.size_m[1],
+        )
 
 
 class Area(Ground):
@@ -286,25 +286,15 @@ _SlowSize = Annotated[StrictFloat, Field(ge=2.0, le=2000.0)]
 """Side of slow ground, m; a smaller one could lie between the places of the speed search."""
 
 
-class SlowArea(Section):
+class SlowArea(Area):
     """Ground that limits a vehicle's speed, with the reason: a speed table, a chicane.
 
     Attributes:
-        corner_m: Lower left corner.
-        size_m: Its size.
         speed_km_h: Largest speed on it.
-        reason: Reason for the limit.
     """
 
-    corner_m: PointM
     size_m: tuple[_SlowSize, _SlowSize]
     speed_km_h: Speed
-    reason: Reason
-
-    @property
-    def rectangle_m(self) -> Rectangle:
-        """The rectangle."""
-        return Rectangle.from_corner(self.corner_m, self.size_m)
 
 
 class Motion(Section):

@@ -38,7 +38,7 @@ from blast_env.site.sections import (
     VehicleSource,
 )
 from blast_env.site.terraces import ground_below_m
-from blast_env.site.worst_places import WorstPlaces, nearest_wall, worst_of
+from blast_env.site.worst_places import WorstPlaces, least_distances_m, worst_of
 from blast_env.site.zone import BuildZone
 from blast_env.units import MODULE_SIDE_M
 
@@ -254,7 +254,7 @@ class VehicleGround:
     @property
     def entry_stand_off_m(self) -> float:
         """Least distance of its centre, just after entry, from a loaded wall, m."""
-        return float(nearest_wall(self.reach().starts_m, self.structures)[0].min())
+        return float(least_distances_m(self.structures, self.reach().starts_m).min())
 
 
 class Impact(NamedTuple):

@@ -12,14 +12,12 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle, WallLine
+from blast_env.site.boxes import box_distances_m
 from blast_env.site.scene import Charge, WallName
 from blast_env.site.sections import AnyStructure, PointM, VehicleSource
 
 _EQUAL_M: Final = 1e-6
 """Tolerance within which distances are equal."""
-
-_NEAR_M: Final = 1e-3
-"""Largest excess over the least approximate distance of a candidate for the worst place."""
 
 
 @dataclass(frozen=True)
@@ -62,48 +60,51 @@ def worst_of(
         places_m: Possible places of its charge, at least one (places, 2).
         structures: The structures.
     """
-    rough_m = _rough_distance_m(places_m, structures)
+    stand_offs_m = least_distances_m(structures, places_m)
     left = np.ones(len(places_m), dtype=bool)
     chosen: list[PointM] = []
     distances_m: list[float] = []
     while left.any() and len(chosen) < source.places:
-        # Only the nearest are compared exactly; they stay ordered by y, then by x.
-        near = np.flatnonzero(left & (rough_m <= rough_m[left].min() + _NEAR_M))
-        distance_m, middle_m = nearest_wall(places_m[near], structures)
-        best = np.arange(len(near))
-        for measure in (distance_m, middle_m, places_m[near, 0], places_m[near, 1]):
+        near = np.flatnonzero(left & (stand_offs_m <= stand_offs_m[left].min() + _EQUAL_M))
+        middle_m = _from_middle_m(structures, places_m[near], stand_offs_m[near])
+        best = np.arange(len(near))  # ordered by y, then by x
+        for measure in (middle_m, *places_m[near].T):
             values = measure[best]
             best = best[values <= values.min() + _EQUAL_M]
-        x_m, y_m = places_m[near[best[0]]]
-        chosen.append((float(x_m), float(y_m)))
-        distances_m.append(float(distance_m[best[0]]))
+        worst = near[best[0]]
+        x_m, y_m = places_m[worst].tolist()
+        chosen.append((x_m, y_m))
+        distances_m.append(float(stand_offs_m[worst]))
         if len(chosen) < source.places:
             apart_m = np.hypot(places_m[:, 0] - x_m, places_m[:, 1] - y_m)
             left &= apart_m >= source.least_apart_m - _EQUAL_M
     return WorstPlaces(source, tuple(chosen), tuple(distances_m))
 
 
-def _rough_distance_m(places_m: FloatArray, structures: Iterable[AnyStructure]) -> FloatArray:
-    """Return the distance of `nearest_wall` up to rounding (places,)."""
-    x_m, y_m = np.ascontiguousarray(places_m.T)
-    square_m2 = np.full(len(places_m), np.inf)
-    for structure in structures:
-        if structure.protected:
-            for wall in _walls(structure):
-                if isinstance(wall, WallLine):
-                    np.minimum(square_m2, wall.distances_m(places_m) ** 2, out=square_m2)
-                    continue
-                left, bottom, right, top = wall
-                across_m, along_m = x_m - x_m.clip(left, right), y_m - y_m.clip(bottom, top)
-                np.minimum(square_m2, across_m**2 + along_m**2, out=square_m2)
-    distance_m: FloatArray = np.sqrt(square_m2)
-    return distance_m
-
-
 def stand_off_m(structures: Iterable[AnyStructure], position_m: PointM) -> float:
     """Return the distance of a place from the nearest loaded wall, m."""
-    distances_m, _ = nearest_wall(np.array([position_m]), structures)
-    return float(distances_m[0])
+    return float(least_distances_m(structures, np.array([position_m]))[0])
+
+
+def least_distances_m(structures: Iterable[AnyStructure], places_m: FloatArray) -> FloatArray:
+    """Return the distances of places (places, 2) from the nearest loaded wall, m (places,)."""
+    nearest_m = np.full(len(places_m), np.inf)
+    for wall in _loaded_walls(structures):
+        np.minimum(nearest_m, _distances_m(wall, places_m), out=nearest_m)
+    return nearest_m
+
+
+def _from_middle_m(
+    structures: Iterable[AnyStructure], places_m: FloatArray, nearest_m: FloatArray
+) -> FloatArray:
+    """Return the distance of places from the middle of the nearest loaded wall, m (places,)."""
+    middle_m = np.full(len(places_m), np.inf)
+    for wall in _loaded_walls(structures):
+        x_m, y_m = (wall.bounds_m if isinstance(wall, WallLine) else wall).centre
+        aside_m = np.hypot(places_m[:, 0] - x_m, places_m[:, 1] - y_m)
+        is_nearest = _distances_m(wall, places_m) <= nearest_m + _EQUAL_M
+        np.minimum(middle_m, aside_m, out=middle_m, where=is_nearest)
+    return middle_m
 
 
 def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> PointM:
@@ -113,8 +114,7 @@ def nearest_point_m(structures: Iterable[AnyStructure], position_m: PointM) -> P
         ValueError: If no structure is protected.
     """
     x_m, y_m = position_m
-    walls = [wall for each in structures if each.protected for wall in _walls(each)]
-    points = [_nearest_m(wall, position_m) for wall in walls]
+    points = [_nearest_m(wall, position_m) for wall in _loaded_walls(structures)]
     return min(points, key=lambda point: hypot(point[0] - x_m, point[1] - y_m))
 
 
@@ -126,80 +126,28 @@ def _nearest_m(wall: Rectangle | WallLine, place_m: PointM) -> PointM:
     return min(max(place_m[0], left), right), min(max(place_m[1], bottom), top)
 
 
-def nearest_wall(
-    places_m: FloatArray, structures: Iterable[AnyStructure]
-) -> tuple[FloatArray, FloatArray]:
-    """Return the distance of places from the nearest loaded wall, and from its middle, m.
-
-    Args:
-        places_m: The places (places, 2).
-        structures: The structures, of which the protected ones count.
-    """
-    nearest_m, middle_m, most_m = np.full((3, len(places_m)), np.inf)
+def _distances_m(wall: Rectangle | WallLine, places_m: FloatArray) -> FloatArray:
+    """Return the distances of places (places, 2) from a wall, m (places,)."""
+    if isinstance(wall, WallLine):
+        return wall.distances_m(places_m)
     x_m, y_m = np.ascontiguousarray(places_m.T)
-    protected = [each for each in structures if each.protected]
-
-    def least_m(structure: AnyStructure) -> FloatArray:
-        left, bottom, right, top = _around_m(structure)
-        across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
-        along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
-        distances_m: FloatArray = np.sqrt(across_m**2 + along_m**2)
-        return distances_m
-
-    for structure in protected:
-        left, bottom, right, top = _around_m(structure)
-        # No wall of the structure is farther from a place than this.
-        diagonal_m = hypot(right - left, top - bottom) + 2.0 * _EQUAL_M
-        np.minimum(most_m, least_m(structure) + diagonal_m, out=most_m)
-    for structure in protected:
-        near = np.flatnonzero(least_m(structure) <= most_m)
-        nearest_m[near], middle_m[near] = _nearer_wall(
-            places_m[near], structure, nearest_m[near], middle_m[near]
-        )
-    return nearest_m, middle_m
+    return box_distances_m(wall, (x_m, y_m, x_m, y_m))
 
 
-def _nearer_wall(
-    places_m: FloatArray, structure: AnyStructure, nearest_m: FloatArray, middle_m: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return both distances of `nearest_wall`, updated with one more structure."""
-    x_m, y_m = places_m.T
-    for wall in _walls(structure):
-        if isinstance(wall, WallLine):
-            left, bottom, right, top = wall.bounds_m
-            wall_m = wall.distances_m(places_m)
-        else:
-            left, bottom, right, top = wall
-            across_m = np.maximum(np.maximum(left - x_m, x_m - right), 0.0)
-            along_m = np.maximum(np.maximum(bottom - y_m, y_m - top), 0.0)
-            wall_m = np.hypot(across_m, along_m)
-        aside_m = np.hypot(x_m - (left + right) / 2.0, y_m - (bottom + top) / 2.0)
-        nearer = wall_m < nearest_m - _EQUAL_M
-        as_near = np.abs(wall_m - nearest_m) <= _EQUAL_M
-        middle_m = np.where(
-            nearer, aside_m, np.where(as_near, np.minimum(middle_m, aside_m), middle_m)
-        )
-        nearest_m = np.minimum(nearest_m, wall_m)
-    return nearest_m, middle_m
-
-
-def _around_m(structure: AnyStructure) -> Rectangle:
-    """Return the rectangle around the walls of a structure."""
-    if structure.footprint is None:
-        return structure.rectangle_m
-    return Rectangle.around([each.bounds_m for each in structure.footprint.walls])
-
-
-def _walls(structure: AnyStructure) -> Iterator[Rectangle | WallLine]:
-    """Yield the loaded walls: of a rectangle as rectangles of width 0."""
-    if structure.footprint is not None:
-        yield from (each for each in structure.footprint.walls if each.side in structure.faces)
-        return
-    left, bottom, right, top = structure.rectangle_m
-    sides: dict[WallName, Rectangle] = {
-        "west": Rectangle(left, bottom, left, top),
-        "east": Rectangle(right, bottom, right, top),
-        "south": Rectangle(left, bottom, right, bottom),
-        "north": Rectangle(left, top, right, top),
-    }
-    yield from (sides[wall] for wall in structure.faces)
+def _loaded_walls(structures: Iterable[AnyStructure]) -> Iterator[Rectangle | WallLine]:
+    """Yield the loaded walls of protected structures: of a rectangle as rectangles of width 0."""
+    for structure in structures:
+        if not structure.protected:
+            continue
+        if structure.footprint is not None:
+            walls = structure.footprint.walls
+            yield from (each for each in walls if each.side in structure.faces)
+            continue
+        left, bottom, right, top = structure.rectangle_m
+        sides: dict[WallName, Rectangle] = {
+            "west": Rectangle(left, bottom, left, top),
+            "east": Rectangle(right, bottom, right, top),
+            "south": Rectangle(left, bottom, right, bottom),
+            "north": Rectangle(left, top, right, top),
+        }
+        yield from (sides[wall] for wall in structure.faces)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import inf
 from typing import Annotated, Any, Final
 
@@ -86,31 +86,6 @@ class CostArea(Area):
         return {key: value for key, value in handler(self).items() if value is not None}
 
 
-@dataclass(frozen=True, eq=False)
-class _SameItems:
-    """The items of a zone compared by identity, since comparison by value is slow."""
-
-    items: tuple[Item, ...]
-    hardening: tuple[Hardening, ...]
-    removable: tuple[Demolition, ...]
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, _SameItems)
-            and other.items is self.items
-            and other.hardening is self.hardening
-            and other.removable is self.removable
-        )
-
-    def __hash__(self) -> int:
-        return id(self.items)
-
-
-@lru_cache(maxsize=64)
-def _catalogue_of(same: _SameItems, shape: tuple[int, int]) -> Catalogue:
-    return Catalogue.of_items(same.items, (*same.hardening, *same.removable), shape)
-
-
 class BuildZone(Section):
     """The zone for barriers: a grid of cells of one module each.
 
@@ -178,12 +153,11 @@ class BuildZone(Section):
         """The unit of costs: the currency, or `cost units` without one."""
         return self.currency or "cost units"
 
-    @property
+    @cached_property
     def catalogue(self) -> Catalogue:
         """The catalogue of items, or of the single module."""
         if self.items:
-            same = _SameItems(self.items, self.hardening, self.removable)
-            return _catalogue_of(same, self.shape)
+            return Catalogue.of_items(self.items, self.measures, self.shape)
         return Catalogue.of_modules(self.stock, self.height_m, self.module_cost, self.shape)
 
     @property
