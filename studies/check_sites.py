@@ -6,7 +6,7 @@ draws are measured, so that wrong rejections show.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from math import ceil, inf
 from pathlib import Path
@@ -40,14 +40,13 @@ from blast_env.sites import (
     SITES,
     SiteCriterion,
     SiteMeasures,
-    SiteRanges,
     Visibility,
     VisibilityCriterion,
     draw_site,
     visibility_layout,
 )
 from blast_env.sites.criterion import cut_share_of
-from blast_env.sites.generate import AnyRanges, criterion_of
+from blast_env.sites.ranges import Ranges
 
 LEAST_REDUCTION: Final = 0.15
 
@@ -152,7 +151,7 @@ def rule_layouts(site: Scenario) -> dict[str, Layout]:
     return {name: layout for name, layout in layouts_by_rule(site).items() if layout}
 
 
-def drawn_sites(seed: int, ranges: AnyRanges) -> Iterator[Scenario]:
+def drawn_sites(seed: int, ranges: Ranges) -> Iterator[Scenario]:
     """Yield the sites that `generate_site` draws for a seed; it returns the last one."""
     rng = np.random.default_rng(seed)
     while True:
@@ -161,7 +160,7 @@ def drawn_sites(seed: int, ranges: AnyRanges) -> Iterator[Scenario]:
         except ScenarioError:  # the parts drawn do not fit together
             continue
         yield site
-        if criterion_of(ranges).objection(site) is None:
+        if ranges.criterion.objection(site) is None:
             return
 
 
@@ -176,15 +175,15 @@ def main(
     rejected: Annotated[
         bool, typer.Option(help="Measure what the criterion rejected on the way, too.")
     ] = True,
-    preset: str = SiteRanges.preset,
-    calibration: str = SiteRanges.calibration,
+    preset: str = FAMILIES[SITES].preset,
+    calibration: str = FAMILIES[SITES].calibration,
     picture: Annotated[Path | None, typer.Option(help="Where to draw the first twelve.")] = None,
 ) -> None:
     """Print tables about generated sites, and draw some."""
     with user_errors(), running_on(cluster):
         if family not in FAMILIES:
             raise UnknownNameError("family", family, FAMILIES)
-        ranges = replace(FAMILIES[family], preset=preset, calibration=calibration)
+        ranges = FAMILIES[family].changed(preset=preset, calibration=calibration)
         run_by = find_engine(engine or ("event" if family == SITES else "gas"))
         of_seeds = [list(drawn_sites(seed, ranges)) for seed in range(sites)]
         if picture is not None:
@@ -197,7 +196,7 @@ def main(
             random_layouts=random_layouts,
             threats=threats,
             engine=run_by,
-            criterion=criterion_of(ranges),
+            criterion=ranges.criterion,
         )
         with progress_bar("blasts") as progress:
             results = run_all(measure, drawn, processes, progress=progress)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,14 @@ from blast_env.units import MODULE_SIDE_M
 
 
 def _check_whole_modules(width_m: float) -> float:
-    """Refuse a width that is not a whole number of cells."""
+    """Refuse a length that is not a whole number of modules."""
     if abs(width_m - round(width_m / MODULE_SIDE_M) * MODULE_SIDE_M) > 1e-9:
         raise ValueError(f"must be a multiple of {MODULE_SIDE_M:g}, the side of a module")
     return width_m
+
+
+WholeModules: Final = AfterValidator(_check_whole_modules)
+"""Annotation of a length of whole modules."""
 
 
 class Gate(Ground):
@@ -56,9 +60,7 @@ class AccessWay(Section):
             closed to vehicles with a charge.
     """
 
-    width_m: Annotated[
-        StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0), AfterValidator(_check_whole_modules)
-    ]
+    width_m: Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0), WholeModules]
     between: Literal["left_right", "bottom_top"]
     gate: Gate | None = None
 

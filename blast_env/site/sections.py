@@ -687,6 +687,10 @@ def _check_preset(name: str) -> str:
     return name
 
 
+PresetName = Annotated[str, AfterValidator(_check_preset)]
+"""Name of a preset of the particle model."""
+
+
 def _check_overrides(overrides: dict[str, Any]) -> dict[str, Any]:
     """Refuse overrides of unknown parameters, and values out of bounds."""
     groups = (_group_problems(group, values) for group, values in overrides.items())
@@ -723,7 +727,7 @@ class SimulationSection(Section):
         overrides: Nested like `SimulationParameters`: `{"air": {"spacing_units": 3.0}}`.
     """
 
-    preset: Annotated[str, AfterValidator(_check_preset)] = "ballistic"
+    preset: PresetName = "ballistic"
     overrides: Annotated[dict[str, Any], AfterValidator(_check_overrides)] = Field(
         default_factory=dict
     )

@@ -16,7 +16,8 @@ from blast_env.sites.item_sites import (
     close_ranges,
     large_ranges,
 )
-from blast_env.sites.ranges import SiteRanges
+from blast_env.sites.module_sites import SiteRanges
+from blast_env.sites.ranges import Ranges
 from blast_env.sites.source import (
     FAMILIES,
     HELD_OUT_SITES,
@@ -34,6 +35,7 @@ __all__ = [
     "SITES",
     "ItemSiteRanges",
     "Objection",
+    "Ranges",
     "SiteCriterion",
     "SiteMeasures",
     "SiteRanges",

@@ -1,31 +1,38 @@
 """Sites with heights, a catalogue, several buildings, and charges on roads or in vehicles."""
 
-from dataclasses import dataclass
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, ClassVar, Final, NamedTuple, Self
 
-import numpy as np
+from pydantic import Field, StrictFloat, model_validator
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.site import SCHEMA_VERSION, Scenario
-from blast_env.site.parameters import preset
+from blast_env.site import Problem, ScenarioError
+from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.sites.ranges import (
     MARGIN_M,
+    Amounts,
     Apart,
-    Bounds,
-    CountsBounds,
+    Counts,
+    Drawn,
     Draws,
-    LengthBounds,
-    LengthsBounds,
-    PairBounds,
+    Gaps,
+    Lengths,
+    Numbers,
     Probability,
+    Ranges,
+    Shifts,
+    Side,
     Span,
     WholeSpan,
-    check_bounds,
+    ZoneSide,
+    draw_path,
     draw_place,
+    ground,
     on_grid,
+    source,
+    structure,
+    yard,
 )
-from blast_env.sites.turning import turned
 from blast_env.units import MODULE_SIDE_M
 
 
@@ -61,22 +68,16 @@ ITEM_KINDS: Final = (
 POST: Final = "post"
 
 
-@dataclass(frozen=True)
-class ItemSiteRanges:
+class ItemSiteRanges(Ranges):
     """Ranges of generated sites with a catalogue.
 
-    As in `SiteRanges`, pairs are lowest and highest value, lengths are on the 0.5 m grid, and
-    descriptions assume the threat on the left. With the default sizes a gas blast with cells of
-    0.5 m takes a fraction of a second.
-
-    Sites of the same ranges have one size, build zones of one size, and the items of `ITEM_KINDS`,
-    some of them not in stock. So they share action and observation space, which includes the
-    planes and values of vehicles for sites without one.
+    See `Ranges`. With the default sizes a gas blast with cells of 0.5 m takes a fraction of a
+    second. All sites have the items of `ITEM_KINDS`, some of them not in stock. So they share
+    action and observation space, which includes the planes and values of vehicles for sites
+    without one.
 
     Attributes:
-        side_m: Width and height of the site, m.
         air_height_m: Height of the air, m.
-        zone_side_m: Width and height of the build zone, m.
         tnt_kg: TNT-equivalent mass of the charge.
         vehicle_probability: Probability that a vehicle carries the charge.
         parking_probability: Probability, without a vehicle, of a charge on a parking area instead
@@ -112,55 +113,51 @@ class ItemSiteRanges:
         price_of_height: Exponent p in the cost of a piece, length times height to the power p.
         budget: Budget, in the cost of 1 m of a wall 1 m high.
         cvar_probability: Probability that the objective is the CVaR over charges, not the mean.
-        preset: Preset of the particle model.
-        calibration: Name of the calibration for the particle engines.
-
-    Raises:
-        BlastEnvError: If a value is out of bounds, or the site is too small for these ranges.
-        UnknownNameError: If there is no such preset.
     """
 
-    side_m: Annotated[float, LengthBounds(10.0, 200.0)] = 26.0
-    air_height_m: Annotated[float, Bounds(4.0, 200.0)] = 9.0
-    zone_side_m: Annotated[float, LengthBounds(4.0, 100.0)] = 13.0
-    tnt_kg: Annotated[Span, PairBounds(0.1, 100_000.0)] = (100.0, 140.0)
+    side_m: Side = 26.0
+    air_height_m: Annotated[StrictFloat, Field(ge=2.0, le=2000.0)] = 9.0
+    zone_side_m: ZoneSide = 13.0
+    tnt_kg: Amounts = (100.0, 140.0)
     vehicle_probability: Probability = 0.5
     parking_probability: Probability = 0.4
-    road_length_m: Annotated[Span, LengthsBounds(0.5, 200.0)] = (6.0, 12.0)
-    entry_m: Annotated[Span, LengthsBounds(2.5, 200.0)] = (4.0, 6.0)
-    vehicle_width_m: Annotated[Span, LengthsBounds(1.5, 10.0)] = (2.0, 2.5)
-    forecourt_m: Annotated[Span, LengthsBounds(2.5, 200.0)] = (6.0, 11.0)
-    kerb_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (6.5, 7.5)
-    zone_from_border_m: Annotated[Span, LengthsBounds(2.5, 50.0)] = (4.0, 4.5)
-    stand_off_m: Annotated[Span, LengthsBounds(4.0, 100.0)] = (11.0, 15.0)
-    facade_m: Annotated[Span, LengthsBounds(2.0, 100.0)] = (5.0, 9.0)
-    depth_m: Annotated[Span, LengthsBounds(1.0, 100.0)] = (3.0, 5.0)
-    storeys: Annotated[WholeSpan, CountsBounds(1, 20)] = (1, 2)
+    road_length_m: Lengths = (6.0, 12.0)
+    entry_m: Lengths = (4.0, 6.0)
+    vehicle_width_m: Lengths = (2.0, 2.5)
+    forecourt_m: Lengths = (6.0, 11.0)
+    kerb_m: Lengths = (6.5, 7.5)
+    zone_from_border_m: Lengths = (4.0, 4.5)
+    stand_off_m: Lengths = (11.0, 15.0)
+    facade_m: Lengths = (5.0, 9.0)
+    depth_m: Lengths = (3.0, 5.0)
+    storeys: Counts = (1, 2)
     second_probability: Probability = 0.4
-    second_weight: Annotated[Span, PairBounds(0.1, 100.0)] = (0.5, 2.0)
+    second_weight: Amounts = (0.5, 2.0)
     shed_probability: Probability = 0.4
-    shed_side_m: Annotated[Span, LengthsBounds(1.0, 50.0)] = (2.0, 4.0)
-    shift_m: Annotated[Span, LengthsBounds(-50.0, 50.0)] = (-2.0, 2.0)
+    shed_side_m: Lengths = (2.0, 4.0)
+    shift_m: Shifts = (-2.0, 2.0)
     path_probability: Probability = 0.5
-    path_width_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (1.5, 2.0)
-    trees: Annotated[WholeSpan, CountsBounds(0, 50)] = (0, 2)
-    tree_side_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (1.0, 2.0)
-    clearance_m: Annotated[Span, LengthsBounds(0.0, 50.0)] = (0.5, 1.5)
+    path_width_m: Lengths = (1.5, 2.0)
+    trees: Numbers = (0, 2)
+    tree_side_m: Lengths = (1.0, 2.0)
+    clearance_m: Gaps = (0.5, 1.5)
     access_way_probability: Probability = 0.35
-    access_way_width_m: Annotated[Span, LengthsBounds(0.5, 50.0)] = (3.0, 3.5)
+    access_way_width_m: Lengths = (3.0, 3.5)
     duct_probability: Probability = 0.35
-    duct_factor: Annotated[Span, PairBounds(0.1, 1e6)] = (1.5, 3.0)
+    duct_factor: Amounts = (1.5, 3.0)
     item_probability: Probability = 0.7
-    price_of_height: Annotated[Span, PairBounds(0.0, 5.0)] = (0.8, 1.4)
-    budget: Annotated[Span, PairBounds(1.0, 1e6)] = (16.0, 34.0)
+    price_of_height: Amounts = (0.8, 1.4)
+    budget: Amounts = (16.0, 34.0)
     cvar_probability: Probability = 0.25
-    preset: str = "collisional"
-    calibration: str = "collisional_kb"
 
-    def __post_init__(self) -> None:
-        """Check the values; see the class for the errors."""
-        check_bounds(self)
-        preset(self.preset)
+    criterion: ClassVar = VisibilityCriterion(
+        least_layout_share=0.5, most_layout_share=1.0, least_advantage=0.25
+    )
+    """A wall may cut all lines in plan, since blast passes over it."""
+
+    @model_validator(mode="after")
+    def _check_room(self) -> Self:
+        """Refuse a site that is too small for the ranges."""
         needs_m = {
             "stand-off, the largest depth and the road": (
                 _ROAD_M + self.stand_off_m[0] + self.depth_m[0] + MARGIN_M
@@ -168,27 +165,44 @@ class ItemSiteRanges:
             "the build zone": self.zone_from_border_m[1] + self.zone_side_m,
             "two facades": 2.0 * self.facade_m[0] + _BETWEEN_M + 2.0 * MARGIN_M,
         }
-        for what, need_m in needs_m.items():
-            if need_m > self.side_m:
-                raise BlastEnvError(
-                    f"ItemSiteRanges: side_m is {self.side_m:g}, must be at least {need_m:g}, to"
-                    f" have room for {what}"
-                )
+        problems = list(self._without_room(needs_m))
         if self.forecourt_m[1] > self.zone_side_m:
-            raise BlastEnvError(
-                f"ItemSiteRanges: forecourt_m is {self.forecourt_m}, must be at most"
-                f" {self.zone_side_m:g}, zone_side_m: else nothing could stop a vehicle"
+            message = (
+                f"is {self.forecourt_m}, must be at most {self.zone_side_m:g}, zone_side_m: else"
+                " nothing could stop a vehicle"
             )
-        if 3.0 * self.storeys[1] > self.air_height_m:
-            raise BlastEnvError(
-                f"ItemSiteRanges: storeys is {self.storeys}, of 3 m each, must be at most"
+            problems.append(Problem("forecourt_m", message))
+        if STOREY_M * self.storeys[1] > self.air_height_m:
+            message = (
+                f"is {self.storeys}, of {STOREY_M:g} m each, must be at most"
                 f" {self.air_height_m:g} m in all, air_height_m"
             )
+            problems.append(Problem("storeys", message))
+        if problems:
+            raise ScenarioError("ItemSiteRanges", problems)
+        return self
 
-    @property
-    def zone_cells(self) -> int:
-        """Number of rows and of columns of the build zone."""
-        return round(self.zone_side_m / MODULE_SIDE_M)
+    def drawn(self, draws: Draws) -> Drawn:
+        """Draw a site."""
+        has_vehicle = draws.happens(self.vehicle_probability)
+        plan = _draw_plan(draws, self)
+        charge = (_vehicle if has_vehicle else _place)(draws, self, plan)
+        sections: dict[str, Any] = {
+            "site": {
+                "width_m": self.side_m,
+                "height_m": self.side_m,
+                "air_height_m": self.air_height_m,
+            },
+            "charge": [charge],
+            "structures": _structures(draws, self, plan),
+            "build_zone": _zone(draws, self, plan, has_vehicle),
+        }
+        if draws.happens(self.cvar_probability):
+            sections["objective"] = {"charges": "cvar"}
+        front_m = plan.front_m - (0.0 if has_vehicle else _ROAD_M)
+        what = {"vehicle": "a vehicle", "segment": "a car"}.get(charge["kind"], "parked cars")
+        description = f"A generated site: {what}, at most {front_m:g} m from what is protected."
+        return Drawn(description, sections)
 
 
 LARGE_SIDE_M: Final = 60.0
@@ -307,48 +321,6 @@ class ItemSitePlan(NamedTuple):
     middle_m: float
 
 
-def draw_item_site(rng: np.random.Generator, ranges: ItemSiteRanges, name: str) -> Scenario:
-    """Draw a site without applying a criterion.
-
-    Args:
-        rng: The random stream.
-        ranges: Ranges of the site.
-        name: Name of the site.
-
-    Raises:
-        ScenarioError: If the drawn objects are inconsistent.
-    """
-    draws = Draws(rng)
-    has_vehicle = draws.happens(ranges.vehicle_probability)
-    plan = _draw_plan(draws, ranges)
-    source = (_vehicle if has_vehicle else _place)(draws, ranges, plan)
-    structures = _structures(draws, ranges, plan)
-    zone = _zone(draws, ranges, plan, has_vehicle)
-    counts: dict[str, Any] = {}
-    if draws.happens(ranges.cvar_probability):
-        counts = {"objective": {"charges": "cvar"}}
-    quarter_turns = draws.count((0, 3))
-    front_m = plan.front_m - (0.0 if has_vehicle else _ROAD_M)
-    what = "a vehicle" if has_vehicle else "a car" if source["kind"] == "segment" else "parked cars"
-    document = {
-        "schema_version": SCHEMA_VERSION,
-        "name": name,
-        "description": f"A generated site: {what}, at most {front_m:g} m from what is protected.",
-        "calibration": ranges.calibration,
-        "site": {
-            "width_m": ranges.side_m,
-            "height_m": ranges.side_m,
-            "air_height_m": ranges.air_height_m,
-        },
-        "charge": [source],
-        "structures": structures,
-        "build_zone": zone,
-        "simulation": {"preset": ranges.preset},
-        **counts,
-    }
-    return turned(Scenario.from_document(document, name), quarter_turns)
-
-
 def _draw_plan(draws: Draws, ranges: ItemSiteRanges) -> ItemSitePlan:
     middle_m = ranges.side_m / 2.0 + draws.length_m(ranges.shift_m)
     front_m = _ROAD_M + draws.length_m(ranges.stand_off_m)
@@ -381,12 +353,11 @@ def _place(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str
     length_m = draws.length_m(ranges.road_length_m)
     bottom = on_grid(plan.middle_m - length_m / 2.0)
     bottom = min(max(bottom, MARGIN_M), ranges.side_m - MARGIN_M - length_m)
-    mass = {"tnt_kg": draws.amount(ranges.tnt_kg, 0)}
+    tnt_kg = draws.amount(ranges.tnt_kg, 0)
+    left, right = _ROAD_M, _ROAD_M
     if draws.happens(ranges.parking_probability):
-        corner_m, size_m = [MARGIN_M, bottom], [_ROAD_M - MARGIN_M + 1.0, length_m]
-        return {"kind": "rectangle", "corner_m": corner_m, "size_m": size_m, **mass}
-    ends = {"start_m": [_ROAD_M, bottom], "end_m": [_ROAD_M, bottom + length_m]}
-    return {"kind": "segment", **ends, **mass}
+        left, right = MARGIN_M, _ROAD_M + 1.0
+    return source(Rectangle(left, bottom, right, bottom + length_m), tnt_kg)
 
 
 def _vehicle(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> dict[str, Any]:
@@ -412,9 +383,9 @@ def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> lis
     structures: list[dict[str, Any]] = []
     for number, building in enumerate(plan.buildings):
         weight = round(draws.amount(ranges.second_weight, 1), 1) if number else 1.0
-        own: dict[str, Any] = {"protected": True, "weight": weight}
-        own["height_m"] = STOREY_M * draws.count(ranges.storeys)
-        structures.append(_block("annexe" if number else "building", building) | own)
+        name, height_m = "annexe" if number else "building", STOREY_M * draws.count(ranges.storeys)
+        own = {"protected": True, "weight": weight, "height_m": height_m}
+        structures.append(structure(name, building, **own))
     if draws.happens(ranges.shed_probability):
         size_m = (draws.length_m(ranges.shed_side_m), draws.length_m(ranges.shed_side_m))
         far_m = ranges.side_m - MARGIN_M
@@ -422,19 +393,8 @@ def _structures(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> lis
         others = [Apart(each, _BETWEEN_M) for each in plan.buildings]
         shed = draw_place(draws, area, size_m, [*others, Apart(plan.zone, 0.0)])
         if shed is not None:
-            structures.append(_block("shed", shed) | {"height_m": STOREY_M})
+            structures.append(structure("shed", shed, height_m=STOREY_M))
     return structures
-
-
-def _block(name: str, rectangle: Rectangle) -> dict[str, Any]:
-    left, bottom, right, top = rectangle
-    return {
-        "kind": "ModularObstacle",
-        "name": name,
-        "corner_m": [left, bottom],
-        "rows": round((top - bottom) / MODULE_SIDE_M),
-        "columns": round((right - left) / MODULE_SIDE_M),
-    }
 
 
 def _zone(
@@ -495,28 +455,19 @@ def _items(draws: Draws, ranges: ItemSiteRanges, has_vehicle: bool) -> list[dict
 def _keep_outs(draws: Draws, ranges: ItemSiteRanges, plan: ItemSitePlan) -> list[dict[str, Any]]:
     """Return a path to the door and trees, within the zone before the buildings."""
     zone, building = plan.zone, plan.buildings[0]
-    yard = Rectangle(zone.left, zone.bottom, min(zone.right, plan.front_m), zone.top)
     places: list[tuple[str, Rectangle]] = []
     width_m = draws.length_m(ranges.path_width_m)
-    low, high = max(zone.bottom, building.bottom), min(zone.top, building.top) - width_m
-    if draws.happens(ranges.path_probability) and high >= low:
-        corner_m = (zone.left, draws.length_m((low, high)))
-        path = Rectangle.from_corner(corner_m, (yard.right - zone.left, width_m))
-        places.append(("the path to the door must stay open", path))
+    if draws.happens(ranges.path_probability):
+        path = draw_path(draws, zone, building, width_m)
+        if path is not None:
+            places.append(("the path to the door must stay open", path))
     for _ in range(draws.count(ranges.trees)):
         side_m = draws.length_m(ranges.tree_side_m)
         others = [Apart(each, 0.0) for _, each in places]
-        tree = draw_place(draws, yard, (side_m, side_m), others)
+        tree = draw_place(draws, yard(zone, building), (side_m, side_m), others)
         if tree is not None:
             places.append(("tree", tree))
-    return [
-        {
-            "corner_m": [each.left, each.bottom],
-            "size_m": [each.right - each.left, each.top - each.bottom],
-            "reason": reason,
-        }
-        for reason, each in places
-    ]
+    return [ground(each, reason=reason) for reason, each in places]
 
 
 def _access_way(

@@ -1,16 +1,20 @@
-"""Bounds of a dataclass's values as annotations, their checks, and draws within bounds."""
+"""Ranges of generated sites, draws within them, and the parts of a site that all families share."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import ceil, floor
-from typing import Annotated, Any, ClassVar, Final, NamedTuple, TypeGuard, get_type_hints
+from typing import Annotated, Any, ClassVar, Final, NamedTuple, Self
 
 import numpy as np
+from pydantic import AfterValidator, Field, StrictFloat, StrictInt, ValidationError
 
-from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
+from blast_env.site import Problem, ScenarioError
+from blast_env.site.access_way import WholeModules
 from blast_env.site.boxes import box_distances_m
-from blast_env.site.parameters import preset
+from blast_env.site.problems import problems_from
+from blast_env.site.sections import Name, PresetName, Section
+from blast_env.sites.criterion import VisibilityCriterion
 from blast_env.units import MODULE_SIDE_M
 
 Span = tuple[float, float]
@@ -22,113 +26,62 @@ WholeSpan = tuple[int, int]
 _TOLERANCE: Final = 1e-9  # of a module
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """A number within bounds.
-
-    Attributes:
-        least: Lower bound.
-        most: Upper bound.
-    """
-
-    least: float
-    most: float
-
-    words: ClassVar[str] = "a number"
-
-    def __str__(self) -> str:
-        return f"{self.words} from {self.least:.10g} to {self.most:.10g}"
-
-    def allow(self, value: object) -> bool:
-        """Return whether a value has the right form and is within bounds."""
-        return self._is_within(value)
-
-    def _is_within(self, value: object) -> TypeGuard[float]:
-        if not isinstance(value, int | float) or isinstance(value, bool):
-            return False
-        return self.least <= value <= self.most
-
-
-class PairBounds(Bounds):
-    """A pair (lowest, highest) of numbers within bounds."""
-
-    words = "a pair (lowest, highest) of numbers"
-
-    def allow(self, value: object) -> bool:
-        """Return whether a value has the right form and is within bounds."""
-        return self._is_pair(value)
-
-    def _is_pair(self, value: object) -> TypeGuard[Span]:
-        if not (isinstance(value, tuple) and len(value) == 2):
-            return False
-        return all(map(self._is_within, value)) and value[0] <= value[1]
-
-
-class CountsBounds(PairBounds):
-    """A pair of whole numbers within bounds."""
-
-    words = "a pair (lowest, highest) of whole numbers"
-
-    def allow(self, value: object) -> bool:
-        """Return whether a value has the right form and is within bounds."""
-        return self._is_pair(value) and all(isinstance(each, int) for each in value)
-
-
-class LengthBounds(Bounds):
-    """A length of whole modules within bounds, m."""
-
-    words = f"a multiple of {MODULE_SIDE_M:g} m"
-
-    def allow(self, value: object) -> bool:
-        """Return whether a value has the right form and is within bounds."""
-        return self._is_within(value) and _has_grid((value, value))
-
-
-class LengthsBounds(PairBounds):
-    """A pair of lengths within bounds, m, with whole modules between them."""
-
-    words = f"a pair (lowest, highest) with a multiple of {MODULE_SIDE_M:g} m between,"
-
-    def allow(self, value: object) -> bool:
-        """Return whether a value has the right form and is within bounds."""
-        return self._is_pair(value) and _has_grid(value)
-
-
-def check_bounds(instance: Any) -> None:
-    """Check the fields of a dataclass that are annotated with bounds.
-
-    Raises:
-        BlastEnvError: If a value is out of bounds; the message names field, value and bound.
-    """
-    hints = get_type_hints(type(instance), include_extras=True)
-    for each in fields(instance):
-        value = getattr(instance, each.name)
-        for bounds in getattr(hints[each.name], "__metadata__", ()):
-            if not bounds.allow(value):
-                owner = type(instance).__name__
-                raise BlastEnvError(f"{owner}: {each.name} is {value!r}, must be {bounds}")
-
-
 def modules_within(span_m: Span) -> tuple[int, int]:
     """Return the least and the largest whole number of modules in a range of lengths."""
     low_m, high_m = span_m
     return ceil(low_m / MODULE_SIDE_M - _TOLERANCE), floor(high_m / MODULE_SIDE_M + _TOLERANCE)
 
 
-def _has_grid(span_m: Span) -> bool:
-    first, last = modules_within(span_m)
-    return first <= last
+def _check_rising(span: Span) -> Span:
+    if span[0] > span[1]:
+        problem = Problem("", f"is {span}, must be a pair (lowest, highest)")
+        raise ScenarioError("ranges", [problem])
+    return span
 
 
-Probability = Annotated[float, Bounds(0.0, 1.0)]
+def _check_grid(span_m: Span) -> Span:
+    first, last = modules_within(_check_rising(span_m))
+    if first > last:
+        message = f"is {span_m}, must have a multiple of {MODULE_SIDE_M:g} m between"
+        raise ScenarioError("ranges", [Problem("", message)])
+    return span_m
+
+
+_Length = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=2000.0)]
+_Gap = Annotated[StrictFloat, Field(ge=0.0, le=2000.0)]
+_Shift = Annotated[StrictFloat, Field(ge=-2000.0, le=2000.0)]
+_Amount = Annotated[StrictFloat, Field(ge=0.1, le=1e9)]
+_Number = Annotated[StrictInt, Field(ge=0, le=90)]
+_Count = Annotated[StrictInt, Field(ge=1, le=10_000)]
+
+Probability = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
+Side = Annotated[StrictFloat, Field(ge=2.0, le=2000.0), WholeModules]
+ZoneSide = Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=500.0), WholeModules]
+Lengths = Annotated[tuple[_Length, _Length], AfterValidator(_check_grid)]
+Gaps = Annotated[tuple[_Gap, _Gap], AfterValidator(_check_grid)]
+Shifts = Annotated[tuple[_Shift, _Shift], AfterValidator(_check_grid)]
+Amounts = Annotated[tuple[_Amount, _Amount], AfterValidator(_check_rising)]
+Numbers = Annotated[tuple[_Number, _Number], AfterValidator(_check_rising)]
+Counts = Annotated[tuple[_Count, _Count], AfterValidator(_check_rising)]
 
 MARGIN_M: Final = 1.0
 """Width of the free strip along the border of a site."""
 
 
-@dataclass(frozen=True)
-class SiteRanges:
-    """Ranges of generated sites.
+class Drawn(NamedTuple):
+    """What is drawn of a site.
+
+    Attributes:
+        description: Its description, with `{side}` for the side of the threat after the turn.
+        sections: The sections of its scenario that differ between sites, as plain data.
+    """
+
+    description: str
+    sections: dict[str, Any]
+
+
+class Ranges(Section):
+    """Base of the ranges of a family of sites.
 
     A pair is the lowest and the highest value, both included, of a uniform distribution; lengths
     are drawn on the 0.5 m grid of the modules. Descriptions assume the threat on the left;
@@ -139,112 +92,51 @@ class SiteRanges:
     Attributes:
         side_m: Width and height of the site, m.
         zone_side_m: Width and height of the build zone, m.
-        tnt_kg: TNT-equivalent mass of the charge, rounded to whole kg within the range.
-        road_from_border_m: From the left border to road or parking area, m.
-        road_length_m: Length of the stretch of road with the charge, m.
-        parking_probability: Probability of a parking area instead of the road.
-        parking_length_m: Length of a parking area along the road, m.
-        parking_depth_m: Its depth, m.
-        threat_shift_m: From the middle of the site to that of road or parking area, m.
-        stand_off_m: From road or parking area to the facade of the protected building, m; limited
-            by the room on the site.
-        facade_m: Length of that facade, m.
-        depth_m: Depth of the protected building, m; limited by the room on the site.
-        building_shift_m: From the middle of the site to that of the facade, m.
-        neighbour_probability: Probability of an unprotected building, if there is room.
-        neighbour_side_m: Its width, and its height, m.
-        zone_from_threat_m: From road or parking area to the build zone, m.
-        zone_shift_m: From midway between threat and facade to the zone's middle, along the
-            road, m.
-        path_probability: Probability of a path from the road to the door that is kept free.
-        path_width_m: Its width, m.
-        hydrant_probability: Probability of a hydrant, a no-build area 1.5 m square.
-        trees: Number of trees, each a no-build area.
-        tree_side_m: Side of the square of a tree, m.
-        clearance_m: Least distance between a module and a building, m.
-        access_way_probability: Probability of an access way that must stay open.
-        access_way_width_m: Its width, m.
-        stock: Number of modules.
-        duct_probability: Probability of a budget, and of a duct with dearer modules above it.
-        duct_width_m: Width of the strip above the duct, m.
-        duct_module_cost: Cost of a module in it; elsewhere it is 1.
-        budget_share: Budget divided by stock.
         preset: Preset of the particle model.
         calibration: Name of the calibration for the particle engines.
 
     Raises:
-        BlastEnvError: If a value is out of bounds, or the site is too small for these ranges.
-        UnknownNameError: If there is no such preset.
+        ScenarioError: If a value is out of bounds, there is no such preset, or the site is too
+            small for these ranges.
     """
 
-    side_m: Annotated[float, LengthBounds(2.0, 2000.0)] = 36.0
-    zone_side_m: Annotated[float, LengthBounds(0.5, 500.0)] = 14.0
-    tnt_kg: Annotated[Span, PairBounds(0.1, 100_000.0)] = (50.0, 300.0)
-    road_from_border_m: Annotated[Span, LengthsBounds(MARGIN_M, 2000.0)] = (2.0, 5.0)
-    road_length_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (8.0, 20.0)
-    parking_probability: Probability = 0.35
-    parking_length_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (6.0, 14.0)
-    parking_depth_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (2.5, 4.0)
-    threat_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-4.0, 4.0)
-    stand_off_m: Annotated[Span, LengthsBounds(1.0, 2000.0)] = (12.0, 20.0)
-    facade_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (6.0, 14.0)
-    depth_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (4.0, 12.0)
-    building_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-5.0, 5.0)
-    neighbour_probability: Probability = 0.5
-    neighbour_side_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (3.0, 6.0)
-    zone_from_threat_m: Annotated[Span, LengthsBounds(0.5, 2000.0)] = (3.0, 6.0)
-    zone_shift_m: Annotated[Span, LengthsBounds(-2000.0, 2000.0)] = (-1.5, 1.5)
-    path_probability: Probability = 0.75
-    path_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.5, 2.5)
-    hydrant_probability: Probability = 0.5
-    trees: Annotated[WholeSpan, CountsBounds(0, 90)] = (0, 3)
-    tree_side_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.0, 2.5)
-    clearance_m: Annotated[Span, LengthsBounds(0.0, 2000.0)] = (0.0, 2.0)
-    access_way_probability: Probability = 0.35
-    access_way_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (2.5, 4.0)
-    stock: Annotated[WholeSpan, CountsBounds(1, 10_000)] = (8, 20)
-    duct_probability: Probability = 0.35
-    duct_width_m: Annotated[Span, LengthsBounds(0.5, 500.0)] = (1.5, 4.0)
-    duct_module_cost: Annotated[Span, PairBounds(0.1, 1e9)] = (1.5, 4.0)
-    budget_share: Annotated[Span, PairBounds(0.1, 1e6)] = (0.75, 1.5)
-    preset: str = "collisional"
-    calibration: str = "collisional_kb"
+    side_m: Side
+    zone_side_m: ZoneSide
+    preset: PresetName = "collisional"
+    calibration: Name = "collisional_kb"
 
-    def __post_init__(self) -> None:
+    criterion: ClassVar[VisibilityCriterion]
+    """The default acceptance criterion."""
+
+    def __init__(self, **values: Any) -> None:
         """Check the values; see the class for the errors."""
-        check_bounds(self)
-        preset(self.preset)
-        self._check_room()
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            problems = problems_from(error, type(self))
+            raise ScenarioError(type(self).__name__, problems) from error
+
+    def changed(self, **values: Any) -> Self:
+        """Return the ranges with other values; see the class for the errors."""
+        return type(self)(**{**self.model_dump(), **values})
 
     @property
     def zone_cells(self) -> int:
         """Number of rows and of columns of the build zone."""
         return round(self.zone_side_m / MODULE_SIDE_M)
 
-    def _check_room(self) -> None:
-        """Refuse a site that is too small for the ranges."""
-        parking_m = self.parking_depth_m[1] if self.parking_probability > 0.0 else 0.0
-        before_m = self.road_from_border_m[1] + parking_m
-        behind_m = self.stand_off_m[0] + self.depth_m[0] + MARGIN_M
-        needs_m = {
-            "threat, the least stand-off and the least depth": before_m + behind_m,
-            "threat and build zone": before_m + self.zone_from_threat_m[1] + self.zone_side_m,
-            "the longest road": self.road_length_m[1] + 2.0 * MARGIN_M,
-            "the longest parking area": self.parking_length_m[1] + 2.0 * MARGIN_M,
-            "the longest facade": self.facade_m[1] + 2.0 * MARGIN_M,
-        }
+    def drawn(self, draws: "Draws") -> Drawn:
+        """Draw a site."""
+        raise NotImplementedError
+
+    def _without_room(self, needs_m: Mapping[str, float]) -> Iterator[Problem]:
+        """Yield a problem for each need of the ranges for which the site is too small."""
         for what, need_m in needs_m.items():
             if need_m > self.side_m:
-                raise BlastEnvError(
-                    f"SiteRanges: side_m is {self.side_m:g}, must be at least {need_m:g},"
-                    f" to have room for {what}"
+                message = (
+                    f"is {self.side_m:g}, must be at least {need_m:g}, to have room for {what}"
                 )
-        if self.zone_from_threat_m[1] >= self.stand_off_m[0]:
-            raise BlastEnvError(
-                f"SiteRanges: zone_from_threat_m is {self.zone_from_threat_m}, must be less than"
-                f" {self.stand_off_m[0]:g}, the least stand_off_m: the zone begins before the"
-                " building"
-            )
+                yield Problem("side_m", message)
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,3 +221,48 @@ def draw_place(
     row, column = places[draws.count((0, len(places) - 1))].tolist()
     corner_m = (float(left[column]), float(bottom[row, 0]))
     return Rectangle.from_corner(corner_m, size_m)
+
+
+def source(threat: Rectangle, tnt_kg: float) -> dict[str, Any]:
+    """Return the charge in a parking area or, if its width is 0, on a stretch of road."""
+    left, bottom, right, top = threat
+    if left == right:
+        ends = {"start_m": (left, bottom), "end_m": (right, top)}
+        return {"kind": "segment", **ends, "tnt_kg": tnt_kg}
+    return {"kind": "rectangle", **ground(threat), "tnt_kg": tnt_kg}
+
+
+def structure(name: str, rectangle: Rectangle, **others: Any) -> dict[str, Any]:
+    """Return a block of modules."""
+    left, bottom, right, top = rectangle
+    return {
+        "kind": "ModularObstacle",
+        "name": name,
+        "corner_m": (left, bottom),
+        "rows": round((top - bottom) / MODULE_SIDE_M),
+        "columns": round((right - left) / MODULE_SIDE_M),
+        **others,
+    }
+
+
+def ground(rectangle: Rectangle, **others: Any) -> dict[str, Any]:
+    """Return a rectangle of the site."""
+    left, bottom, right, top = rectangle
+    return {"corner_m": (left, bottom), "size_m": (right - left, top - bottom), **others}
+
+
+def draw_path(
+    draws: Draws, zone: Rectangle, building: Rectangle, width_m: float
+) -> Rectangle | None:
+    """Draw a path through the zone to the door of a building; `None` if no door leads there."""
+    lowest = max(zone.bottom, building.bottom)
+    highest = min(zone.top, building.top) - width_m
+    if highest < lowest:
+        return None
+    corner_m = (zone.left, draws.length_m((lowest, highest)))
+    return Rectangle.from_corner(corner_m, (yard(zone, building).right - zone.left, width_m))
+
+
+def yard(zone: Rectangle, building: Rectangle) -> Rectangle:
+    """Return the part of the zone before a building."""
+    return zone._replace(right=min(zone.right, building.left))

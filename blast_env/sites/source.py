@@ -12,10 +12,11 @@ from blast_env.bundled import ITEM_SITES, LARGE_SITES, SITES
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario
 from blast_env.sites.criterion import SiteCriterion
-from blast_env.sites.generate import MOST_SEED, RANGES, AnyRanges, generate_site
+from blast_env.sites.generate import MOST_SEED, RANGES, generate_site
 from blast_env.sites.item_sites import ItemSiteRanges, large_ranges
+from blast_env.sites.ranges import Ranges
 
-FAMILIES: Final[Mapping[str, AnyRanges]] = MappingProxyType(
+FAMILIES: Final[Mapping[str, Ranges]] = MappingProxyType(
     {SITES: RANGES, ITEM_SITES: ItemSiteRanges(), LARGE_SITES: large_ranges()}
 )
 """The named families of generated sites."""
@@ -45,7 +46,7 @@ class SiteSource:
 
     first_seed: int
     count: int
-    ranges: AnyRanges = RANGES
+    ranges: Ranges = RANGES
     criterion: SiteCriterion | None = None
 
     def __post_init__(self) -> None:
@@ -59,7 +60,7 @@ class SiteSource:
             )
 
     @classmethod
-    def training(cls, count: int = TRAINING_SITES, ranges: AnyRanges = RANGES) -> "SiteSource":
+    def training(cls, count: int = TRAINING_SITES, ranges: Ranges = RANGES) -> "SiteSource":
         """Return the training sites.
 
         Args:
@@ -72,7 +73,7 @@ class SiteSource:
         return cls(HELD_OUT_SITES, count, ranges)
 
     @classmethod
-    def held_out(cls, count: int = HELD_OUT_SITES, ranges: AnyRanges = RANGES) -> "SiteSource":
+    def held_out(cls, count: int = HELD_OUT_SITES, ranges: Ranges = RANGES) -> "SiteSource":
         """Return the first held-out sites, which training never uses, in a fixed order.
 
         Args:
@@ -124,7 +125,7 @@ class SiteSource:
 
 
 @lru_cache(maxsize=512)
-def _site(seed: int, ranges: AnyRanges) -> Scenario:
+def _site(seed: int, ranges: Ranges) -> Scenario:
     """Return a site; training draws the same few hundred again and again, at a quarter second."""
     return generate_site(seed, ranges)
 

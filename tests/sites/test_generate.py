@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
@@ -190,7 +190,7 @@ def test_a_seed_without_a_site_is_given_up_with_the_reasons() -> None:
 
 
 def test_ranges_that_fit_nothing_are_given_up_with_the_reasons() -> None:
-    crowded = replace(RANGES, stock=(800, 800))
+    crowded = RANGES.changed(stock=(800, 800))
     with pytest.raises(
         BlastEnvError,
         match=r"build_zone.stock: must fit \(200 times, the last one is 800, must be at most",
@@ -199,8 +199,7 @@ def test_ranges_that_fit_nothing_are_given_up_with_the_reasons() -> None:
 
 
 def test_narrow_ranges_leave_only_what_they_say() -> None:
-    ranges = replace(
-        RANGES,
+    ranges = RANGES.changed(
         tnt_kg=(100.0, 100.0),
         parking_probability=0.0,
         neighbour_probability=0.0,
@@ -225,9 +224,7 @@ def test_narrow_ranges_leave_only_what_they_say() -> None:
 
 @pytest.mark.parametrize("shift_m", [(-50.0, -50.0), (50.0, 50.0)])
 def test_nothing_is_shifted_off_the_site(shift_m: tuple[float, float]) -> None:
-    shifted = replace(
-        RANGES, threat_shift_m=shift_m, building_shift_m=shift_m, zone_shift_m=shift_m
-    )
+    shifted = RANGES.changed(threat_shift_m=shift_m, building_shift_m=shift_m, zone_shift_m=shift_m)
     for seed in range(20):
         site = draw_site(np.random.default_rng(seed), shifted, "shifted")
         threat, building = threat_of(site), site.structures[0].rectangle_m
@@ -236,7 +233,7 @@ def test_nothing_is_shifted_off_the_site(shift_m: tuple[float, float]) -> None:
 
 
 def test_preset_and_calibration_are_those_of_the_ranges() -> None:
-    site = generate_site(0, replace(RANGES, calibration="some_other"))
+    site = generate_site(0, RANGES.changed(calibration="some_other"))
     assert site.calibration == "some_other"
     assert site.simulation.preset == RANGES.preset
 

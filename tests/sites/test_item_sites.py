@@ -27,7 +27,6 @@ from blast_env.sites import (
     large_ranges,
 )
 from blast_env.sites.criterion import TARGETS, Visibility, cut_share_of
-from blast_env.sites.generate import ITEM_CRITERION
 from blast_env.sites.item_sites import ITEM_KINDS, POST
 from tests.catalogue_sites import yard
 from tests.envs.small import ThinEngine
@@ -128,7 +127,7 @@ def test_a_low_wall_cuts_the_lines_to_the_foot_of_a_building_alone() -> None:
 
 
 def test_the_criterion_is_kept(item_sites: tuple[Scenario, ...]) -> None:
-    assert all(ITEM_CRITERION.objection(site) is None for site in item_sites[:4])
+    assert all(ItemSiteRanges.criterion.objection(site) is None for site in item_sites[:4])
 
 
 def test_large_sites_of_a_side_share_the_spaces_and_keep_the_criterion() -> None:
@@ -137,7 +136,7 @@ def test_large_sites_of_a_side_share_the_spaces_and_keep_the_criterion() -> None
         site = source.site(seed)
         check_size(site, source.representative)
         assert (site.site.width_m, site.site.height_m) == (60.0, 60.0)
-        assert ITEM_CRITERION.objection(site) is None
+        assert ItemSiteRanges.criterion.objection(site) is None
         assert generate_site(seed, large_ranges()) == site
     assert source.representative.vehicles
 
@@ -156,7 +155,7 @@ def test_threats_are_closer_on_close_sites(side_m: float) -> None:
     for seed in range(2):
         site = generate_site(seed, close_ranges(side_m))
         assert site.site.width_m == site.site.height_m == side_m
-        assert ITEM_CRITERION.objection(site) is None
+        assert ItemSiteRanges.criterion.objection(site) is None
         assert generate_site(seed, close_ranges(side_m)) == site
         stand_offs_m = [
             Rectangle(*each.rectangle_m).distance_to(threat.charge_against(site, ()).position_m)
@@ -182,10 +181,10 @@ def test_sides_out_of_bounds_are_refused(ranges: Any, side_m: float, bounds: str
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"side_m": 16.0}, "side_m is 16, must be at least"),
-        ({"forecourt_m": (6.0, 20.0)}, "forecourt_m is .* nothing could stop a vehicle"),
-        ({"storeys": (1, 4)}, "storeys is .* must be at most 9 m in all"),
-        ({"budget": (0.0, 3.0)}, "budget is .* must be a pair"),
+        ({"side_m": 16.0}, "side_m: is 16, must be at least"),
+        ({"forecourt_m": (6.0, 20.0)}, "forecourt_m: is .* nothing could stop a vehicle"),
+        ({"storeys": (1, 4)}, "storeys: is .* must be at most 9 m in all"),
+        ({"budget": (0.0, 3.0)}, r"budget\[0\]: is 0.0: .* greater than or equal to 0.1"),
     ],
 )
 def test_ranges_without_room_are_refused(changes: dict[str, Any], message: str) -> None:

@@ -13,7 +13,7 @@ from blast_env.evaluation import Evaluators, LoadCase, LoadCaseSet, SeedRange, c
 from blast_env.evaluation.cases import in_turn
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
-from blast_env.sites.generate import AnyRanges
+from blast_env.sites.ranges import Ranges
 from blast_env.statistics import Estimate
 
 
@@ -133,7 +133,7 @@ def unseen_cases(
     return _cases(settings, tuple(sites), seeds)
 
 
-def _ranges_of(source: ScenarioSource) -> AnyRanges:
+def _ranges_of(source: ScenarioSource) -> Ranges:
     """Return the family of a source's sites."""
     return source.ranges if isinstance(source, SiteSource) else FAMILIES[SITES]
 
