@@ -20,10 +20,10 @@ from blast_env.site import (
 from blast_env.site.balls import Balls, air_lattice, explosion_fan
 from blast_env.site.boxes import TOLERANCE_M
 from blast_env.site.heights import highest_top_m
-from blast_env.site.models import AnyStructure, ConcreteSquareSection
 from blast_env.site.parameters import SimulationParameters, for_charge
 from blast_env.site.reach import Reach
 from blast_env.site.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
+from blast_env.site.sections import AnyStructure, ConcreteSquareSection
 from blast_env.site.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.vehicles import NOTHING, Drive, Obstacles, obstacles_of

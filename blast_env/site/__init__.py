@@ -4,6 +4,7 @@ from blast_env.bundled import bundled_scenarios
 from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.site.access_way import AccessWay
 from blast_env.site.catalogue import Catalogue, Item, PlacedModule, StockBarrier, stock_barriers
+from blast_env.site.content import SCHEMA_VERSION
 from blast_env.site.files import (
     AnyScenario,
     ScenarioField,
@@ -14,8 +15,11 @@ from blast_env.site.files import (
     save_scenario,
     scenario_hash,
 )
-from blast_env.site.models import (
-    SCHEMA_VERSION,
+from blast_env.site.models import Scenario
+from blast_env.site.objective import ObjectiveSection
+from blast_env.site.problems import Problem, ScenarioError
+from blast_env.site.scene import Charge
+from blast_env.site.sections import (
     AnySource,
     AnyStructure,
     ConcreteSquareSection,
@@ -23,15 +27,11 @@ from blast_env.site.models import (
     ModularObstacleSection,
     PointSource,
     RectangleSource,
-    Scenario,
     SegmentSource,
     SimulationSection,
     Site,
     VehicleSource,
 )
-from blast_env.site.objective import ObjectiveSection
-from blast_env.site.problems import Problem, ScenarioError
-from blast_env.site.scene import Charge
 from blast_env.site.vehicles import AnyCharge, VehicleCharge
 from blast_env.site.zone import BuildZone, CostArea, KeepOut
 

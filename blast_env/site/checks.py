@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, stacked_runs
 from blast_env.site.balls import lattice_capacity
 from blast_env.site.boxes import TOLERANCE_M
+from blast_env.site.content import Content
 from blast_env.site.driving import places_shape
 from blast_env.site.facade import bay_count_problems, facade_problems, hardening_problems
 from blast_env.site.heights import depth_inside_m, highest_grounds_m, is_over_or_below
@@ -42,9 +43,6 @@ from blast_env.site.zone import (
 from blast_env.site.zone_checks import build_zone_problems, place_count_problems
 from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 
-if TYPE_CHECKING:  # the scenario calls these checks
-    from blast_env.site.models import Scenario
-
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""
 
@@ -52,7 +50,7 @@ MOST_SPEED_PLACES: Final = 400_000
 """Most places of the speeds of all vehicles: a site of 300 m x 300 m takes 2 s a search."""
 
 
-def check_sections(scenario: "Scenario") -> tuple[Problem, ...]:
+def check_sections(scenario: Content) -> tuple[Problem, ...]:
     """Return all problems between the sections of a scenario, each of which is valid by itself.
 
     Whatever takes memory or time is counted first; too much of it is the only problem then.
@@ -73,7 +71,7 @@ def check_sections(scenario: "Scenario") -> tuple[Problem, ...]:
     )
 
 
-def _count_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _count_problems(scenario: Content) -> Iterator[Problem]:
     """Yield the problems of products of counts: bays, places of pieces, places of vehicles."""
     yield from bay_count_problems(scenario.structures)
     if scenario.build_zone is not None:
@@ -81,7 +79,7 @@ def _count_problems(scenario: "Scenario") -> Iterator[Problem]:
     yield from _vehicle_count_problems(scenario)
 
 
-def _vehicle_count_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _vehicle_count_problems(scenario: Content) -> Iterator[Problem]:
     """Yield the problems of too many places of vehicles, with and without a motion."""
     vehicles = [each for each in scenario.charge if isinstance(each, VehicleSource)]
     places = len(vehicles) * places_on(scenario.site)
@@ -102,7 +100,7 @@ def _vehicle_count_problems(scenario: "Scenario") -> Iterator[Problem]:
         )
 
 
-def _facade_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _facade_problems(scenario: Content) -> Iterator[Problem]:
     """Check facades and the measures that harden them, if the sections that they use are valid."""
     problems = list(facade_problems(scenario.structures, scenario.components))
     yield from problems
@@ -111,7 +109,7 @@ def _facade_problems(scenario: "Scenario") -> Iterator[Problem]:
         yield from hardening_problems(scenario.structures, scenario.components, measures)
 
 
-def _removable_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _removable_problems(scenario: Content) -> Iterator[Problem]:
     """Check that removable structures exist, and are neither protected nor otherwise needed."""
     if scenario.build_zone is None:
         return
@@ -133,7 +131,7 @@ def _removable_problems(scenario: "Scenario") -> Iterator[Problem]:
                 yield Problem(where, f"is {name!r}, which {used} removes already")
 
 
-def _objective_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _objective_problems(scenario: Content) -> Iterator[Problem]:
     """Check that a response objective has facades, and a target has a budget."""
     objective, zone = scenario.objective, scenario.build_zone
     if not objective.is_response:
@@ -150,7 +148,7 @@ def _objective_problems(scenario: "Scenario") -> Iterator[Problem]:
         yield Problem("build_zone.budget", message)
 
 
-def check_sources(scenario: "Scenario") -> tuple[Problem, ...]:
+def check_sources(scenario: Content) -> tuple[Problem, ...]:
     """Return the problems between the sources of the charge and the other sections.
 
     They are the result of `check_sections` if the other sections are consistent.
@@ -159,7 +157,7 @@ def check_sources(scenario: "Scenario") -> tuple[Problem, ...]:
     return counted or (*_charge_problems(scenario), *_build_zone_problems(scenario))
 
 
-def _name_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _name_problems(scenario: Content) -> Iterator[Problem]:
     """Check the names of the structures, and that at least one is protected."""
     for index, structure in enumerate(scenario.structures):
         if structure.name == BARRIER_NAME:
@@ -183,7 +181,7 @@ def _repeated_names(
             yield Problem(f"{key}[{index}].name", message)
 
 
-def _structure_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _structure_problems(scenario: Content) -> Iterator[Problem]:
     """Check that structures lie inside the site without overlaps, and their number of modules."""
     stock = 0 if scenario.build_zone is None else scenario.build_zone.stock
     modules = sum(each.modules for each in scenario.structures) + stock
@@ -220,7 +218,7 @@ def _are_above_each_other(one: AnyStructure, other: AnyStructure) -> bool:
     )
 
 
-def _charge_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _charge_problems(scenario: Content) -> Iterator[Problem]:
     """Check that every place of the charge is clear of structures and border."""
     for index, source in enumerate(scenario.charge):
         if isinstance(source, VehicleSource):
@@ -230,7 +228,7 @@ def _charge_problems(scenario: "Scenario") -> Iterator[Problem]:
         yield from _above_the_air(scenario, f"charge[{index}].height_m", source.height_m)
 
 
-def _place_problems(scenario: "Scenario", key: str, source: PlaceSource) -> Iterator[Problem]:
+def _place_problems(scenario: Content, key: str, source: PlaceSource) -> Iterator[Problem]:
     """Check a charge whose places do not depend on the layout."""
     radius = scenario.charge_radius_m
     words = f" by {radius:g} m, the charge's radius"
@@ -253,7 +251,7 @@ def _place_problems(scenario: "Scenario", key: str, source: PlaceSource) -> Iter
             yield Problem(key, message)
 
 
-def _vehicle_problems(scenario: "Scenario", key: str, source: VehicleSource) -> Iterator[Problem]:
+def _vehicle_problems(scenario: Content, key: str, source: VehicleSource) -> Iterator[Problem]:
     """Check that a vehicle fits on the site and can enter, and that barriers can stop it."""
     problems = [
         *_vehicle_size_problems(scenario, key, source),
@@ -272,9 +270,7 @@ def _vehicle_problems(scenario: "Scenario", key: str, source: VehicleSource) -> 
         yield from _way_problems(scenario, key, scenario.vehicle_ground(source))
 
 
-def _vehicle_size_problems(
-    scenario: "Scenario", key: str, source: VehicleSource
-) -> Iterator[Problem]:
+def _vehicle_size_problems(scenario: Content, key: str, source: VehicleSource) -> Iterator[Problem]:
     """Check that the vehicle is at least as wide as its charge and no larger than the site."""
     least_m = 2.0 * scenario.charge_radius_m
     if source.width_m < least_m - TOLERANCE_M:
@@ -286,7 +282,7 @@ def _vehicle_size_problems(
         yield Problem(f"{key}.width_m", message)
 
 
-def _entry_problems(scenario: "Scenario", key: str, source: VehicleSource) -> Iterator[Problem]:
+def _entry_problems(scenario: Content, key: str, source: VehicleSource) -> Iterator[Problem]:
     """Check that entries lie on the border and are wide enough."""
     for index, entry in enumerate(source.entries):
         if entry.side(scenario.site) is None:
@@ -303,7 +299,7 @@ def _entry_problems(scenario: "Scenario", key: str, source: VehicleSource) -> It
             yield Problem(f"{key}.entries[{index}]", message)
 
 
-def _way_problems(scenario: "Scenario", key: str, ground: VehicleGround) -> Iterator[Problem]:
+def _way_problems(scenario: Content, key: str, ground: VehicleGround) -> Iterator[Problem]:
     """Check that a vehicle can enter, approach a protected structure, and be stopped."""
     width = f"{ground.source.width_m:g} m, its width"
     reach = ground.reach()
@@ -327,7 +323,7 @@ def _way_problems(scenario: "Scenario", key: str, ground: VehicleGround) -> Iter
 
 
 def _stopping_problems(
-    scenario: "Scenario", key: str, ground: VehicleGround, zone: BuildZone
+    scenario: Content, key: str, ground: VehicleGround, zone: BuildZone
 ) -> Iterator[Problem]:
     """Check that a barrier can increase the stand-off of a vehicle over the empty site's."""
     cells = _stopping_cells(empty_zone(_surroundings(scenario, zone)), ground.source)
@@ -363,7 +359,7 @@ def _stopping_cells(empty: EmptyZone, source: VehicleSource) -> BoolArray:
     return cells
 
 
-def _build_zone_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _build_zone_problems(scenario: Content) -> Iterator[Problem]:
     """Check that the build zone lies inside the site, and that barriers can be built in it."""
     zone = scenario.build_zone
     if zone is None:
@@ -374,12 +370,12 @@ def _build_zone_problems(scenario: "Scenario") -> Iterator[Problem]:
     yield from build_zone_problems(_surroundings(scenario, zone))
 
 
-def _surroundings(scenario: "Scenario", zone: BuildZone) -> Surroundings:
+def _surroundings(scenario: Content, zone: BuildZone) -> Surroundings:
     structures, sources = tuple(scenario.structures), tuple(scenario.charge)
     return Surroundings(zone, structures, sources, scenario.charge_radius_m, scenario.site)
 
 
-def _height_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _height_problems(scenario: Content) -> Iterator[Problem]:
     """Check that structures and barriers do not exceed the height of the air."""
     for index, structure in enumerate(scenario.structures):
         yield from _above_the_air(scenario, f"structures[{index}].height_m", structure.height_m)
@@ -400,7 +396,7 @@ def _height_problems(scenario: "Scenario") -> Iterator[Problem]:
             yield from _above_the_air(scenario, where, item.height_m, grounds_m[index])
 
 
-def _gauge_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _gauge_problems(scenario: Content) -> Iterator[Problem]:
     """Check that gauges have unique names, and lie in the air or at most a module inside."""
     yield from _repeated_names("gauges", scenario.gauges)
     for index, gauge in enumerate(scenario.gauges):
@@ -420,7 +416,7 @@ def _gauge_problems(scenario: "Scenario") -> Iterator[Problem]:
 
 
 def _above_the_air(
-    scenario: "Scenario", key: str, height_m: float | None, ground_m: float = 0.0
+    scenario: Content, key: str, height_m: float | None, ground_m: float = 0.0
 ) -> Iterator[Problem]:
     """Yield a problem if a height above its ground, such as a terrace, exceeds the air."""
     if height_m is not None and ground_m + height_m > scenario.air_height_m + TOLERANCE_M:
@@ -432,7 +428,7 @@ def _above_the_air(
         yield Problem(key, message)
 
 
-def _simulation_problems(scenario: "Scenario") -> Iterator[Problem]:
+def _simulation_problems(scenario: Content) -> Iterator[Problem]:
     """Check that no balls overlap at the start."""
     air, explosive = scenario.parameters.air, scenario.parameters.explosive
     if 0.0 < air.spacing_units < 2.0 * air.radius_units:
@@ -455,7 +451,7 @@ def _simulation_problems(scenario: "Scenario") -> Iterator[Problem]:
             )
 
 
-def particle_problems(scenario: "Scenario") -> Iterator[Problem]:
+def particle_problems(scenario: Content) -> Iterator[Problem]:
     """Yield the features of a scenario that particles cannot simulate, unlike gas dynamics.
 
     All structures must stand on the ground, and none be a terrace; the parameters of the particle
@@ -493,7 +489,7 @@ def _too_much_air(site: Site, air: AirParameters) -> Iterator[Problem]:
 
 
 def _outside_site(
-    scenario: "Scenario", key: str, description: str, rectangle: Rectangle
+    scenario: Content, key: str, description: str, rectangle: Rectangle
 ) -> Iterator[Problem]:
     """Yield a problem if a rectangle is not inside the site."""
     if not scenario.site.rectangle_m.contains(rectangle):

@@ -8,90 +8,39 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from hashlib import sha256
-from typing import Annotated, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
     BaseModel,
-    Field,
-    StrictInt,
     TypeAdapter,
     ValidationError,
     model_validator,
 )
 
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.geometry import Cell, Element, Measure, Rectangle
-from blast_env.response.components import Component, Glazing, Wall, catalogue
+from blast_env.geometry import Element, Measure
+from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
 from blast_env.response.facade import FilledBay
 from blast_env.site.catalogue import RIGID_KEYS, Hardening
 from blast_env.site.checks import check_sections, check_sources, particle_problems
+from blast_env.site.content import Content, Sources
 from blast_env.site.facade import NamedBay, named_bays
 from blast_env.site.heights import default_air_height_m, height_notes
-from blast_env.site.objective import ObjectiveSection
-from blast_env.site.parameters import SimulationParameters
 from blast_env.site.problems import Problem, ScenarioError, problems_from
 from blast_env.site.scene import Charge
 from blast_env.site.sections import (
-    FOR_PEOPLE,
-    AnyGeoreference,
     AnySource,
-    AnyStructure,
-    ChargeSource,
-    ConcreteSquareSection,
-    GaugeSection,
-    ModularObstacleSection,
-    Name,
-    PointM,
     PointSource,
     PolygonSection,
-    RectangleSource,
-    Section,
-    SegmentSource,
-    SimulationSection,
-    Site,
-    SizeM,
-    StructureSection,
     VehicleSource,
 )
-from blast_env.site.vehicles import AnyCharge, RatedPiece, VehicleCharge, VehicleGround, ranked
+from blast_env.site.vehicles import AnyCharge, VehicleCharge, ranked
 from blast_env.site.zone import (
     BuildZone,
-    KeepOut,
 )
 from blast_env.units import MODULE_SIDE_M
-
-__all__ = [
-    "AnySource",
-    "AnyStructure",
-    "BuildZone",
-    "Cell",
-    "Charge",
-    "ChargeSource",
-    "ConcreteSquareSection",
-    "GaugeSection",
-    "KeepOut",
-    "ModularObstacleSection",
-    "ObjectiveSection",
-    "PointM",
-    "PointSource",
-    "PolygonSection",
-    "RectangleSource",
-    "Scenario",
-    "Section",
-    "SegmentSource",
-    "SimulationSection",
-    "Site",
-    "SizeM",
-    "StructureSection",
-    "VehicleCharge",
-    "VehicleSource",
-]
-
-SCHEMA_VERSION: Final = 2
-"""The version of the file format."""
 
 _OPTIONAL: Final[Mapping[str, tuple[str, ...]]] = {
     "scenario": ("gauges", "objective"),
@@ -118,24 +67,8 @@ _BUILT: Final = {
 }
 """Keys of a structure for its shape and place."""
 
-MOST_NOTES: Final = 100
-"""Most notes of an import in a scenario."""
 
-MOST_NOTE: Final = 1000
-"""Most characters of one of them."""
-
-Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
-"""The sources of the charge."""
-
-
-def _check_version(version: int) -> int:
-    """Refuse a file of another version of the format."""
-    if version != SCHEMA_VERSION:
-        raise ValueError(f"must be {SCHEMA_VERSION}, the version of this release")
-    return version
-
-
-class Scenario(Section):
+class Scenario(Content):
     """A protective-layout problem, without layout and seed.
 
     Attributes:
@@ -154,26 +87,6 @@ class Scenario(Section):
         georeference: Place of the site on a map or drawing; no result depends on it.
         components: Components of facades by name, beside those of the catalogue.
     """
-
-    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
-    name: Name
-    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
-    import_notes: Annotated[
-        tuple[Annotated[str, Field(max_length=MOST_NOTE), FOR_PEOPLE], ...],
-        Field(max_length=MOST_NOTES),
-    ] = ()
-    site: Site
-    charge: Sources
-    structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
-    build_zone: BuildZone | None = None
-    simulation: SimulationSection = SimulationSection()
-    calibration: Name | None = None
-    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
-    objective: ObjectiveSection = ObjectiveSection()
-    georeference: AnyGeoreference | None = None
-    components: Annotated[dict[Name, Component], Field(max_length=100)] = Field(
-        default_factory=dict
-    )
 
     @property
     def bays(self) -> tuple[FilledBay, ...]:
@@ -218,26 +131,6 @@ class Scenario(Section):
                 f"scenario {self.name!r} has no build zone, so nothing can be placed in it"
             )
         return self.build_zone
-
-    @property
-    def parameters(self) -> SimulationParameters:
-        """The parameters of the particle model."""
-        return self.simulation.parameters
-
-    @property
-    def charge_radius_m(self) -> float:
-        """Radius of the charge's disc at the start, m."""
-        return self.parameters.charge_radius_m
-
-    @property
-    def air_height_m(self) -> float:
-        """Height of the simulated air, m: that of `site`, or the default.
-
-        The default is 12 m, or 6 m more than the highest structure or barrier if that is more.
-        """
-        if self.site.air_height_m is not None:
-            return self.site.air_height_m
-        return default_air_height_m(self.structures, self.build_zone)
 
     @property
     def height_notes(self) -> tuple[str, ...]:
@@ -458,27 +351,6 @@ class Scenario(Section):
         """Return the title of a structure or building, else its name."""
         parts = (each for each in self.structures if name in (each.name, each.building_name))
         return next((each.title for each in parts if each.title), name)
-
-    def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
-        """Return the structures that remain with a layout."""
-        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
-        return tuple(each for each in self.structures if each.name not in away)
-
-    def vehicle_ground(
-        self, source: VehicleSource, layout: Iterable[Element] = ()
-    ) -> VehicleGround:
-        """Return a vehicle's ground without barriers and the structures that a layout removes."""
-        way = None if self.build_zone is None else self.build_zone.access_way
-        closed: tuple[Rectangle, ...] = ()
-        rated: tuple[RatedPiece, ...] = ()
-        if way is not None and way.gate is not None:
-            where, rating = way.gate.rectangle_m, way.gate.crash_rating
-            if rating is None:
-                closed = (where,)
-            else:
-                rated = (RatedPiece(where, rating, "the gate"),)
-        structures = self.structures_with(layout)
-        return VehicleGround(source, self.site, structures, closed, rated, self.charge_radius_m)
 
     def sample_charges(self, rng: np.random.Generator, count: int) -> tuple[AnyCharge, ...]:
         """Draw independent charges: a source by its weight, then a place in it.

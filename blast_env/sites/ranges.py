@@ -69,7 +69,7 @@ MARGIN_M: Final = 1.0
 
 
 class Drawn(NamedTuple):
-    """What is drawn of a site.
+    """The drawn parts of a site.
 
     Attributes:
         description: Its description, with `{side}` for the side of the threat after the turn.

@@ -33,7 +33,7 @@ from blast_env.layout.placement import load_relevant
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import Tell, share_of
 from blast_env.site import Scenario
-from blast_env.site.models import SCHEMA_VERSION
+from blast_env.site.content import SCHEMA_VERSION
 
 ROUNDS: Final = 3
 """Default number of searches for each kind."""

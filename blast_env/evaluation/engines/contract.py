@@ -31,7 +31,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import BayDamage, level_of, worst
 from blast_env.site import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
 from blast_env.site.facade import NamedBay
-from blast_env.site.models import StructureSection
+from blast_env.site.sections import StructureSection
 from blast_env.statistics import counted_parts, mean_over_area
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import

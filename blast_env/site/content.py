@@ -1,0 +1,110 @@
+"""The content of a scenario file: all its sections, without the checks between them."""
+
+from collections.abc import Iterable
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, Field, StrictInt
+
+from blast_env.geometry import Element, Rectangle
+from blast_env.response.components import Component
+from blast_env.site.heights import default_air_height_m
+from blast_env.site.objective import ObjectiveSection
+from blast_env.site.parameters import SimulationParameters
+from blast_env.site.sections import (
+    FOR_PEOPLE,
+    AnyGeoreference,
+    AnySource,
+    AnyStructure,
+    GaugeSection,
+    Name,
+    Section,
+    SimulationSection,
+    Site,
+    VehicleSource,
+)
+from blast_env.site.vehicles import RatedPiece, VehicleGround
+from blast_env.site.zone import BuildZone
+
+SCHEMA_VERSION: Final = 2
+"""The version of the file format."""
+
+MOST_NOTES: Final = 100
+"""Most notes of an import in a scenario."""
+
+MOST_NOTE: Final = 1000
+"""Most characters of one of them."""
+
+Sources = Annotated[tuple[AnySource, ...], Field(min_length=1, max_length=100)]
+"""The sources of the charge."""
+
+
+def _check_version(version: int) -> int:
+    """Refuse a file of another version of the format."""
+    if version != SCHEMA_VERSION:
+        raise ValueError(f"must be {SCHEMA_VERSION}, the version of this release")
+    return version
+
+
+class Content(Section):
+    """The sections of a scenario; see `Scenario`."""
+
+    schema_version: Annotated[StrictInt, AfterValidator(_check_version)]
+    name: Name
+    description: Annotated[str, Field(max_length=2000), FOR_PEOPLE] = ""
+    import_notes: Annotated[
+        tuple[Annotated[str, Field(max_length=MOST_NOTE), FOR_PEOPLE], ...],
+        Field(max_length=MOST_NOTES),
+    ] = ()
+    site: Site
+    charge: Sources
+    structures: Annotated[tuple[AnyStructure, ...], Field(min_length=1, max_length=100)]
+    build_zone: BuildZone | None = None
+    simulation: SimulationSection = SimulationSection()
+    calibration: Name | None = None
+    gauges: Annotated[tuple[GaugeSection, ...], Field(max_length=100)] = ()
+    objective: ObjectiveSection = ObjectiveSection()
+    georeference: AnyGeoreference | None = None
+    components: Annotated[dict[Name, Component], Field(max_length=100)] = Field(
+        default_factory=dict
+    )
+
+    @property
+    def parameters(self) -> SimulationParameters:
+        """The parameters of the particle model."""
+        return self.simulation.parameters
+
+    @property
+    def charge_radius_m(self) -> float:
+        """Radius of the charge's disc at the start, m."""
+        return self.parameters.charge_radius_m
+
+    @property
+    def air_height_m(self) -> float:
+        """Height of the simulated air, m: that of `site`, or the default.
+
+        The default is 12 m, or 6 m more than the highest structure or barrier if that is more.
+        """
+        if self.site.air_height_m is not None:
+            return self.site.air_height_m
+        return default_air_height_m(self.structures, self.build_zone)
+
+    def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
+        """Return the structures that remain with a layout."""
+        away = frozenset() if self.build_zone is None else self.build_zone.taken_away(layout)
+        return tuple(each for each in self.structures if each.name not in away)
+
+    def vehicle_ground(
+        self, source: VehicleSource, layout: Iterable[Element] = ()
+    ) -> VehicleGround:
+        """Return a vehicle's ground without barriers and the structures that a layout removes."""
+        way = None if self.build_zone is None else self.build_zone.access_way
+        closed: tuple[Rectangle, ...] = ()
+        rated: tuple[RatedPiece, ...] = ()
+        if way is not None and way.gate is not None:
+            where, rating = way.gate.rectangle_m, way.gate.crash_rating
+            if rating is None:
+                closed = (where,)
+            else:
+                rated = (RatedPiece(where, rating, "the gate"),)
+        structures = self.structures_with(layout)
+        return VehicleGround(source, self.site, structures, closed, rated, self.charge_radius_m)
