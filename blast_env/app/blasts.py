@@ -5,6 +5,7 @@ earlier pictures stay comparable when a layout is added.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Final
@@ -26,11 +27,12 @@ from blast_env.app.records import (
     write_kept,
 )
 from blast_env.app.verdicts import keep_histories
-from blast_env.app.work import BlastTask
+from blast_env.app.work import Teller
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.consequences import unchecked
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
+from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import charge_against
 from blast_env.layout.placement import load_relevant
@@ -89,99 +91,107 @@ def warm_engine() -> None:
     GasBlast(load_scenario("control_room"), engine=GasEngine(cells="coarse")).run()
 
 
-def run_blasts(task: BlastTask, tell: Tell) -> None:
-    """Run one blast per threat with the layout, and one without a barrier for comparison.
+@dataclass(frozen=True, kw_only=True)
+class BlastTask:
+    """Blasts of one layout, one per threat.
 
-    Blasts with a complete record are not run again. The worst threat of the layout runs on coarser
-    cells at the end, for the error of the cells.
-
-    Args:
-        task: The site, layout, threats and cells.
-        tell: Called with the completed share, 0 to 1.
-
-    Raises:
-        BlastEnvError: If a blast cannot be run.
+    Attributes:
+        site: The site.
+        threats: The threats.
+        cache: Folder for the loads of blasts.
+        cells: The cells.
+        layout: The layout.
+        blasts: Folder for the blasts, each under its key.
     """
-    scenario = task.site
-    layout = load_relevant(placing.layout_from(scenario, task.layout))
-    # The scale is that of the blast without a barrier, which comes first.
-    work = list(dict.fromkeys((threat, each) for threat in task.threats for each in ((), layout)))
-    for number, (threat, cells) in enumerate(work):
-        _run_one(task, scenario, threat, cells, share_of(tell, number, len(work)))
-    _run_coarse(task, scenario, layout)
 
+    site: Scenario
+    threats: tuple[LoadCase, ...]
+    cache: Path
+    cells: Cells
+    layout: Layout
+    blasts: Path
 
-def _folder_of(task: BlastTask, scenario: Scenario, layout: Layout, threat: LoadCase) -> Path:
-    charge = charge_against(scenario, layout, threat.charge)
-    return Path(task.blasts) / blast_key(scenario, layout, charge, task.cells)
+    def __call__(self, teller: Teller) -> None:
+        """Run one blast per threat with the layout, and one without a barrier for comparison.
 
+        Blasts with a complete record are not run again. The worst threat of the layout runs on
+        coarser cells at the end, for the error of the cells.
 
-def _run_one(
-    task: BlastTask, scenario: Scenario, threat: LoadCase, layout: Layout, tell: Tell
-) -> None:
-    folder = _folder_of(task, scenario, layout, threat)
-    if read_record(folder) is not None:
-        return
-    make_folder(folder)
-    began_s, engine = perf_counter(), GasEngine.with_cells(task.cells)
-    blast = GasBlast(scenario, layout, 0, engine, threat.charge)
-    height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
-    recording = share_of(tell, 0, 100, 60)
-    shot = record_planes(blast, height_m, default_section(blast.site), recording, ground_recorders)
-    result = shot.result
-    scale = _scale(shot, _folder_of(task, scenario, (), threat) / _SCALE)
-    if not layout:
-        write_kept(scale, folder / _SCALE)
-    evaluator = BlastEvaluator(scenario, engine, cache=task.cache)
-    evaluator.keep(layout, threat, result.loads())  # for searches, reports and others
-    keep_histories(result, folder)
-    pictures = (
-        _film(shot, scale, folder, share_of(tell, 60, 100, 25)),
-        *_pictures(result, scale, folder),
-    )
-    notes = [note for name in result.structures["structure"] for note in result.impulse(name).notes]
-    notes += [*result.stepped_notes, *result.gauge_notes]
-    charge = blast.site.charge
-    record = BlastRecord(
-        key=folder.name,
-        threat=threat.name,
-        cells=task.cells,
-        layout=placing.plain(layout),
-        loads=result.structure_loads,
-        notes=tuple(dict.fromkeys(notes)),
-        unchecked=(
-            *unchecked(scenario, result),
-            *((each.building, each.words) for each in result.unjudged),
-        ),
-        pictures=pictures,
-        seconds=perf_counter() - began_s,
-        repeat={
-            "scenario hash": scenario.content_hash,
-            "charge": [list(charge.position_m), charge.tnt_kg, charge.height_m],
-            "versions": versions(),
-        },
-    )
-    write_kept(record, folder / RECORD)
+        Raises:
+            BlastEnvError: If a blast cannot be run.
+        """
+        layout = load_relevant(self.layout)
+        # The scale is that of the blast without a barrier, which comes first.
+        pairs = ((threat, each) for threat in self.threats for each in ((), layout))
+        work = list(dict.fromkeys(pairs))
+        for number, (threat, cells) in enumerate(work):
+            self._run(threat, cells, share_of(teller.share, number, len(work)))
+        self._run_coarse(layout)
+        teller.tell(state="done", share=1.0, text="done")
 
+    def _folder_of(self, layout: Layout, threat: LoadCase) -> Path:
+        charge = charge_against(self.site, layout, threat.charge)
+        return self.blasts / blast_key(self.site, layout, charge, self.cells)
 
-def _run_coarse(task: BlastTask, scenario: Scenario, layout: Layout) -> None:
-    """Keep the loads with coarser cells under the charge with the largest load."""
-    coarser = GasEngine.with_cells(task.cells).coarser
-    if coarser is None:
-        return
+    def _run(self, threat: LoadCase, layout: Layout, tell: Tell) -> None:
+        site, folder = self.site, self._folder_of(layout, threat)
+        if read_record(folder) is not None:
+            return
+        make_folder(folder)
+        began_s, engine = perf_counter(), GasEngine.with_cells(self.cells)
+        blast = GasBlast(site, layout, 0, engine, threat.charge)
+        height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
+        section, recording = default_section(blast.site), share_of(tell, 0, 100, 60)
+        shot = record_planes(blast, height_m, section, recording, ground_recorders)
+        result = shot.result
+        scale = _scale(shot, self._folder_of((), threat) / _SCALE)
+        if not layout:
+            write_kept(scale, folder / _SCALE)
+        evaluator = BlastEvaluator(site, engine, cache=self.cache)
+        evaluator.keep(layout, threat, result.loads())  # for searches, reports and others
+        keep_histories(result, folder)
+        film = _film(shot, scale, folder, share_of(tell, 60, 100, 25))
+        names = result.structures["structure"]
+        notes = [note for name in names for note in result.impulse(name).notes]
+        notes += [*result.stepped_notes, *result.gauge_notes]
+        unjudged = ((each.building, each.words) for each in result.unjudged)
+        charge = blast.site.charge
+        record = BlastRecord(
+            key=folder.name,
+            threat=threat.name,
+            cells=self.cells,
+            layout=placing.plain(layout),
+            loads=result.structure_loads,
+            notes=tuple(dict.fromkeys(notes)),
+            unchecked=(*unchecked(site, result), *unjudged),
+            pictures=(film, *_pictures(result, scale, folder)),
+            seconds=perf_counter() - began_s,
+            repeat={
+                "scenario hash": site.content_hash,
+                "charge": [list(charge.position_m), charge.tnt_kg, charge.height_m],
+                "versions": versions(),
+            },
+        )
+        write_kept(record, folder / RECORD)
 
-    def load(threat: LoadCase) -> float:
-        record = read_record(_folder_of(task, scenario, layout, threat))
-        assert record is not None
-        return worst_first(scenario.objective, record)
+    def _run_coarse(self, layout: Layout) -> None:
+        """Keep the loads with coarser cells under the charge with the largest load."""
+        coarser = GasEngine.with_cells(self.cells).coarser
+        if coarser is None:
+            return
 
-    worst = max(task.threats, key=load)
-    evaluator = BlastEvaluator(scenario, coarser, cache=task.cache)
-    for cells in dict.fromkeys([layout, ()]):
-        path = _folder_of(task, scenario, cells, worst) / COARSE
-        if not path.is_file():
-            found = evaluator.loads(cells, worst)
-            write_kept(CoarseLoads(loads=found.structures), path)
+        def load(threat: LoadCase) -> float:
+            record = read_record(self._folder_of(layout, threat))
+            assert record is not None
+            return worst_first(self.site.objective, record)
+
+        worst = max(self.threats, key=load)
+        evaluator = BlastEvaluator(self.site, coarser, cache=self.cache)
+        for cells in dict.fromkeys([layout, ()]):
+            path = self._folder_of(cells, worst) / COARSE
+            if not path.is_file():
+                found = evaluator.loads(cells, worst)
+                write_kept(CoarseLoads(loads=found.structures), path)
 
 
 def _scale(shot: PressureShot, kept: Path) -> Scale:

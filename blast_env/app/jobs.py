@@ -1,85 +1,128 @@
-"""Worker processes for all designs: started in advance, given work, stopped."""
+"""Work in processes: queued, started, stopped.
 
+Each task has its own process, which takes no time to start: it is forked from one that has loaded
+all modules and compiled code in advance.
+"""
+
+import _thread
 import asyncio
+import multiprocessing
 import os
 import secrets
-import subprocess
-import sys
+import signal
+import traceback
 from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from threading import Thread
 from time import monotonic
 from typing import Final
 
-from blast_env.app.work import Status, Task, read_status, write_status, write_task
+from blast_env.app.work import Status, Task, Teller, end, read_status, write_status
+from blast_env.errors import BlastEnvError
 from blast_env.files import make_folder
 
 _GRACE_S: Final = 5.0
 """Time allowed for work to stop with the server before its process is killed."""
 
 _MOST_READINGS: Final = 2
-_COMMAND: Final = (sys.executable, "-m", "blast_env.app.worker")
+_WARM: Final = "blast_env.app.warm"
+_CONTEXT: Final = (
+    multiprocessing.get_context("forkserver")
+    if os.name == "posix"
+    else multiprocessing.get_context("spawn")
+)
+
+
+def do(folder: Path, task: Task) -> None:
+    """Do the task of a folder and write the outcome into its status; raise no error."""
+    try:
+        task(Teller(folder))
+    except KeyboardInterrupt:
+        end(folder, "stopped", "stopped")
+    except BlastEnvError as error:
+        end(folder, "failed", str(error))
+    except MemoryError:
+        title = read_status(folder).title
+        end(folder, "failed", f"{title}: the memory of this computer does not suffice")
+    except Exception as error:  # a fault in the program must not leave the task "running"
+        traceback.print_exc()
+        end(folder, "failed", f"{type(error).__name__}: {error}")
+
+
+def _work(folder: Path, task: Task, stop: Connection) -> None:
+    """Do a task in this process, until a message or the end of the server stops it."""
+    # A shell script's background server ignores SIGINT; inherited, that would disable the stop.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if hasattr(os, "setsid"):
+        os.setsid()  # Ctrl-C is for the server, which stops the tasks
+
+    def wait() -> None:
+        with suppress(EOFError, OSError):
+            stop.recv()
+        _thread.interrupt_main()
+
+    Thread(target=wait, daemon=True).start()
+    with suppress(KeyboardInterrupt):  # one that came after the end
+        do(folder, task)
 
 
 @dataclass
-class _Process:
-    """A worker process and its task."""
+class Running:
+    """A task at work.
 
-    popen: "subprocess.Popen[str]"
-    folder: Path | None = None
+    Attributes:
+        folder: Its folder.
+        process: Its process.
+        line: A message on it stops the task.
+        stop_by_s: Time at which the process is killed, once it is to stop.
+    """
+
+    folder: Path
+    process: BaseProcess
+    line: Connection
     stop_by_s: float | None = None
 
     @classmethod
-    def started(cls) -> "_Process":
-        log = None if os.environ.get("BLAST_ENV_WORKER_LOG") else subprocess.DEVNULL
-        return cls(
-            subprocess.Popen(
-                _COMMAND,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=log,
-                text=True,
-                start_new_session=True,  # Ctrl-C is for the server, which stops the workers
-            )
-        )
+    def started(cls, folder: Path, task: Task) -> "Running":
+        """Start a task."""
+        stop, line = _CONTEXT.Pipe(duplex=False)
+        process = _CONTEXT.Process(target=_work, args=(folder, task, stop), daemon=True)
+        process.start()
+        stop.close()
+        return cls(folder, process, line)
 
-    @property
-    def is_alive(self) -> bool:
-        return self.popen.poll() is None
-
-    def send(self, line: str) -> bool:
-        """Send a line; return whether the process accepted it."""
-        assert self.popen.stdin is not None
-        try:
-            self.popen.stdin.write(f"{line}\n")
-            self.popen.stdin.flush()
-        except OSError:
-            return False
-        return True
+    def stop(self) -> None:
+        """Ask the task to stop; a search keeps the best layout so far."""
+        if self.stop_by_s is None:
+            self.stop_by_s = monotonic() + read_status(self.folder).grace_s
+            with suppress(OSError):
+                self.line.send("stop")
 
     def end(self) -> None:
-        """End the process at once."""
-        self.popen.kill()
-        self.popen.wait()
-        self.hang_up()
-
-    def hang_up(self) -> None:
-        """Close the process's standard input, which ends it."""
-        if self.popen.stdin is not None:
-            with suppress(OSError):
-                self.popen.stdin.close()
+        """End the process, and write what it could not."""
+        if self.process.is_alive():
+            self.process.kill()
+        self.process.join()
+        self.line.close()
+        if self.stop_by_s is not None:
+            end(self.folder, "stopped", "stopped")
+        code = self.process.exitcode
+        end(self.folder, "failed", f"its process ended unexpectedly (code {code})")
 
 
 @dataclass
 class Workers:
-    """The worker processes, and the queue of work.
+    """The tasks at work, and the queue of others.
 
-    Call `tick` regularly to hand out work. Work is identified by its folder.
+    Call `tick` regularly to start queued work. Work is identified by its folder.
 
     Attributes:
-        most: Most worker processes at the same time.
+        most: Most tasks at work at the same time.
         readings: Limits the processes that read uploaded files: each holds it while it runs.
     """
 
@@ -87,13 +130,16 @@ class Workers:
     readings: asyncio.Semaphore = field(
         default_factory=partial(asyncio.Semaphore, _MOST_READINGS), init=False
     )
-    _processes: list[_Process] = field(default_factory=list, init=False)
-    _waiting: deque[Path] = field(default_factory=deque, init=False)
+    _running: list[Running] = field(default_factory=list, init=False)
+    _waiting: deque[tuple[Path, Task]] = field(default_factory=deque, init=False)
+    _loading: Thread | None = field(default=None, init=False)
 
     def prepare(self) -> None:
-        """Start one idle process, so that the first blast need not wait for it."""
-        if not self._processes:
-            self._processes.append(_Process.started())
+        """Begin to load modules and compiled code, so that tasks need not; they wait until then."""
+        _CONTEXT.set_forkserver_preload([_WARM])
+        process = _CONTEXT.Process(target=int, daemon=True)
+        self._loading = Thread(target=process.start, daemon=True)  # it takes seconds
+        self._loading.start()
 
     def begin(self, task: Task, jobs: Path, title: str) -> Path:
         """Queue work.
@@ -111,76 +157,52 @@ class Workers:
         """
         folder = jobs / f"{len(list(jobs.iterdir())):04}-{secrets.token_hex(4)}"
         make_folder(folder)
-        write_task(task, folder, title)
-        self._waiting.append(folder)
+        write_status(Status(title=title), folder)
+        self._waiting.append((folder, task))
         self.tick()
         return folder
 
     def stop(self, folder: Path) -> None:
         """Stop work; a search keeps the best layout so far."""
-        if folder in self._waiting:
-            self._waiting.remove(folder)
-            _put(folder, "stopped", "stopped before it began")
-            return
-        for process in self._processes:
-            if process.folder == folder and process.stop_by_s is None:
-                process.stop_by_s = monotonic() + read_status(folder).grace_s
-                process.send("stop")
+        waiting = [each for each in self._waiting if each[0] == folder]
+        for each in waiting:
+            self._waiting.remove(each)
+            end(folder, "stopped", "stopped before it began")
+        for running in self._running:
+            if running.folder == folder:
+                running.stop()
 
     def is_known(self, folder: Path) -> bool:
         """Return whether work is queued or running here."""
-        return folder in self._waiting or any(each.folder == folder for each in self._processes)
+        return folder in (*(each for each, _ in self._waiting), *(x.folder for x in self._running))
 
     def tick(self) -> None:
-        """Check the processes for finished work and deaths, and hand out queued work."""
-        for process in [*self._processes]:
-            self._look_at(process)
-        while self._waiting:
-            idle = next((each for each in self._processes if each.folder is None), None)
-            if idle is None:
-                if len(self._processes) >= self.most:
-                    return
-                idle = _Process.started()
-                self._processes.append(idle)
-            folder = self._waiting.popleft()
-            idle.folder = folder
-            if not idle.send(f"run {folder}"):
-                self._waiting.appendleft(folder)
-                idle.end()
-                self._processes.remove(idle)
+        """Check the processes for their end, and start queued work."""
+        for each in [*self._running]:
+            is_late = each.stop_by_s is not None and monotonic() > each.stop_by_s
+            if is_late or not each.process.is_alive():
+                each.end()
+                self._running.remove(each)
+        if self._loading is not None and self._loading.is_alive():
+            return
+        while self._waiting and len(self._running) < self.most:
+            folder, task = self._waiting.popleft()
+            try:
+                self._running.append(Running.started(folder, task))
+            except (OSError, EOFError) as error:
+                end(folder, "failed", f"its process cannot be started: {error}")
 
     def close(self) -> None:
         """Stop all work, let searches keep their best layouts, and end the processes."""
-        for folder in [*self._waiting]:
+        for folder, _ in [*self._waiting]:
             self.stop(folder)
-        for process in self._processes:
-            process.hang_up()
+        for each in self._running:
+            each.stop()
         until_s = monotonic() + _GRACE_S
-        for process in self._processes:
-            try:
-                process.popen.wait(max(until_s - monotonic(), 0.0))
-            except subprocess.TimeoutExpired:
-                process.end()
-            if process.folder is not None and not read_status(process.folder).is_over:
-                _put(process.folder, "stopped", "stopped with the server")
-        self._processes.clear()
-
-    def _look_at(self, process: _Process) -> None:
-        if not process.is_alive:
-            process.hang_up()
-            self._processes.remove(process)
-            if process.folder is not None and not read_status(process.folder).is_over:
-                code = process.popen.returncode
-                _put(process.folder, "failed", f"its process ended unexpectedly (code {code})")
-            return
-        if process.folder is None:
-            return
-        if read_status(process.folder).is_over:
-            process.folder, process.stop_by_s = None, None
-        elif process.stop_by_s is not None and monotonic() > process.stop_by_s:
-            process.end()
-            self._processes.remove(process)
-            _put(process.folder, "stopped", "stopped")
+        for each in self._running:
+            each.process.join(max(until_s - monotonic(), 0.0))
+            each.end()
+        self._running.clear()
 
 
 def jobs_of(folder: Path, most: int | None = None) -> list[tuple[Path, Status]]:
@@ -189,13 +211,8 @@ def jobs_of(folder: Path, most: int | None = None) -> list[tuple[Path, Status]]:
     return [(each, read_status(each)) for each in folders[:most]]
 
 
-def _put(folder: Path, state: str, text: str) -> None:
-    status = read_status(folder)
-    write_status(status.model_copy(update={"state": state, "text": text}), folder)
-
-
 def settle(jobs: Path, workers: Workers) -> None:
     """Mark as stopped the unfinished work without a process, as after a killed server."""
     for folder, status in jobs_of(jobs):
         if not status.is_over and not workers.is_known(folder):
-            _put(folder, "stopped", "the server stopped meanwhile")
+            end(folder, "stopped", "the server stopped meanwhile")

@@ -4,13 +4,14 @@ A session is independent of the page. All tabs on one design share its session, 
 independent of each other.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from blast_env.app import placing
+from blast_env.app.blasts import BlastTask
 from blast_env.app.cost import CostGuess, ReportCost
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
@@ -23,6 +24,7 @@ from blast_env.app.records import (
     comparison,
     read_kept,
 )
+from blast_env.app.tasks import AnswerTask, ReportTask, SearchTask
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import (
     Judged,
@@ -32,17 +34,7 @@ from blast_env.app.verdicts import (
     stored_consequences,
     verdict_table,
 )
-from blast_env.app.work import (
-    Answer,
-    AnswerTask,
-    BlastTask,
-    Question,
-    ReportChoice,
-    ReportTask,
-    SearchTask,
-    Status,
-    Task,
-)
+from blast_env.app.work import Answer, Question, Status, Task
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS
 from blast_env.design.search.registry import proposer_row
@@ -59,6 +51,9 @@ from blast_env.layout import check_layout
 from blast_env.layout.build_scene import charge_against
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
+
+if TYPE_CHECKING:
+    from blast_env.report import StudyOptions
 
 NO_FACADE = "Give structures windows or wall panels first (on the left)."
 """Message where no structure has a facade, so that there is no level of protection."""
@@ -228,9 +223,8 @@ class Session:
         for slot in chosen:
             task = BlastTask(
                 **self._on_site(self.scenario.without_budget),
-                layout=placing.plain(self.design.layouts[slot]),
-                cells=self.cells,
-                blasts=str(self.folder.blasts),
+                layout=self.design.layouts[slot],
+                blasts=self.folder.blasts,
             )
             folder = self._begin(task, f"blast of {SLOTS[slot]}, {self.engine.words}")
         if folder is None:
@@ -254,33 +248,36 @@ class Session:
         elif budget < 1:
             raise BlastEnvError(f"budget is {budget} blasts, must be at least 1")
         title = proposer_row(method).title
-        task = SearchTask(**self._on_site(), method=method, budget=budget, cells=self.cells)
+        task = SearchTask(**self._on_site(), method=method, budget=budget)
         if budget == 0:
             return self._begin(task, f"proposal: {title}")
         return self._begin(task, f"{method} search, {budget} blasts, {self._search_engine.words}")
 
-    def report(
-        self, page: Path, pdf: Path | None = None, choice: ReportChoice | None = None
-    ) -> Path:
+    def report(self, page: Path, pdf: Path | None = None, **contents: Any) -> Path:
         """Report on the active layout, by gas dynamics, under the chosen threats.
 
         Args:
             page: The page to write, .html.
             pdf: The same as PDF.
-            choice: Its contents.
+            contents: Options of `StudyOptions`.
 
         Raises:
             BlastEnvError: If the layout is empty, or the report cannot be started.
         """
-        self._check_for_report()
-        task = ReportTask(
-            **self._on_site(),
-            layout=placing.plain(self.design.layout),
-            choice=choice or ReportChoice(),
-            path=str(page),
-            pdf=None if pdf is None else str(pdf),
-        )
+        options = self._study_options(contents)
+        task = ReportTask(self.scenario, self.design.layout, options, page, pdf)
         return self._begin(task, f"report {page.name if pdf is None else pdf.name}")
+
+    def _study_options(self, contents: Mapping[str, Any]) -> "StudyOptions":
+        from blast_env.report import StudyOptions  # needs an extra
+
+        if not self.design.layout:
+            raise BlastEnvError(
+                f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
+            )
+        check_layout(self.scenario, self.design.layout)  # refuses one that costs too much
+        charges = tuple(each.charge for each in self.chosen_threats())
+        return StudyOptions(charges=charges, cache=self.work.cache, **contents)
 
     def ask(
         self, question: Question, target: LevelOfProtection, mass_error: float, budget: int
@@ -336,10 +333,9 @@ class Session:
         return AnswerTask(
             **self._on_site(None if is_advice else self.scenario.without_budget),
             subject=self.subject,
-            layout=placing.plain(self.design.layout),
+            layout=self.design.layout,
             question=question,
             name=SLOTS[self.design.active],
-            cells=self.cells,
             target=target,
             mass_error=mass_error,
             budget=budget,
@@ -390,9 +386,10 @@ class Session:
     def _on_site(self, site: Scenario | None = None) -> dict[str, Any]:
         """Return the parameters common to all work on the site, or on a variant of it."""
         return {
-            "scenario": (site or self.scenario).model_dump(mode="json", exclude_none=True),
+            "site": site or self.scenario,
             "threats": self.chosen_threats(),
-            "cache": str(self.work.cache),
+            "cache": self.work.cache,
+            "cells": self.cells,
         }
 
     def cost(self, slots: Iterable[int]) -> tuple[CostGuess, ...]:
@@ -429,23 +426,14 @@ class Session:
         """The engine of searches: with coarser cells than those of final statements."""
         return self.engine.coarser or self.engine
 
-    def cost_of_report(self, choice: ReportChoice) -> ReportCost:
-        """Return the cost of a report on the active layout.
+    def cost_of_report(self, **contents: Any) -> ReportCost:
+        """Return the cost of a report on the active layout; see `report`.
 
         Raises:
             BlastEnvError: If the layout is empty, or there are too many threats.
         """
-        self._check_for_report()
-        charges = (each.charge for each in self.chosen_threats())
-        options = choice.options(charges, self.work.cache)
+        options = self._study_options(contents)
         return ReportCost.of(self.scenario, self.design.layout, options)
-
-    def _check_for_report(self) -> None:
-        if not self.design.layout:
-            raise BlastEnvError(
-                f"layout {SLOTS[self.design.active]} is empty: there is nothing to report on"
-            )
-        check_layout(self.scenario, self.design.layout)  # refuses one that costs too much
 
     def cost_of_search(self, budget: int) -> tuple[CostGuess, ...]:
         """Return the costs of the blasts of a search."""

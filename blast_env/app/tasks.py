@@ -1,197 +1,223 @@
-"""The tasks of a worker: searches, answers, reports; blasts are in `blasts`.
+"""The tasks of the page: searches, answers, reports; blasts are in `blasts`.
 
-Long work reports its progress through a `Teller`, and may be interrupted anywhere by
-`KeyboardInterrupt`.
+Each is called in a process, see `jobs`, and reports its progress through a `Teller`.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from time import monotonic, time
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from blast_env.app import placing
-from blast_env.app.blasts import run_blasts, warm_engine
 from blast_env.app.cost import ReportCost
 from blast_env.app.records import write_kept
-from blast_env.app.work import (
-    ANSWER,
-    Answer,
-    AnswerTask,
-    BlastTask,
-    Question,
-    ReportTask,
-    SearchTask,
-    Status,
-    read_status,
-    read_task,
-    write_status,
-)
+from blast_env.app.work import ANSWER, Answer, Question, Teller
 from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
 from blast_env.design.search.registry import proposer_row
-from blast_env.evaluation import BlastEvaluator, LoadCaseSet
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
+from blast_env.evaluation.answers import AnswerPart
 from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
+from blast_env.response.buildings import LevelOfProtection
+from blast_env.site import Scenario
 from blast_env.site.vehicles import source_of
 
-_LEAST_PAUSE_S: Final = 0.1
+if TYPE_CHECKING:
+    from blast_env.report import StudyOptions
+
 _WRITING_S: Final = 300.0  # of a report with its pictures, on a busy computer
 
 
-class Teller:
-    """Writes the progress of work into its status, at most every 0.1 s.
+@dataclass(frozen=True, kw_only=True)
+class SearchTask:
+    """A search for a layout, or a proposal without a blast.
 
-    Args:
-        folder: The folder of the work.
+    Attributes:
+        site: The site.
+        threats: The threats: a single one is known, several are hidden.
+        cache: Folder for the loads of blasts.
+        cells: The cells of the page; the search has cells twice as large.
+        method: Name of the proposer.
+        budget: Most blasts; 0 for a proposer that runs none.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        changes = {"state": "running", "began_s": time()}
-        self._status = read_status(folder).model_copy(update=changes)
-        self._told_s = 0.0
-        self.tell()
-
-    def tell(self, **changes: object) -> None:
-        """Write changes of the status at once; the keys are the fields of `Status`."""
-        self._status = self._status.model_copy(update=changes)
-        self._told_s = monotonic()
-        write_status(self._status, self.folder)
-
-    def share(self, share: float) -> None:
-        """Write the completed share, 0 to 1, if an update is due."""
-        if self.is_due:
-            self.tell(share=min(max(share, 0.0), 1.0))
+    site: Scenario
+    threats: tuple[LoadCase, ...]
+    cache: Path
+    cells: Cells
+    method: str
+    budget: int
 
     @property
-    def is_due(self) -> bool:
-        """Whether the last update is long enough ago."""
-        return monotonic() - self._told_s >= _LEAST_PAUSE_S
+    def problem(self) -> DesignProblem:
+        """The problem of the proposer."""
+        row, site = proposer_row(self.method), self.site
+        if row.kind is ProposerKind.RULE and Need.VEHICLE not in row.needs:
+            # One against vehicles plans for all of the site.
+            sources = tuple(source_of(each.charge) for each in self.threats)
+            site = site.model_copy(update={"charge": sources})
+        engine = GasEngine.with_cells(self.cells)
+        evaluator = BlastEvaluator(site, engine.coarser or engine, cache=self.cache)
+        return DesignProblem(evaluator, LoadCaseSet(site, self.threats))
 
-    @property
-    def status(self) -> Status:
-        """The status written last."""
-        return self._status
+    def __call__(self, teller: Teller) -> None:
+        """Search; an interrupted search ends with its best layout so far.
+
+        Raises:
+            BlastEnvError: If it cannot be done; the message is for the user.
+            KeyboardInterrupt: If it was stopped before it had any layout.
+        """
+        problem = self.problem
+        if self.budget:
+            teller.tell(text="blasts without a barrier")
+            problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+
+        def report(progress: Progress) -> None:
+            if progress.best is None:
+                teller.share(progress.share)
+                return
+            best = placing.plain(progress.best.layout)
+            gone = 100.0 * progress.best.reduction(problem)
+            text = f"{progress.blasts} of {progress.budget} blasts, best reduction {gone:.1f} %"
+            if best != teller.status.layout:
+                teller.tell(share=progress.share, text=text, layout=best)
+            elif teller.is_due:
+                teller.tell(share=progress.share, text=text)
+
+        result = find_proposer(self.method).propose(problem, self.budget, 0, report)
+        if result.load is None and result.interrupted:
+            raise KeyboardInterrupt
+        if result.load is None:
+            words = result.expectation if result.layout else result.by
+            text = f"{placing.counted(self.site, result.layout)}, proposed by "
+            text += f"{proposer_row(self.method).title}{words and f', {words}'}"
+        else:
+            text = (
+                f"reduction {100.0 * result.history[-1].reduction(problem):.1f} % on the blasts of"
+                f" the search, after {result.blasts} of {result.budget}"
+                f" ({problem.evaluator.engine.words}); blast the layout to confirm it"
+            )
+        state = "stopped" if result.interrupted else "done"
+        teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
 
 
-def warm_up() -> None:
-    """Import modules and load compiled code in advance, so that the first task is not slow."""
-    warm_engine()
+@dataclass(frozen=True, kw_only=True)
+class AnswerTask:
+    """A question on a layout.
 
-
-def run_task(folder: Path) -> None:
-    """Run the task of a folder.
-
-    Raises:
-        BlastEnvError: If it cannot be done; the message is for the user.
-        KeyboardInterrupt: If it was stopped before it had any result.
+    Attributes:
+        site: The site.
+        threats: The threats.
+        cache: Folder for the loads of blasts.
+        cells: The cells; a search of advice has cells twice as large.
+        layout: The layout.
+        name: Its name.
+        question: The question.
+        subject: Digest of the site, the layout and the threats.
+        target: Required level of protection.
+        mass_error: Uncertainty of the masses; see `Uncertainty`.
+        budget: Most blasts of a search of advice.
     """
-    task, teller = read_task(folder), Teller(folder)
-    if isinstance(task, BlastTask):
-        run_blasts(task, teller.share)
-        teller.tell(state="done", share=1.0, text="done")
-    elif isinstance(task, SearchTask):
-        _search(task, teller)
-    elif isinstance(task, ReportTask):
-        _report(task, teller)
-    else:
-        _answer(task, teller)
 
+    site: Scenario
+    threats: tuple[LoadCase, ...]
+    cache: Path
+    cells: Cells
+    layout: Layout
+    name: str
+    question: Question
+    subject: str
+    target: LevelOfProtection
+    mass_error: float
+    budget: int
 
-def _search(task: SearchTask, teller: Teller) -> None:
-    row, scenario = proposer_row(task.method), task.site
-    if row.kind is ProposerKind.RULE and Need.VEHICLE not in row.needs:
-        # One against vehicles plans for all of the site.
-        sources = tuple(source_of(each.charge) for each in task.threats)
-        scenario = scenario.model_copy(update={"charge": sources})
-    engine = GasEngine.with_cells(task.cells)
-    evaluator = BlastEvaluator(scenario, engine.coarser or engine, cache=task.cache)
-    problem = DesignProblem(evaluator, LoadCaseSet(scenario, task.threats))
-    if task.budget:
-        teller.tell(text="blasts without a barrier")
-        problem.unprotected  # noqa: B018  # refuses a case in which nothing arrives
+    def __call__(self, teller: Teller) -> None:
+        """Answer the question, and keep the answer in a file.
 
-    def report(progress: Progress) -> None:
-        if progress.best is None:
-            teller.share(progress.share)
-            return
-        best = placing.plain(progress.best.layout)
-        reduction = 100.0 * progress.best.reduction(problem)
-        text = f"{progress.blasts} of {progress.budget} blasts, best reduction {reduction:.1f} %"
-        if best != teller.status.layout:
-            teller.tell(share=progress.share, text=text, layout=best)
-        elif teller.is_due:
-            teller.tell(share=progress.share, text=text)
+        Raises:
+            BlastEnvError: If it cannot be answered; the message is for the user.
+        """
+        changes: dict[str, object] = {}
+        if self.question is Question.ADVISE:
+            layout, parts = self._advice(teller)
+            changes["layout"] = placing.plain(layout) or None
+        else:
+            parts = [*self._judgement(teller)]
+        answer = Answer(question=self.question, subject=self.subject, parts=tuple(parts))
+        write_kept(answer, teller.folder / ANSWER)
+        first = next(each for each in answer.parts if isinstance(each, str))
+        teller.tell(state="done", share=1.0, text=first, **changes)
 
-    result = find_proposer(task.method).propose(problem, task.budget, 0, report)
-    if result.load is None and result.interrupted:
-        raise KeyboardInterrupt
-    if result.load is None:
-        words = result.expectation if result.layout else result.by
-        text = f"{placing.counted(scenario, result.layout)}, proposed by {row.title}"
-        text += words and f", {words}"
-    else:
-        reduction = 100.0 * result.history[-1].reduction(problem)
-        text = (
-            f"reduction {reduction:.1f} % on the blasts of the search, after {result.blasts} of"
-            f" {result.budget} ({evaluator.engine.words}); blast the layout to confirm it"
-        )
-    state = "stopped" if result.interrupted else "done"
-    teller.tell(state=state, share=1.0, text=text, layout=placing.plain(result.layout))
+    def _judgement(self, teller: Teller) -> Iterator[AnswerPart]:
+        # Here, as below, because they take long to import, and a blast needs none of them.
+        from blast_env.evaluation.assessment import assess
+        from blast_env.evaluation.capacity import capacity
 
+        engine, charges = GasEngine.with_cells(self.cells), [each.charge for each in self.threats]
+        layouts: dict[str, Layout] = {"no barrier": ()}
+        if self.layout:
+            layouts[f"layout {self.name}"] = self.layout
+        if self.question is Question.ASSESS:
+            found = assess(self.site, layouts, charges, engine, teller.share, cache=self.cache)
+            return found.answer(self.target, self.mass_error)
+        evaluator = BlastEvaluator(self.site, engine, cache=self.cache)
+        return iter(capacity(evaluator, layouts, charges, teller.share).answer())
 
-def _answer(task: AnswerTask, teller: Teller) -> None:
-    # Here, because they take long to import, and a blast needs none of them.
-    from blast_env.design.search.advised import AdviceJudge, advised, asked_site
-    from blast_env.evaluation.assessment import assess
-    from blast_env.evaluation.capacity import capacity
+    def _advice(self, teller: Teller) -> tuple[Layout, list[AnswerPart]]:
+        from blast_env.design.search.advised import AdviceJudge, advised, asked_site
 
-    scenario, engine = task.site, GasEngine.with_cells(task.cells)
-    charges = [each.charge for each in task.threats]
-    layouts: dict[str, Layout] = {"no barrier": ()}
-    if task.layout:
-        layouts[f"layout {task.name}"] = placing.layout_from(scenario, task.layout)
-    changes: dict[str, object] = {}
-    if task.question is Question.ASSESS:
-        found = assess(scenario, layouts, charges, engine, teller.share, cache=Path(task.cache))
-        parts = found.answer(task.level, task.mass_error)
-    elif task.question is Question.CAPACITY:
-        evaluator = BlastEvaluator(scenario, engine, cache=task.cache)
-        parts = capacity(evaluator, layouts, charges, teller.share).answer()
-    else:
-        site = asked_site(scenario, task.level)
-        coarse = BlastEvaluator(site, engine.coarser or engine, cache=task.cache)
+        engine, site = GasEngine.with_cells(self.cells), asked_site(self.site, self.target)
+        coarse = BlastEvaluator(site, engine.coarser or engine, cache=self.cache)
         judge = AdviceJudge(
-            DesignProblem(coarse, LoadCaseSet(site, task.threats)),
-            BlastEvaluator(site, engine, cache=task.cache),
-            task.mass_error,
+            DesignProblem(coarse, LoadCaseSet(site, self.threats)),
+            BlastEvaluator(site, engine, cache=self.cache),
+            self.mass_error,
         )
-        advice = advised(judge, task.budget, progress=teller.share)
-        parts = advice.answer()
-        changes["layout"] = placing.plain(advice.best.layout) or None
-    answer = Answer(question=task.question, subject=task.subject, parts=tuple(parts))
-    write_kept(answer, teller.folder / ANSWER)
-    first = next(each for each in answer.parts if isinstance(each, str))
-    teller.tell(state="done", share=1.0, text=first, **changes)
+        advice = advised(judge, self.budget, progress=teller.share)
+        return advice.best.layout, [*advice.answer()]
 
 
-def _report(task: ReportTask, teller: Teller) -> None:
-    # Reports need an extra, and most work is no report.
-    from blast_env.report import run_study, write_report
+@dataclass(frozen=True)
+class ReportTask:
+    """A report on one layout.
 
-    scenario, page = task.site, Path(task.path)
-    layout = placing.layout_from(scenario, task.layout)
-    options = task.choice.options((each.charge for each in task.threats), Path(task.cache))
-    cost = ReportCost.of(scenario, layout, options)
-    teller.tell(grace_s=_WRITING_S)
+    Attributes:
+        site: The site.
+        layout: The layout.
+        options: Its threats and contents.
+        page: The page to write, .html.
+        pdf: The same as PDF; `None` for none.
+    """
 
-    def tell(what: str, part: float) -> None:
-        share = cost.share(what, part)
-        if teller.is_due or share is None:
-            teller.tell(text=what, share=teller.status.share if share is None else share)
+    site: Scenario
+    layout: Layout
+    options: "StudyOptions"
+    page: Path
+    pdf: Path | None = None
 
-    study = run_study(scenario, layout, options, tell)
-    written = write_report(study, page, None if task.pdf is None else Path(task.pdf))
-    words = f"wrote {' and '.join(path.name for path in written)}"
-    if study.stopped:
-        words = f"stopped before: {study.stopped}; {words} with the finished parts"
-    state = "stopped" if study.stopped else "done"
-    teller.tell(state=state, share=1.0, text=words, file=str(written[-1]))
+    def __call__(self, teller: Teller) -> None:
+        """Write the report; a stopped one has the finished parts.
+
+        Raises:
+            BlastEnvError: If it cannot be written; the message is for the user.
+            KeyboardInterrupt: If it was stopped before it had any part.
+        """
+        # Reports need an extra, and most work is no report.
+        from blast_env.report import run_study, write_report
+
+        cost = ReportCost.of(self.site, self.layout, self.options)
+        teller.tell(grace_s=_WRITING_S)
+
+        def tell(what: str, part: float) -> None:
+            share = cost.share(what, part)
+            if teller.is_due or share is None:
+                teller.tell(text=what, share=teller.status.share if share is None else share)
+
+        study = run_study(self.site, self.layout, self.options, tell)
+        written = write_report(study, self.page, self.pdf)
+        words = f"wrote {' and '.join(path.name for path in written)}"
+        if study.stopped:
+            words = f"stopped before: {study.stopped}; {words} with the finished parts"
+        state = "stopped" if study.stopped else "done"
+        teller.tell(state=state, share=1.0, text=words, file=str(written[-1]))

@@ -1,195 +1,22 @@
-"""Work requested on the page, as files: the task, its progress and its result."""
+"""Work requested on the page: its progress and its answers, as files that survive a kill."""
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
-
-from pydantic import Field, TypeAdapter
+from time import monotonic, time
+from typing import Any, Final, Literal, TypeAlias
 
 from blast_env.app.records import MOST_BYTES, Kept, write_kept
 from blast_env.documents import check_values, read_text
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation import LoadCase
 from blast_env.evaluation.answers import AnswerTable
-from blast_env.gas.settings import Cells
-from blast_env.response.buildings import LevelOfProtection
-from blast_env.site import AnyCharge, Scenario
 
-if TYPE_CHECKING:
-    from blast_env.report import StudyOptions
-
-TASK: Final = "task.json"
 STATUS: Final = "status.json"
 ANSWER: Final = "answer.json"
 """Name of the file of an answer in the folder of its work."""
 
 _LEAST_SHARE: Final = 0.05  # below it the time left cannot be estimated
+_LEAST_PAUSE_S: Final = 0.1
 State = Literal["waiting", "running", "done", "failed", "stopped"]
-
-
-class SiteTask(Kept):
-    """Work on a site.
-
-    Attributes:
-        scenario: The site as a document.
-        threats: Those that layouts are tested against: a single one is known, several are hidden.
-        cache: Folder for the loads of blasts.
-    """
-
-    scenario: dict[str, Any]
-    threats: tuple[LoadCase, ...]
-    cache: str
-
-    @property
-    def site(self) -> Scenario:
-        """The site.
-
-        Raises:
-            ScenarioError: If the document is no scenario.
-        """
-        return Scenario.from_document(self.scenario, str(self.scenario.get("name", "the site")))
-
-
-class LayoutTask(SiteTask):
-    """Work on one layout.
-
-    Attributes:
-        layout: The layout.
-    """
-
-    layout: tuple[tuple[Any, ...], ...]
-
-
-class BlastTask(LayoutTask):
-    """Blasts of one layout, one per threat.
-
-    Attributes:
-        cells: The cells.
-        blasts: Folder for the blasts, each under its key.
-    """
-
-    kind: Literal["blast"] = "blast"
-    cells: Cells
-    blasts: str
-
-
-class SearchTask(SiteTask):
-    """A search for a layout, or a proposal without a blast.
-
-    Attributes:
-        method: Name of the proposer.
-        budget: Most blasts; 0 for a proposer that runs none.
-        cells: The cells of the page; the search has cells twice as large.
-    """
-
-    kind: Literal["search"] = "search"
-    method: str
-    budget: int
-    cells: Cells
-
-
-class Question(StrEnum):
-    """Questions on the level of protection of buildings, each as a command answers it.
-
-    Attributes:
-        ASSESS: Does the layout comply, and with which probability? As `assess`.
-        CAPACITY: Up to which charge, and from which stand-off? As `assess --capacity`.
-        ADVISE: Which measures comply at the least cost? As `advise`.
-    """
-
-    ASSESS = "assess"
-    CAPACITY = "largest charge"
-    ADVISE = "advise"
-
-
-class AnswerTask(LayoutTask):
-    """A question on a layout, by gas dynamics.
-
-    Attributes:
-        question: The question.
-        name: Name of the layout.
-        cells: The cells; a search of advice has cells twice as large.
-        target: Required level of protection.
-        mass_error: Uncertainty of the masses; see `Uncertainty`.
-        budget: Most blasts of a search of advice.
-        subject: Digest of the site, the layout and the threats.
-    """
-
-    kind: Literal["answer"] = "answer"
-    question: Question
-    subject: str
-    name: str
-    cells: Cells
-    target: int
-    mass_error: float
-    budget: int
-
-    @property
-    def level(self) -> LevelOfProtection:
-        """The required level of protection."""
-        return LevelOfProtection(self.target)
-
-
-class Answer(Kept):
-    """The answer to a question.
-
-    Attributes:
-        question: The question.
-        subject: As in `AnswerTask`.
-        parts: Its lines and tables.
-    """
-
-    question: Question
-    subject: str
-    parts: tuple[str | AnswerTable, ...]
-
-
-class ReportChoice(Kept):
-    """The contents of a report; see `StudyOptions`."""
-
-    cells: tuple[float | str, float | str] = (0.5, 0.25)
-    items: bool = True
-    target: int = LevelOfProtection.LOW
-
-    def options(self, charges: Iterable[AnyCharge], cache: Path) -> "StudyOptions":
-        """Return the options of a report under some charges.
-
-        Raises:
-            BlastEnvError: If there are too many charges, or an option is out of bounds.
-        """
-        from blast_env.report import StudyOptions  # needs an extra
-
-        return StudyOptions(
-            charges=tuple(charges),
-            cells=self.cells,
-            items=self.items,
-            target=LevelOfProtection(self.target),
-            cache=cache,
-        )
-
-
-class ReportTask(LayoutTask):
-    """A report on one layout by gas dynamics.
-
-    Attributes:
-        choice: Its contents.
-        path: The page, .html.
-        pdf: The same as PDF; `None` for none.
-    """
-
-    kind: Literal["report"] = "report"
-    choice: ReportChoice = ReportChoice()
-    path: str
-    pdf: str | None = None
-
-
-Task = Annotated[
-    BlastTask | SearchTask | ReportTask | AnswerTask,
-    Field(discriminator="kind"),
-]
-
-_TASK: Final[TypeAdapter[Task]] = TypeAdapter(Task)
 
 
 class Status(Kept):
@@ -227,28 +54,6 @@ class Status(Kept):
         return self.state in ("done", "failed", "stopped")
 
 
-def write_task(task: Task, folder: Path, title: str) -> None:
-    """Write work and its first status into its folder.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
-    """
-    write_kept(task, folder / TASK)
-    write_status(Status(title=title), folder)
-
-
-def read_task(folder: Path) -> Task:
-    """Return the work of a folder.
-
-    Raises:
-        BlastEnvError: If there is none.
-    """
-    try:
-        return _TASK.validate_json(check_values(read_text(folder / TASK, MOST_BYTES)))
-    except ValueError as error:
-        raise BlastEnvError(f"{folder}: holds no work: {error}") from error
-
-
 def write_status(status: Status, folder: Path) -> None:
     """Write the progress of work."""
     write_kept(status, folder / STATUS)
@@ -260,3 +65,78 @@ def read_status(folder: Path) -> Status:
         return Status.model_validate_json(check_values(read_text(folder / STATUS, MOST_BYTES)))
     except ValueError as error:
         return Status(state="failed", title=folder.name, text=f"cannot be read: {error}")
+
+
+def end(folder: Path, state: State, text: str) -> None:
+    """Write the end of work into its status, unless it has ended already."""
+    status = read_status(folder)
+    if not status.is_over:
+        write_status(status.model_copy(update={"state": state, "text": text}), folder)
+
+
+class Teller:
+    """Writes the progress of work into its status, at most every 0.1 s.
+
+    Args:
+        folder: The folder of the work.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        changes = {"state": "running", "began_s": time()}
+        self._status = read_status(folder).model_copy(update=changes)
+        self._told_s = 0.0
+        self.tell()
+
+    def tell(self, **changes: object) -> None:
+        """Write changes of the status at once; the keys are the fields of `Status`."""
+        self._status = self._status.model_copy(update=changes)
+        self._told_s = monotonic()
+        write_status(self._status, self.folder)
+
+    def share(self, share: float) -> None:
+        """Write the completed share, 0 to 1, if an update is due."""
+        if self.is_due:
+            self.tell(share=min(max(share, 0.0), 1.0))
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the last update is long enough ago."""
+        return monotonic() - self._told_s >= _LEAST_PAUSE_S
+
+    @property
+    def status(self) -> Status:
+        """The status written last."""
+        return self._status
+
+
+Task: TypeAlias = Callable[[Teller], None]
+"""Work for a process: it pickles, and may be interrupted anywhere by `KeyboardInterrupt`."""
+
+
+class Question(StrEnum):
+    """Questions on the level of protection of buildings, each as a command answers it.
+
+    Attributes:
+        ASSESS: Does the layout comply, and with which probability? As `assess`.
+        CAPACITY: Up to which charge, and from which stand-off? As `assess --capacity`.
+        ADVISE: Which measures comply at the least cost? As `advise`.
+    """
+
+    ASSESS = "assess"
+    CAPACITY = "largest charge"
+    ADVISE = "advise"
+
+
+class Answer(Kept):
+    """The answer to a question.
+
+    Attributes:
+        question: The question.
+        subject: Digest of the site, the layout and the threats.
+        parts: Its lines and tables.
+    """
+
+    question: Question
+    subject: str
+    parts: tuple[str | AnswerTable, ...]

@@ -1,9 +1,9 @@
 """The page's work without processes of its own, and the rows of its tables."""
 
+import pickle
 from types import SimpleNamespace
 
-from blast_env.app.jobs import Workers
-from blast_env.app.worker import do
+from blast_env.app.jobs import Workers, do
 from blast_env.evaluation.answers import AnswerTable
 
 
@@ -18,4 +18,5 @@ class Here(Workers):
 
     def tick(self) -> None:
         while self._waiting:
-            do(self._waiting.popleft())
+            folder, task = self._waiting.popleft()
+            do(folder, pickle.loads(pickle.dumps(task)))

@@ -3,7 +3,7 @@
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
@@ -14,10 +14,10 @@ from PIL import Image
 from pydantic import TypeAdapter
 
 from blast_env import report
-from blast_env.app import blasts, jobs, offers
+from blast_env.app import blasts, offers
 from blast_env.app.design import SLOTS
 from blast_env.app.folder import WorkFolder
-from blast_env.app.jobs import Workers, _Process, settle
+from blast_env.app.jobs import Running, Workers, settle
 from blast_env.app.placing import plain
 from blast_env.app.records import (
     Blasted,
@@ -28,7 +28,7 @@ from blast_env.app.records import (
 from blast_env.app.session import Session, Sessions
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import verdict_table
-from blast_env.app.work import ReportChoice, Status, read_status, write_status
+from blast_env.app.work import Status, Teller, read_status, write_status
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase, StructureLoad, evaluate_layout
@@ -413,13 +413,9 @@ def test_a_vehicle_is_where_the_layout_lets_it_come(tmp_path: Path) -> None:
 # Processes.
 
 
-COLD = "from blast_env.app import worker; worker.warm_up = int; worker.main()"
-
-
 @pytest.fixture
-def workers(monkeypatch: pytest.MonkeyPatch) -> Iterator[Workers]:
+def workers() -> Iterator[Workers]:
     """One process, which loads no compiled code in advance."""
-    monkeypatch.setattr(jobs, "_COMMAND", (sys.executable, "-c", COLD))
     workers = Workers(most=1)
     yield workers
     workers.close()
@@ -437,26 +433,23 @@ def wait(workers: Workers, folder: Path, *states: str, most_s: float = 60.0) -> 
 
 
 @pytest.mark.slow
-def test_a_search_is_stopped_and_keeps_its_best_and_its_process_goes_on(
+def test_a_search_is_stopped_and_keeps_its_best_and_the_next_one_begins(
     tmp_path: Path, workers: Workers
 ) -> None:
     session = session_on(tmp_path, hut(), workers)
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in the background of a script
-    workers.prepare()
-    signal.signal(signal.SIGINT, before)
     first, second = session.search("random", 100_000), session.search("random", 4)
+    signal.signal(signal.SIGINT, before)
     while read_status(first).layout is None:
         wait(workers, first, "waiting", "running")
         sleep(0.02)
     assert read_status(second).state == "waiting"  # one process, one at a time
-    process = workers._processes[0].popen.pid
     workers.stop(first)
     stopped = wait(workers, first, "stopped")
     assert stopped.layout is not None
     assert "% on the blasts of the search" in stopped.text
     session.take(stopped, 0)
     assert wait(workers, second, "done").layout is not None
-    assert workers._processes[0].popen.pid == process
 
     third = session.search("random", 100_000)
     wait(workers, third, "running")
@@ -464,23 +457,69 @@ def test_a_search_is_stopped_and_keeps_its_best_and_its_process_goes_on(
     assert read_status(third).state == "stopped"
 
 
-def started(command: Sequence[str], workers: Workers, folder: Path) -> _Process:
-    """Return a process that is at work in a folder, whatever it does."""
+SERVER = """
+import sys, time
+from pathlib import Path
+from blast_env.app.folder import WorkFolder
+from blast_env.app.jobs import Workers
+from blast_env.app.session import Sessions
+from tests.gas_sites import hut
+
+if __name__ == "__main__":
+    session = Sessions(WorkFolder(Path(sys.argv[1])), Workers()).new(hut(), "begin")
+    session.cells = 0.5
+    print(session.search("random", 100_000), flush=True)
+    time.sleep(600.0)
+"""
+
+
+@pytest.mark.slow
+def test_work_ends_with_a_server_that_is_killed_and_keeps_its_best(tmp_path: Path) -> None:
+    script = tmp_path / "server.py"
+    script.write_text(SERVER)
+    command = [sys.executable, str(script), str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        folder = Path(server.stdout.readline().strip())
+        wait(Workers(most=0), folder, "running")
+        while read_status(folder).layout is None:
+            sleep(0.1)
+        server.kill()
+    assert wait(Workers(most=0), folder, "stopped").layout is not None
+
+
+def sleeping(_: Teller) -> None:
+    """Stand for work that lasts."""
+    sleep(60.0)
+
+
+def started(workers: Workers, folder: Path) -> Running:
+    """Return a task that lasts, at work in a folder."""
     folder.mkdir()
-    write_status(Status(state="running"), folder)
-    process = _Process(subprocess.Popen(command, stdin=subprocess.PIPE, text=True), folder)
-    workers._processes.append(process)
-    return process
+    write_status(Status(), folder)
+    running = Running.started(folder, sleeping)
+    workers._running.append(running)
+    wait(workers, folder, "running")
+    return running
 
 
 def test_work_whose_process_is_killed_has_failed(tmp_path: Path) -> None:
     workers, folder = Workers(), tmp_path / "job"
-    process = started(["sleep", "60"], workers, folder)
-    process.popen.kill()
-    process.popen.wait()
+    process = started(workers, folder).process
+    process.kill()
+    process.join()
     workers.tick()
     assert "ended unexpectedly" in read_status(folder).text
     assert not workers.is_known(folder)
+
+
+def test_work_waits_until_modules_and_compiled_code_are_loaded(
+    tmp_path: Path, workers: Workers
+) -> None:
+    workers.prepare()
+    folder = session_on(tmp_path, hut(), workers).search("random", 2)
+    assert read_status(folder).state == "waiting"
+    wait(workers, folder, "done")
 
 
 def test_work_that_waits_is_stopped_at_once(tmp_path: Path) -> None:
@@ -542,9 +581,9 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
     with pytest.raises(BlastEnvError, match="layout A is empty"):
         session.report(tmp_path / "r.html")
     session.put("wall", session.design.with_layout(WALL))
-    choice = ReportChoice(cells=(0.5, 0.5), items=False, target=3)
-    session.report(tmp_path / "r.html", tmp_path / "r.pdf", choice)
-    cost = session.cost_of_report(choice)
+    contents = {"cells": (0.5, 0.5), "items": False, "target": LevelOfProtection.MEDIUM}
+    session.report(tmp_path / "r.html", tmp_path / "r.pdf", **contents)
+    cost = session.cost_of_report(**contents)
     shares = [cost.share("without each item", 0.5), cost.share("other places", 0.5)]
     assert seen == [*shares, shares[-1]]  # of the whole, and what is no part changes nothing
     status = state_of(session)
@@ -568,20 +607,20 @@ def test_a_report_is_of_the_layout_and_the_chosen_threats(
 
 def test_a_report_that_is_stopped_may_take_time_to_write(tmp_path: Path) -> None:
     workers, folder = Workers(), tmp_path / "job"
-    process = started(["sleep", "60"], workers, folder)
+    running = started(workers, folder)
     for grace_s in (5.0, 300.0):
         write_status(Status(state="running", grace_s=grace_s), folder)
-        process.stop_by_s = None
+        running.stop_by_s = None
         workers.stop(folder)
-        assert process.stop_by_s is not None
-        assert grace_s - 4.0 < process.stop_by_s - monotonic() <= grace_s
-    process.end()
+        assert running.stop_by_s is not None
+        assert grace_s - 4.0 < running.stop_by_s - monotonic() <= grace_s
+    workers.close()
+    assert read_status(folder).state == "stopped"
 
 
 WARM_CODE = """
 import sys
 from numba.core.dispatcher import Dispatcher
-from blast_env.app.tasks import warm_up
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from tests.gas_sites import glazed_hut
 
@@ -590,7 +629,7 @@ def loaded():
     compiled = [each for own in physics for each in own.values() if isinstance(each, Dispatcher)]
     return {(each.__name__, *each.signatures) for each in compiled if each.signatures}
 
-warm_up()
+import blast_env.app.warm
 warm = loaded()
 GasBlast(glazed_hut(), engine=GasEngine(cells="coarse")).run()
 print(len(warm), *loaded() - warm)

@@ -23,9 +23,10 @@ from blast_agents.training.run_folder import (
 
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
-from blast_env.app.work import ReportTask, read_task, write_task
+from blast_env.app.records import read_kept, write_kept
+from blast_env.app.work import Answer, Question
 from blast_env.cluster import address_of
-from blast_env.evaluation import LoadCase
+from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad
 from blast_env.evaluation.store import BlastKey, BlastStore
@@ -206,13 +207,12 @@ def _design(folder: Path) -> Format:
     return Format((path.read_bytes(),), _from_file(path, read))
 
 
-def _task(folder: Path) -> Format:
-    threat = LoadCase(name="here", charge=Charge((1.0, 2.0), 100.0))
-    document = small_scenario().model_dump(mode="json", exclude_none=True)
-    task = ReportTask(scenario=document, layout=((0, 0),), threats=(threat,), cache="c", path="p")
-    write_task(task, folder, "report")
-    path = folder / "task.json"
-    return Format((path.read_bytes(),), _from_file(path, lambda _: read_task(folder)))
+def _answer(folder: Path) -> Format:
+    table = AnswerTable.of("largest", ("layout", "low"), [("A", "12")])
+    answer = Answer(question=Question.CAPACITY, subject="a1", parts=("complies", table))
+    path = folder / "answer.json"
+    write_kept(answer, path)
+    return Format((path.read_bytes(),), _from_file(path, lambda path: read_kept(Answer, path)))
 
 
 def _scheduler(folder: Path) -> Format:
@@ -237,7 +237,7 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "DXF": _map(".dxf", units="mm", **LAYERS),
         "collisions (Parquet)": _parquet,
         "page: design": _design,
-        "page: task": _task,
+        "page: answer": _answer,
         "scheduler file": _scheduler,
     }
 )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import tomli_w
 from nicegui import events, ui
@@ -11,7 +11,6 @@ from blast_env.app.design import SLOTS
 from blast_env.app.page.uploads import complain, file_upload, read_upload, site_upload
 from blast_env.app.session import Session
 from blast_env.app.sources import layout_of_file
-from blast_env.app.work import ReportChoice
 from blast_env.errors import BlastEnvError
 from blast_env.files import scratch_folder
 from blast_env.gas.settings import Cells
@@ -117,7 +116,7 @@ class FilesMenu:
     def _save_report(self, as_pdf: bool) -> None:
         session = self._session
         try:
-            session.cost_of_report(ReportChoice())  # raises if no report is possible
+            session.cost_of_report()  # raises if no report is possible
         except BlastEnvError as error:
             complain(error)
             return
@@ -143,7 +142,7 @@ class ReportDialog:
 
             cells = final_cells(session.scenario)
             self._cells = ui.select(_CELLS, value=cells, label="cells of gas dynamics")
-            wanted = session.scenario.objective.level or ReportChoice().target
+            wanted = session.scenario.objective.level or LevelOfProtection.LOW
             self._target = ui.select(_LEVELS, value=wanted, label="required level")
             self._target.visible = bool(session.scenario.bays)
             self._items = ui.switch("contribution of each barrier", value=True)
@@ -162,14 +161,16 @@ class ReportDialog:
         self._say_cost()
 
     @property
-    def _choice(self) -> ReportChoice:
-        cells = (*self._cells.value,)
-        return ReportChoice(
-            cells=cells, items=bool(self._items.value), target=int(self._target.value)
-        )
+    def _contents(self) -> dict[str, Any]:
+        """The chosen options of `StudyOptions`."""
+        return {
+            "cells": (*self._cells.value,),
+            "items": bool(self._items.value),
+            "target": LevelOfProtection(self._target.value),
+        }
 
     def _say_cost(self) -> None:
-        self._cost.text = self._session.cost_of_report(self._choice).words
+        self._cost.text = self._session.cost_of_report(**self._contents).words
 
     def _begin(self) -> None:
         session = self._session
@@ -178,7 +179,7 @@ class ReportDialog:
         self._dialog.close()
         try:
             pdf = page.with_suffix(".pdf") if self._as_pdf else None
-            session.report(page, pdf, self._choice)
+            session.report(page, pdf, **self._contents)
         except BlastEnvError as error:
             complain(error)
             return
