@@ -8,7 +8,7 @@ from blast_agents.training.run_folder import TrainingSettings
 
 from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Evaluators, SeedRange, compare, draw_threats, evaluate_layout
+from blast_env.evaluation import Evaluators, compare, draw_threats, evaluate_layout
 from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.site import PointSource
 from blast_env.site.scene import Charge
@@ -73,13 +73,6 @@ def test_sites_are_evaluated_in_the_order_of_their_cases_with_progress() -> None
     assert shares[-1] == pytest.approx(1.0)
     alone = compare(evaluators, first, [WALLS[0]] * 2)
     assert comparison.loads[0::2].tolist() == alone.loads.tolist()
-
-
-def test_the_weights_are_chosen_by_seeds_of_their_own() -> None:
-    cases = Selection.of(SETTINGS, SOURCE).cases
-    assert len(cases) == SETTINGS.evaluation_cases
-    for case in cases:
-        assert all(threat.seed in SeedRange.VALIDATION.value for threat in case.threats)
 
 
 def test_fixed_charges_come_in_turn_in_training_selection_and_evaluation() -> None:

@@ -52,7 +52,7 @@ from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.scene import Charge
-from studies.blast_table import COLUMNS, scenario_of, site_name
+from studies.blast_table import COLUMNS
 from studies.surrogate import HeldOut, Recipe, verdict
 from tests.agents.test_self_labelling import wide_yard
 
@@ -391,6 +391,8 @@ def table_of_guesses(truth: Surrogate, layouts: int) -> pd.DataFrame:
 
 def test_it_learns_what_it_is_shown_and_says_how_well() -> None:
     table = table_of_guesses(by_hand(7, members=1), 60)
+    with pytest.raises(BlastEnvError, match="no load of a protected structure"):
+        Samples.of(table, {})
     samples = Samples.of(table, {YARD.content_hash: YARD})
     held = folds(samples.case, 4, 0)
     assert sum(each.sum() for each in held) == len(samples)
@@ -430,12 +432,6 @@ def test_loads_that_are_no_numbers_stop_a_fit() -> None:
     every = np.ones(len(samples), dtype=bool)
     with pytest.raises(BlastEnvError, match="network of seed 0 in epoch 0: no finite error"):
         fit(odd, every, 1, 0, ABOUT, 1, peaks=False)
-
-
-def test_rows_of_unknown_scenarios_are_left_out() -> None:
-    table = table_of_guesses(by_hand(), 3)
-    with pytest.raises(BlastEnvError, match="no load of a protected structure"):
-        Samples.of(table, {})
 
 
 def case(charges: int = 1) -> LoadCaseSet:
@@ -596,13 +592,6 @@ def test_held_out_predictions_set_the_intervals() -> None:
     assert joined.check.spreads == pytest.approx(1.0)
     assert joined.errors.rms == pytest.approx(np.sqrt(np.mean(off**2)))
     assert (joined.inside == (off < 0.2)).all()
-
-
-def test_scenarios_of_the_table_are_found_by_their_names() -> None:
-    assert scenario_of("visitor_entrance") == load_scenario("visitor_entrance")
-    assert scenario_of(site_name(10_000)).name == "site_10000"
-    large = scenario_of(site_name(10_001, 42.5))
-    assert (large.name, large.site.width_m) == ("site_10001", 42.5)
 
 
 def test_a_verdict_holds_promise_and_rules_against_blasts() -> None:

@@ -1,4 +1,4 @@
-"""What is asked, what it costs, and which layout counts as the best."""
+"""Search: what is asked and what it costs, neighbours and crossovers."""
 
 from itertools import pairwise
 
@@ -7,12 +7,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blast_env import load_scenario
+from blast_env.design.rules import random_layout
+from blast_env.design.search import Layout
+from blast_env.design.search.moves import Moves, random_walls
+from blast_env.design.search.operators import cut, repaired
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
 from blast_env.evaluation.cases import hidden_search_set, known_search_set
+from blast_env.layout import LayoutState
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
+from tests.agents.sites import site
 from tests.design.search_cases import ballistic, small_problem, small_scenario
 
 LAYOUTS = [((row, column),) for row in range(4) for column in range(3)]
@@ -52,18 +59,10 @@ def test_a_pair_of_layout_and_threat_is_paid_for_once(problem: DesignProblem) ->
     assert it.blasts == 4
 
 
-def test_what_a_cache_knows_is_paid_for_all_the_same(problem: DesignProblem) -> None:
-    """Otherwise a search would find more the second time."""
-    for _ in range(2):
-        it = session(problem, 2)
-        with pytest.raises(SearchEndedError):
-            it.assess(LAYOUTS)
-        assert it.blasts == 2
-
-
 @given(budget=st.integers(1, 12), threats=st.integers(1, 4))
 @settings(max_examples=20, deadline=None, derandomize=True)
 def test_the_budget_is_used_as_far_as_it_goes_and_no_farther(budget: int, threats: int) -> None:
+    """And what a cache knows is paid for all the same: else a search would find more again."""
     it = session(_SHARED, budget, threats)
     try:
         it.assess(LAYOUTS)
@@ -160,30 +159,99 @@ def test_a_known_charge_has_its_realisations() -> None:
 
 
 @pytest.mark.parametrize(
-    ("threats", "words"),
-    [((), "there are none"), ((LoadCase(WEST, 1), LoadCase(WEST, 1)), "appears twice")],
+    ("threats", "zoned", "words"),
+    [
+        ((), True, "there are none"),
+        ((LoadCase(WEST, 1), LoadCase(WEST, 1)), True, "appears twice"),
+        ((LoadCase(WEST, 1),), False, "no build zone"),
+    ],
 )
-def test_threats_that_are_no_use_are_refused(threats: tuple[LoadCase, ...], words: str) -> None:
+def test_problems_that_are_no_use_are_refused(
+    threats: tuple[LoadCase, ...], zoned: bool, words: str
+) -> None:
+    scenario = small_scenario()
+    scenario = scenario if zoned else scenario.model_copy(update={"build_zone": None})
+    evaluator = BlastEvaluator(scenario, "event")
     with pytest.raises(BlastEnvError, match=words):
-        DesignProblem(
-            BlastEvaluator(small_scenario(), "event"),
-            LoadCaseSet(small_scenario(), threats, realisations=len(threats)),
-        )
+        DesignProblem(evaluator, LoadCaseSet(scenario, threats, realisations=len(threats)))
 
 
-def test_a_site_without_a_build_zone_is_refused() -> None:
-    scenario = small_scenario().model_copy(update={"build_zone": None})
-    with pytest.raises(BlastEnvError, match="no build zone"):
-        DesignProblem(
-            BlastEvaluator(scenario, "event"), LoadCaseSet(scenario, (LoadCase(WEST, 1),))
-        )
-
-
-def test_a_layout_that_does_not_fit_is_refused(problem: DesignProblem) -> None:
+def test_questions_that_are_no_use_are_refused(problem: DesignProblem) -> None:
     with pytest.raises(LayoutError, match="outside the build zone"):
         session(problem, 10).assess([((9, 9),)])
-
-
-def test_no_budget_is_refused(problem: DesignProblem) -> None:
     with pytest.raises(BlastEnvError, match="budget is 0 blasts, must be at least 1"):
         session(problem, 0)
+
+
+# --- Neighbours, walls, crossovers: always legal, and they reach every layout.
+
+
+SITES = {name: load_scenario(name) for name in ("courtyard", "perimeter_gate", "street_junction")}
+SITES["budget_and_way"] = site(
+    budget=9.0,
+    clearance_m=1.0,
+    cost_areas=[
+        {"corner_m": (20.0, 15.0), "size_m": (5.0, 10.0), "module_cost": 2.0, "reason": "rock"}
+    ],
+    access_way={"width_m": 4.0, "between": "left_right"},
+)
+
+
+@given(name=st.sampled_from(sorted(SITES)), seed=st.integers(0, 10_000))
+@settings(max_examples=12, deadline=None, derandomize=True)
+def test_every_neighbour_is_legal_and_close(name: str, seed: int) -> None:
+    """A walk of many moves on sites with budgets and access ways.
+
+    Where modules cost the same everywhere, their number changes by one at most.
+    """
+    scenario, rng = SITES[name], np.random.default_rng(seed)
+    moves, layout = Moves(scenario, count_share=0.3), random_walls(scenario, rng)
+    for _ in range(12):
+        neighbour = moves.neighbour(layout, rng)
+        assert LayoutState.of(scenario, neighbour).cells == neighbour
+        assert len(neighbour) <= len(layout) + 1
+        if name == "courtyard":
+            assert len(neighbour) >= len(layout) - 1
+        layout = neighbour
+
+
+def test_a_whole_wall_can_move_at_once() -> None:
+    scenario = site(stock=4)
+    rng, moves = np.random.default_rng(0), Moves(scenario, count_share=0.0, wall_share=1.0)
+    wall = ((8, 5), (9, 5), (10, 5), (11, 5))
+    shifts = set()
+    for _ in range(50):
+        moved = sorted(moves.neighbour(wall, rng))
+        steps = {(a[0] - b[0], a[1] - b[1]) for a, b in zip(moved, wall, strict=True)}
+        if len(steps) == 1:
+            shifts |= steps
+    assert len(shifts) > 10
+
+
+def test_random_walls_hang_together_more_than_random_modules() -> None:
+    def neighbours(layout: Layout) -> int:
+        return sum(
+            max(abs(a[0] - b[0]), abs(a[1] - b[1])) == 1 for a in layout for b in layout if a < b
+        )
+
+    rng, scenario = np.random.default_rng(2), SITES["courtyard"]
+    walls = sum(neighbours(random_walls(scenario, rng)) for _ in range(20))
+    lone = sum(neighbours(random_layout(scenario, rng)) for _ in range(20))
+    assert walls > 5 * lone
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_a_cut_takes_each_side_from_one_parent(seed: int) -> None:
+    """Two columns side by side: one piece of the one, the complement of it of the other."""
+    first, second = (tuple((row, column) for row in range(8)) for column in (0, 1))
+    child = cut(first, second, np.random.default_rng(seed))
+    assert len(child) == 8
+    rows = sorted(each[0] for each in child if each[1] == 0)
+    assert rows in (list(range(len(rows))), list(range(8 - len(rows), 8)))
+
+
+def test_repair_keeps_a_legal_layout_as_it_is() -> None:
+    scenario, rng = site(stock=3), np.random.default_rng(5)
+    assert repaired(scenario, ((1, 1), (2, 2)), rng) == ((1, 1), (2, 2))
+    assert len(repaired(scenario, tuple((1, column) for column in range(9)), rng)) == 3
