@@ -1,11 +1,14 @@
-"""Texts that would keep a parser busy for ever, or break it, are refused before it sees them."""
+"""Texts that would keep a parser busy are refused; numbers and cells are what they say."""
 
+import csv
 import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +23,9 @@ from blast_env.documents import (
     parse_toml,
     read_text,
 )
+from blast_env.errors import BlastEnvError
+from blast_env.tables import cell_text, write_csv
+from blast_env.values import plain_number, typed_number
 
 DEEP = MAX_DEPTH + 1
 
@@ -144,3 +150,64 @@ def test_a_cell_of_a_table_is_no_number_with_marks_between_its_digits() -> None:
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False)))
 def test_numbers_keep_their_last_bit(numbers: list[float]) -> None:
     assert list(checked_as(tuple[float, ...], numbers)) == numbers
+
+
+# --- Numbers that people type: read as they are meant, or refused.
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        *(("50,5", 50.5), ("0,125", 0.125), ("1234,567", 1234.567), ("-36.2", -36.2)),
+        *((" 36,2 m ", 36.2), ("36.2m", 36.2), ("1e3", 1000.0), (".5", 0.5)),
+    ],
+)
+def test_what_is_clear_is_read(text: str, number: float) -> None:
+    assert typed_number("length", text, "m") == number
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("1,000", "1.000,5", "1,000.5", "1 000", "1_000", "110 lb", "36 kg", "nan", "inf"),
+        *("", "m", "1e999", "\uff11\uff10", "0x10", "5,", "12,345"),
+    ],
+)
+def test_what_is_not_clear_is_refused(text: str) -> None:
+    with pytest.raises(BlastEnvError, match=r"^length is "):
+        typed_number("length", text, "m")
+
+
+@pytest.mark.parametrize("text", ["1,5", "1_000", "nan", "inf", " 1", "1 ", "1e999", "\uff11"])
+def test_files_and_options_have_plain_numbers(text: str) -> None:
+    assert plain_number("mass", "1e3") == 1000.0
+    with pytest.raises(BlastEnvError, match=r"^mass is "):
+        plain_number("mass", text)
+
+
+# --- Tables for spreadsheets: a text that begins like a formula stays a text.
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1 wall", "-wall", "@SUM(A1)", "\t=1", "\r=1", "-1+1"])
+def test_a_text_that_a_spreadsheet_would_calculate_is_marked_as_a_text(text: str) -> None:
+    assert cell_text(text) == f"'{text}"
+
+
+@pytest.mark.parametrize("value", ["wall = 1", "", "-1.5", "+3", "-1e-3", -1.5, 3, None, True])
+def test_numbers_and_other_texts_stay(value: object) -> None:
+    assert cell_text(value) is value
+
+
+def test_a_table_keeps_its_numbers(tmp_path: Path) -> None:
+    table = pd.DataFrame(
+        {"item": ["=HYPERLINK(1)", None], "x_m": [-1.5, np.nan], "n": [-1, 2], "own": [True, False]}
+    )
+    path = write_csv(table, tmp_path / "table.csv")
+    with path.open(newline="") as file:
+        rows = [*csv.reader(file)]
+    assert rows == [
+        ["item", "x_m", "n", "own"],
+        ["'=HYPERLINK(1)", "-1.5", "-1", "True"],
+        ["", "", "2", "False"],
+    ]
+    assert table["item"][0] == "=HYPERLINK(1)"

@@ -56,13 +56,6 @@ def test_the_wall_that_sees_the_charge_takes_most(unprotected: GasResult) -> Non
     assert row["roof_impulse_pa_s"] == pytest.approx(of_walls["roof"])
 
 
-def test_a_site_with_a_mirror_has_loads_with_a_mirror(unprotected: GasResult) -> None:
-    """The charge is in the middle: north and south are the same up to rounding."""
-    loads = unprotected.faces.set_index(["face", "x_m", "z_m"])["impulse_pa_s"]
-    south, north = loads["south"].sort_index(), loads["north"].sort_index()
-    np.testing.assert_allclose(south.to_numpy(), north.to_numpy(), rtol=1e-4)
-
-
 def test_a_named_wall_is_the_one_that_counts(unprotected: GasResult) -> None:
     document = HUT.model_dump(mode="json", exclude_none=True)
     document["structures"][0]["faces"] = ["west"]
@@ -76,15 +69,6 @@ def test_a_wall_protects_and_is_itself_loaded(unprotected: GasResult, protected:
     barrier = protected.modules[protected.modules["structure"] == "barrier"]
     assert barrier["impulse_pa_s"].max() > unprotected.modules["impulse_pa_s"].max()
     assert set(protected.structures["structure"]) == {"hut"}
-
-
-def test_gauges_integrate_their_histories(unprotected: GasResult) -> None:
-    for row in unprotected.gauges.to_dict("records"):
-        history = unprotected.history(row["name"])
-        steps = np.diff(history["time_s"], prepend=history["time_s"][0])
-        assert row["peak_pa"] == pytest.approx(history["overpressure_pa"].max())
-        running = np.cumsum(history["overpressure_pa"] * steps)
-        assert row["impulse_pa_s"] == pytest.approx(float(running.max()), rel=0.1)
     front, behind = unprotected.gauges.to_dict("records")
     assert front["peak_pa"] > 3.0 * behind["peak_pa"]
     assert front["arrival_s"] < behind["arrival_s"]

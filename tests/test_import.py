@@ -1,13 +1,15 @@
-"""`import blast_env` is light, and what it offers is there when it is asked for."""
+"""'import blast_env' is light, offers what is asked for, and says its versions."""
 
 import ast
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import blast_env
+from blast_env.provenance import code_digest, code_version, versions
 
 HEAVY = ("joblib", "numba", "pandas", "pyarrow", "pydantic", "pymunk", "scipy", "torch")
 """What takes a hundredth of a second or more to import, beside Gymnasium and NumPy."""
@@ -68,3 +70,31 @@ def test_no_two_public_classes_share_a_name() -> None:
                     places.setdefault(node.name, []).append(str(path.relative_to(repository)))
     assert len(places) > 300
     assert {name: where for name, where in places.items() if len(where) > 1} == {}
+
+
+# --- What records say of the versions and the code.
+
+
+def test_versions_are_those_that_run() -> None:
+    record = versions("event 1", ("numpy", "no-such-package"))
+    assert record["blast_env"] == blast_env.__version__
+    assert record["engine"] == "event 1"
+    assert record["numpy"] == np.__version__
+    assert record["no-such-package"] == "not installed"
+    assert "engine" not in versions()
+
+
+def test_the_digest_of_code_knows_its_parts(tmp_path: Path) -> None:
+    """A change of what loads depend on is noticed, one of a picture is not."""
+    for name in ("physics", "rendering"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "code.py").write_text("1\n")
+    before = code_digest(tmp_path, {"rendering"})
+    (tmp_path / "rendering" / "code.py").write_text("2\n")
+    assert code_digest(tmp_path, {"rendering"}) == before
+    (tmp_path / "physics" / "code.py").write_text("2\n")
+    assert code_digest(tmp_path, {"rendering"}) != before
+
+
+def test_the_version_of_the_code_begins_with_the_packages() -> None:
+    assert code_version().startswith(f"{blast_env.__version__}+")

