@@ -22,6 +22,7 @@ ENORMOUS = 10**400
 LONG = "x" * 100_000
 FIVE: Any = 5
 SOON: Any = "soon"
+COURTYARD, FAR = load_scenario("courtyard"), Charge((ENORMOUS, 1), 1.0)
 """Arguments of types that the checker of types would refuse."""
 
 
@@ -31,29 +32,17 @@ def blast(**changes: Any) -> Callable[[], Any]:
 
 
 def evaluation(**changes: Any) -> Callable[[], Any]:
-    arguments = {
-        "scenario": "courtyard",
-        "layout": (),
-        "seeds": (0, 1),
-        "engine": "event",
-    } | changes
-    return lambda: evaluate_layout(**arguments)
+    arguments = {"scenario": "courtyard", "layout": (), "seeds": (0, 1), "engine": "event"}
+    return lambda: evaluate_layout(**arguments | changes)
 
 
 def kb(**changes: Any) -> Callable[[], Any]:
-    arguments: dict[str, Any] = {
-        "quantity": "reflected_impulse",
-        "distance_m": 10.0,
-        "charge_kg": 1.0,
-    } | changes
-    return lambda: kingery_bulmash(**arguments)
+    arguments: dict[str, Any] = {"quantity": "reflected_impulse", "distance_m": 10.0}
+    return lambda: kingery_bulmash(**{"charge_kg": 1.0} | arguments | changes)
 
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
-    "seed 1.5": (
-        blast(seed=1.5),
-        r"^seed is 1.5, must be an integer from 0 to 9223372036854775807",
-    ),
+    "seed 1.5": (blast(seed=1.5), r"^seed is 1.5, must be an integer from 0 to 922337203"),
     "seed none": (blast(seed=None), "^seed is nothing"),
     "seed 2**63": (blast(seed=2**63), "^seed is 9223372036854775808, must be an integer from 0"),
     "seed enormous": (blast(seed=ENORMOUS), "^seed is an integer of about 400 digits"),
@@ -81,14 +70,8 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "quantity 5": (kb(quantity=5), "5"),
     "distance": (kb(distance_m=ENORMOUS), "must be made of numbers"),
     "fit": (lambda: fit_power_law([1, 2], [ENORMOUS, 1]), "must be made of numbers"),
-    "charge 5": (
-        lambda: load_scenario("courtyard").with_charge(FIVE),
-        "^charge is 5, must be a Charge",
-    ),
-    "charge enormous": (
-        lambda: load_scenario("courtyard").with_charge(Charge((ENORMOUS, 1), 1.0)),
-        "an integer of about 400 digits",
-    ),
+    "charge 5": (lambda: COURTYARD.with_charge(FIVE), "^charge is 5, must be a Charge"),
+    "charge enormous": (lambda: COURTYARD.with_charge(FAR), "an integer of about 400 digits"),
     "file 5": (lambda: save_scenario("courtyard", FIVE), "^path is 5, must be a path"),
     "file null": (lambda: save_scenario("courtyard", "a\0.toml"), "null characters"),
     "layout file 5": (lambda: blast_env.load_layout(FIVE), "^path is 5, must be a path"),

@@ -21,12 +21,11 @@ from blast_env.benchmark.standings import StandingsTable
 from blast_env.cli.output import print_table
 from blast_env.documents import DocumentError, parse_json, read_text
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.engines import simulate
-from blast_env.evaluation.engines.gas import GasResult
 from blast_env.files import write_atomically
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
 from blast_env.particles.parquet import checked_table
+from blast_env.response.components import find_component
 from blast_env.response.facade import respond
 from blast_env.site import Scenario, ScenarioError
 from blast_env.store import Store
@@ -42,55 +41,17 @@ TEXTS: Final = (
     *("a\n\n# Heading", "<script>alert(1)</script>", "[here](javascript:alert(1))", "{raw}`x`"),
 )
 
-ABOUT: Final = {"title": "A component", "source": "a test"}
+USED: Final = ("window_laminated_12", "concrete_200", "brick_215", "steel_stud")
 COMPONENTS: Final[Document] = {
-    "window": ABOUT
-    | {"kind": "glazing", "cost_m2": 100.0, "width_m": 1.2, "height_m": 1.5}
-    | {"thickness_mm": 6.0, "outer_thickness_mm": 4.0}
-    | {"interlayer": {"tension_n_m": 16e3, "tear_share": 0.15}},
-    "concrete": ABOUT
-    | {"kind": "wall", "span_m": 3.0}
-    | {
-        "section": {
-            "kind": "reinforced_concrete",
-            "thickness_m": 0.2,
-            "steel_share": 0.003,
-            "cover_m": 0.03,
-            "concrete_pa": 30e6,
-            "steel_pa": 500e6,
-            "dynamic_increase": 1.2,
-        }
-    },
-    "brick": ABOUT
-    | {"kind": "wall", "supports": "fixed"}
-    | {
-        "section": {
-            "kind": "masonry",
-            "thickness_m": 0.2,
-            "density_kg_m3": 1900.0,
-            "flexural_pa": 7e5,
-            "young_pa": 6e9,
-        }
-    },
-    "sheet": ABOUT
-    | {"kind": "wall"}
-    | {
-        "section": {
-            "kind": "sheeting",
-            "material": "steel",
-            "moment_n": 5e3,
-            "mass_kg_m2": 30.0,
-            "bending_stiffness_n_m": 4e5,
-        }
-    },
+    name: find_component(name).model_dump(mode="json", exclude_none=True) for name in USED
 }
 
 
 def site_document() -> Document:
     """Return a small site with components of all kinds, and an objective with references."""
     document = minimal_document()
-    parts = [{"walls": [w], "wall": c} for w, c in (("east", "brick"), ("north", "sheet"))]
-    facade = {"glazing": "window", "wall": "concrete", "parts": parts}
+    parts = [{"walls": [w], "wall": c} for w, c in (("east", USED[2]), ("north", USED[3]))]
+    facade = {"glazing": USED[0], "wall": USED[1], "parts": parts}
     document["structures"][0] |= {"height_m": 3.0, "weight": 3.0, "facade": facade}
     references = {"reference_impulse_pa_s": 500.0, "reference_peak_pa": 5e4}
     return document | {
@@ -194,20 +155,6 @@ def test_messages_quote_little_of_a_long_text() -> None:
         import_site(BLOCK, ImportOptions(crs=long))
     for each in (layout, crs):
         assert "x" * 81 not in str(each.value)
-
-
-@pytest.mark.parametrize(("z_m", "moved"), [(0.3, True), (1.0, False)])
-def test_a_gauge_that_is_moved_out_of_a_solid_is_noted(z_m: float, moved: bool) -> None:
-    document = minimal_document()
-    document["structures"][0]["height_m"] = 0.5
-    document["gauges"] = [{"name": "door", "position_m": [11.0, 5.0, z_m]}]
-    site = Scenario.from_document(document, "gauge")
-    result = simulate(site, engine="gas", cell_m=0.5, until=0.001)
-    assert isinstance(result, GasResult)
-    assert ["gauge door: lies inside a solid" in note for note in result.moved_gauges] == [True] * (
-        moved
-    )
-    assert set(result.moved_gauges) <= set(result.gauge_notes)
 
 
 @pytest.mark.parametrize("name", ["os:system", "builtins:pow", "math:pi", "nothing:at_all"])

@@ -158,24 +158,14 @@ def test_changing_the_time_step_gives_lasting_contacts_no_second_push() -> None:
     assert run.balls().velocity == pytest.approx(np.array([[-16.2, 0], [16.2, 0]]), abs=1e-9)
 
 
-def test_a_run_ends_when_nothing_can_reach_a_structure(engine: ParticleEngine) -> None:
-    of_scene = scene(
-        balls([AIR], [(20.0, 20.0)], [(10.0, 0.0)]),
-        [wall((150.0, 150.0), 2, 2)],
-        parameters(stepping={"time_limit_s": 1.0}),
-    )
-    run = finished(of_scene, engine)
+@pytest.mark.parametrize(("speed", "left"), [(10.0, 1), (-200.0, 0)])
+def test_a_run_ends_when_nothing_can_reach_a_structure_or_all_has_left(
+    engine: ParticleEngine, speed: float, left: int
+) -> None:
+    ball, far = balls([AIR], [(20.0, 20.0)], [(speed, 0.0)]), wall((150.0, 150.0), 2, 2)
+    run = finished(scene(ball, [far], parameters(stepping={"time_limit_s": 1.0})), engine)
     assert run.end_reason is EndReason.OUT_OF_REACH
-    assert run.steps == 0
-
-
-def test_a_run_ends_when_all_balls_have_left(engine: ParticleEngine) -> None:
-    of_scene = scene(
-        balls([AIR], [(20.0, 20.0)], [(-200.0, 0.0)]), [wall((30.0, 150.0), 2, 2)], parameters()
-    )
-    run = finished(of_scene, engine)
-    assert run.end_reason is EndReason.OUT_OF_REACH
-    assert len(run.balls()) == 0
+    assert len(run.balls()) == left
 
 
 def test_a_run_ends_at_the_time_limit(engine: ParticleEngine) -> None:

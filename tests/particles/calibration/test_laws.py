@@ -111,11 +111,6 @@ def test_a_constant_has_no_inverse(law: ScalingLaw) -> None:
         law.inverse(0.3)
 
 
-def test_the_smallest_impulse_of_a_linear_law_is_its_offset() -> None:
-    assert LAWS[1].inverse(LAWS[1](0.0)) == 0.0
-    assert LAWS[1](0.0) == -0.017
-
-
 def test_a_falling_power_law_refuses_zero() -> None:
     with pytest.raises(BlastEnvError, match="i_sim is 0, must be above 0"):
         PowerLaw(1.0, -0.5)(0.0)

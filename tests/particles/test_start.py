@@ -1,4 +1,4 @@
-"""Other charges than the reference charge."""
+"""Charge, air and parameters at the start: the fan, other charges, finer balls."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,9 @@ from blast_env import load_scenario, simulate
 from blast_env.errors import BlastEnvError
 from blast_env.layout.build_scene import build_scene, build_site
 from blast_env.site import Scenario
+from blast_env.site.balls import Balls, explosion_fan
 from blast_env.site.parameters import (
+    ExplosiveParameters,
     SimulationParameters,
     for_charge,
     preset,
@@ -18,6 +20,84 @@ from blast_env.site.parameters import (
 )
 from blast_env.site.scene import Charge
 from blast_env.site.zone import source_bounds_m
+
+KEPT = ExplosiveParameters(ball_count=20_000)
+
+
+def fan(parameters: ExplosiveParameters) -> Balls:
+    return explosion_fan(parameters, (50.0, 60.0), np.random.default_rng(0))
+
+
+def kinetic_energy(balls: Balls) -> float:
+    return float(0.5 * (balls.mass * (balls.velocity**2).sum(axis=1)).sum())
+
+
+def test_every_ball_flies_straight_out_in_its_own_direction() -> None:
+    balls = fan(ExplosiveParameters(ball_count=720))
+    outwards = balls.position - (50.0, 60.0)
+    assert np.hypot(*outwards.T) == pytest.approx(KEPT.offset_units)
+    assert balls.velocity == pytest.approx(2000.0 / KEPT.offset_units * outwards)
+    angle = np.sort(np.arctan2(*balls.velocity.T[::-1]))
+    assert np.diff(angle) == pytest.approx(2.0 * np.pi / 720)
+    assert balls.mass == pytest.approx(KEPT.mass)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.75, 1.0])
+def test_the_thermal_share_moves_energy_and_adds_none(share: float) -> None:
+    """With 20,000 balls the energy of the random part scatters by less than 1 %."""
+    hot = fan(KEPT.model_copy(update={"thermal_share": share}))
+    assert kinetic_energy(hot) == pytest.approx(kinetic_energy(fan(KEPT)), rel=0.03)
+    direction = (hot.position - (50.0, 60.0)) / KEPT.offset_units
+    radial = (hot.velocity * direction).sum(axis=1)
+    assert radial.mean() == pytest.approx(2000.0 * np.sqrt(1.0 - share), abs=40.0)
+    across = hot.velocity - radial[:, np.newaxis] * direction
+    assert (across**2).sum(axis=1).mean() == pytest.approx(share / 2.0 * 2000.0**2, rel=0.03)
+
+
+# --- The same air and charge with finer balls.
+
+
+def air_density(parameters: SimulationParameters) -> float:
+    return parameters.air.mass / parameters.air.spacing_units**2
+
+
+def packing_fraction(parameters: SimulationParameters) -> float:
+    return (parameters.air.radius_units / parameters.air.spacing_units) ** 2
+
+
+def charge_mass(parameters: SimulationParameters) -> float:
+    return parameters.explosive.mass * parameters.explosive.ball_count
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.0, 1.5, 3.0])
+def test_air_and_charge_stay_what_they_are(factor: float) -> None:
+    coarse = preset("collisional")
+    fine = with_resolution(coarse, factor)
+    for quantity in (air_density, packing_fraction, charge_mass):
+        assert quantity(fine) == pytest.approx(quantity(coarse))
+    assert fine.air.radius_units == pytest.approx(coarse.air.radius_units / factor)
+    assert fine.explosive.speed_units_per_s == coarse.explosive.speed_units_per_s
+
+
+def test_a_way_of_the_same_length_costs_the_same() -> None:
+    """It has twice as many collisions, each of which takes half as much, to first order."""
+    coarse, fine = preset("collisional"), with_resolution(preset("collisional"), 2.0)
+    assert 1.0 - fine.air.elasticity**2 == pytest.approx((1.0 - coarse.air.elasticity**2) / 2.0)
+    assert fine.contact.air_shrink**2 == pytest.approx(coarse.contact.air_shrink)
+
+
+def test_the_presets_are_one_physics_at_two_resolutions() -> None:
+    expected = with_resolution(preset("collisional"), 2.0).model_dump()
+    for group, values in preset("collisional_fine").model_dump().items():
+        for name, value in values.items():
+            if isinstance(value, float):
+                assert value == pytest.approx(expected[group][name]), (group, name)
+            else:
+                assert value == expected[group][name], (group, name)
+
+
+# --- Other charges than the reference charge.
+
 
 # With a base impulse, which the presets leave out.
 DENSE = with_overrides(preset("collisional"), {"contact": {"base_impulse": 0.01}})
