@@ -351,17 +351,6 @@ def test_pictures_draw_what_stands_on_it_at_its_height() -> None:
     assert [each.size_m[2] for each in walls] == [1.0, 1.0]
 
 
-def test_the_view_in_three_dimensions_draws_the_zone_on_it() -> None:
-    """Its western half, 2 m wide, lies on the ground, its eastern half on the terrace."""
-    scenario = terraced()
-    zone = {
-        (each.centre_m[0], round(each.centre_m[2] - each.size_m[2] / 2.0, 9))
-        for each in boxes(scenario, ())
-        if each.name == "build zone"
-    }
-    assert zone == {(5.0, 0.0), (7.0, 1.0)}
-
-
 def test_the_zone_is_cut_where_the_ground_changes_its_height() -> None:
     higher = TERRACE | {"name": "upper", "corner_m": [7.0, 2.0], "columns": 3, "rows": 4}
     document = site_document(TERRACE | {"rows": 12, "corner_m": [6.0, 4.0]}, higher)

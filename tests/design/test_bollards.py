@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 
 from blast_env.design.bollards import line_of_posts, posts_and_wall
-from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import LayoutState
@@ -103,10 +102,3 @@ def test_the_wall_is_added_to_the_posts_and_keeps_the_stand_off() -> None:
 def test_without_a_vehicle_there_is_no_line_of_posts() -> None:
     with pytest.raises(BlastEnvError, match="courtyard has no vehicle"):
         line_of_posts(load_scenario("courtyard"))
-
-
-def test_the_rules_are_only_for_sites_with_vehicles() -> None:
-    posts = {"line_of_posts", "posts_and_wall"}
-    assert posts <= set(proposers(ProposerKind.RULE, suiting=[gate_site()]))
-    both = proposers(ProposerKind.RULE, suiting=[gate_site(), load_scenario("courtyard")])
-    assert not posts & set(both)

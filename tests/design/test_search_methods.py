@@ -1,13 +1,12 @@
 """Every search method: how near it comes to a known optimum, and what holds for all of them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from blast_env.design.rules import wall_near_building, wall_near_charge
+from blast_env.design.rules import wall_near_charge
 from blast_env.design.search import (
     DesignProblem,
     GeneticSearch,
@@ -78,7 +77,9 @@ def test_gaps_to_the_optimum(
     The optimum takes 86 % off the impulse; one random layout after the other would do too on 299.
     """
     method = find_proposer(name)
-    gaps = [gap(problem, method.propose(problem, budget, seed), optimum) for seed in SEEDS]
+    results = [method.propose(problem, budget, seed) for seed in SEEDS]
+    assert max(result.blasts for result in results) <= budget
+    gaps = [gap(problem, result, optimum) for result in results]
     assert min(gaps) >= 0.0
     assert float(np.mean(gaps)) <= most
 
@@ -187,19 +188,6 @@ def test_what_is_no_method_or_begins_with_no_layouts_is_told() -> None:
         find_proposer("best_rule", (((0, 0),),))
     with pytest.raises(UnknownNameError, match="no search method 'genetik', did you mean 'genet"):
         find_proposer("genetik")
-
-
-@pytest.mark.parametrize(
-    ("name", "rule"),
-    [("wall_near_charge", wall_near_charge), ("wall_near_building", wall_near_building)],
-)
-def test_rules_spend_nothing(
-    name: str, rule: Callable[..., Layout], problem: DesignProblem
-) -> None:
-    result = find_proposer(name).propose(problem, 0, 0)
-    assert result.blasts == 0
-    assert result.load is None
-    assert set(result.layout) == set(rule(problem.scenario, problem.known_charge))
 
 
 def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:

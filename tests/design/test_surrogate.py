@@ -41,7 +41,7 @@ from blast_env.design.surrogate.network import (
     packaged_surrogate,
 )
 from blast_env.design.surrogate.relations import relations
-from blast_env.design.surrogate.search import Guesses, LearntSearch, _floored, improved
+from blast_env.design.surrogate.search import Guesses, LearntSearch, improved
 from blast_env.design.surrogate.walls import FEATURES, INPUTS, WallPoints, site_of
 from blast_env.design.surrogate.ways import ABOVE_M, FALLS_M, SHARES, STATIONS, Ways
 from blast_env.envs.barrier_env import BlastBarrierEnv
@@ -533,13 +533,6 @@ def test_against_a_hidden_charge_it_chooses_by_all_places_though_few_are_met() -
     assert set(problem.met.values()) == {4, 10}
     best = min(problem.met, key=lambda layout: problem.true_load(layout, problem.threats))
     assert result.layout == best
-
-
-def test_a_predicted_response_of_nothing_is_floored() -> None:
-    """It has no logarithm; the floor is a thousandth of that without a barrier."""
-    guesses, (layout, *_) = Guesses.of(by_hand(), case()), layouts_by_rule(YARD).values()
-    guesses._known.update({(): 2.0, layout: 0.0})
-    assert _floored(guesses, [(), layout]).tolist() == [2.0, 0.002]
 
 
 def test_layouts_to_learn_from_are_legal_and_of_all_kinds() -> None:

@@ -353,17 +353,3 @@ def test_finishing_stays_legal_when_the_stock_is_not_used_up_but_no_cell_is_left
     assert env.step(1)[2]
     assert env.placement.stock_left == 1
     assert env.placement.is_full
-
-
-def test_the_mask_of_the_information_is_what_a_space_samples_with() -> None:
-    env = make(restricted_scenario())
-    _, info = env.reset(seed=0)
-    assert env.action_masks().dtype == np.bool_  # as MaskablePPO wants it
-    assert info["action_mask"].dtype == np.int8
-    env.action_space.seed(0)
-    sampled = {int(env.action_space.sample(mask=info["action_mask"])) for _ in range(500)}
-    assert sampled < set(np.flatnonzero(env.action_masks()))
-    assert len(sampled) > 50
-    _, _, _, _, info = env.step(min(sampled))
-    assert info["action_mask"].dtype == np.int8
-    assert env.action_space.sample(mask=info["action_mask"]) != min(sampled)

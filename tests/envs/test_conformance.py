@@ -16,7 +16,6 @@ from blast_env.envs import barrier_env
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
 from blast_env.site import bundled_scenarios, load_scenario, save_scenario
-from blast_env.sites import SiteSource
 from tests.envs.small import ThinEngine, make, play, same, small_scenario
 from tests.gas_sites import hut
 from tests.libraries.ids import BARRIER_IDS, IDS, arguments
@@ -85,10 +84,6 @@ def remade(env: gym.Env | gym.vector.VectorEnv) -> gym.Env:
     return gym.make(EnvSpec.from_json(env.spec.to_json()))
 
 
-def test_there_are_ids() -> None:
-    assert len(IDS) <= 8
-
-
 @pytest.mark.parametrize("name", IDS)
 def test_registered_specs_survive_json(name: str) -> None:
     env = gym.make(EnvSpec.from_json(gym.spec(name).to_json()))
@@ -120,12 +115,6 @@ def test_paths_and_layouts_survive_json(tmp_path: Path) -> None:
     observations = [each.reset(seed=1) for each in (env, remade(env))]
     assert observations[0][1]["layout"] == wall
     assert same(*observations)
-
-
-def test_generated_sites_have_a_name() -> None:
-    env = gym.make("BlastBarrier-v0", scenario="sites").unwrapped
-    assert isinstance(env, BlastBarrierEnv)
-    assert env.task.source == SiteSource.training()
 
 
 def rollout(mode: str | None, **arguments: Any) -> list[Any]:

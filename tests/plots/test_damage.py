@@ -61,17 +61,6 @@ def test_panes_and_walls_have_the_colours_of_what_they_allow(site: Scenario) -> 
     assert "level of protection high" in figure.axes[1].get_title("left")
 
 
-def test_a_diagram_has_a_point_a_bay_and_layout(site: Scenario) -> None:
-    figure = pressure_impulse_diagram([(words, each.facade) for words, each in both(site)], "hut")
-    glass, wall = figure.axes
-    assert glass.get_title() == "window, 4 mm annealed"
-    assert wall.get_title() == "reinforced concrete wall, 200 mm"
-    points = [line for line in glass.lines if line.get_linestyle() == "None"]
-    peaks = [np.asarray(line.get_ydata(), dtype=np.float64) for line in points]
-    assert [len(each) for each in peaks] == [4, 4]
-    assert peaks[0].max() == pytest.approx(40.0)
-
-
 def test_a_bay_with_better_glass_is_in_the_diagram_of_that_glass(site: Scenario) -> None:
     """Its point among the regions of the old glass would say that it fails."""
     better = find_component("window_laminated_12")

@@ -10,7 +10,6 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.patches import PathPatch
 from PIL import Image
 
 from blast_env import Charge
@@ -21,7 +20,6 @@ from blast_env.particles.calibration.references import kingery_bulmash
 from blast_env.plots.film import plan_until
 from blast_env.plots.gas import facades, full_load, gauge_history
 from blast_env.plots.ground_map import ground_map, ground_recorders, ground_values
-from blast_env.plots.plan import barrier_features
 from blast_env.plots.pressure_film import record_planes, write_pressure_film
 from blast_env.plots.pressure_frames import (
     PressurePainter,
@@ -29,10 +27,7 @@ from blast_env.plots.pressure_frames import (
     VerticalSection,
     default_section,
 )
-from blast_env.plots.site_plan import draw_features, legend_of
 from blast_env.site import Scenario
-from tests.catalogue_sites import WALL as PIECES
-from tests.catalogue_sites import yard
 from tests.gas_sites import WALL, hut
 
 HEIGHT_M, CUT = 0.75, VerticalSection("y", 4.25)
@@ -371,16 +366,3 @@ def test_what_is_no_film_is_refused(
     with pytest.raises(BlastEnvError, match=words):
         write_pressure_film(blast, path, **options)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_pieces_are_drawn_as_wholes_in_the_colours_of_their_items() -> None:
-    axes = Figure().add_subplot()
-    features = list(barrier_features(yard(), PIECES))
-    walls, post = draw_features(axes, features)
-    assert isinstance(walls, PathPatch)
-    assert isinstance(post, PathPatch)
-    assert walls.get_path().get_extents().bounds == (4.0, 5.0, 0.5, 3.0)
-    assert post.get_path().get_extents().bounds == (4.0, 4.5, 0.5, 0.5)
-    assert walls.get_facecolor() != post.get_facecolor()
-    labels = [handle.get_label() for handle in legend_of(features)]
-    assert labels == ["wall, 2 m: 2 of 3", "post, 1 m: 1 of 4"]

@@ -248,17 +248,6 @@ def test_the_legend_counts_what_stands_by_item() -> None:
     assert "barrier module, 1 m: 6 of 16" in legend(site_picture(gate_site(), POSTS))
 
 
-def test_vehicles_show_their_reach_entry_and_stand_off() -> None:
-    figure = site_picture(gate_site(), POSTS)
-    texts = [text.get_text() for text in figure.axes[0].texts]
-    assert "stand-off 7.0 m" in texts
-    assert {
-        "ground that a vehicle reaches",
-        "entry of a vehicle",
-        "worst place of a vehicle",
-    } <= set(legend(figure))
-
-
 def test_conditions_of_the_zone_are_drawn() -> None:
     zone = site_document()["build_zone"] | {
         "access_way": {

@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from blast_env import load_scenario
-from blast_env.evaluation import BlastEvaluator, BlastStore, draw_threats
+from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.geometry import Piece
 from blast_env.particles.parquet import read_frame, write_table
@@ -17,7 +17,6 @@ from blast_env.site.scene import Charge
 from studies import blast_again, blast_table
 from studies.blast_table import COLUMNS
 from tests.evaluation.cases import COURTYARD
-from tests.evaluation.test_blast_store import key, loads, same
 
 PIECES = (Piece(0, 0, "wall"),)
 FAST = GasEngine(border_m=0.0, until=0.005)
@@ -77,14 +76,6 @@ def test_walls_of_front_sites_see_the_charge(tmp_path: Path, seed: int) -> None:
     options = ("--first", seed - 10_000, "--sites", 1, "--side", 18, "--front", "--out", out)
     assert run(tmp_path / "blasts", *options)[0] == 0
     assert set(pd.read_parquet(out)["scenario"]) == {f"front_sites/18/{seed}"}
-
-
-def test_keys_come_back_as_they_were(tmp_path: Path) -> None:
-    cache, asked = BlastStore(tmp_path), key(3)._replace(layout=PIECES)
-    cache.add(asked, loads(3))
-    ((found, kept),) = cache.items()
-    assert found == asked
-    assert same(kept, loads(3))
 
 
 # --- The blasts of a table, run again with the present engine.

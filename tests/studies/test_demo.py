@@ -111,17 +111,6 @@ def test_the_verdict_needs_an_interval_above_zero() -> None:
     assert comparison_of([2.0], [7.0]).verdict.startswith("No verdict")
 
 
-def test_a_row_says_by_how_much_the_agent_is_ahead() -> None:
-    """Paired: 20 points in every case leave no spread, however much the cases differ."""
-    unprotected, random, *_, agent = comparison_of(
-        [1.0, 4.0, 2.0, 6.0], [3.0, 6.0, 4.0, 8.0]
-    ).rows()
-    assert unprotected[:5] == ("no barrier", "10", "0.0 %", "0.0 % to 0.0 %", "67.5 %")
-    assert random[:3] == (RANDOM, "5", "47.5 %")
-    assert random[4:] == ("20.0 %", "20.0 % to 20.0 %")
-    assert agent[4:] == ("-", "-")
-
-
 def test_the_best_rule_for_each_case_is_one_that_nobody_can_name_beforehand() -> None:
     """The two rules are best in two cases each; the agent is between them and the best."""
     rule, other = [2.0, 2.0, 6.0, 6.0], [6.0, 6.0, 2.0, 1.0]
