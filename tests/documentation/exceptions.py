@@ -209,7 +209,7 @@ NOT_RUN: Final[dict[str, str]] = {
     "blast-env import FILE --out site.toml": "FILE is a placeholder; the page's next commands run",
     "blast-env draw --check-only FILE...": "FILE is a placeholder; docs/start.md has a file",
     "python -m studies.blast_again docs/data/close_site_blasts.parquet --layouts 4": (
-        "200 sites; tests/studies/test_blast_again.py"
+        "200 sites; tests/studies/test_blast_table.py"
     ),
     "python -m studies.surrogate calibrate --surrogate surrogate.json --device cuda"
     " --processes 5": ("an hour without a GPU; tests/design/test_surrogate.py"),

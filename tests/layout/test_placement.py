@@ -24,13 +24,6 @@ from tests.site.zones import (
     zone_scenario,
 )
 
-CONDITIONS: Document = {
-    "clearance_m": 1.0,
-    "module_cost": 1.5,
-    "budget": 20.0,
-    "access_way": {"width_m": 3.0, "between": "left_right"},
-}
-
 
 def assert_free_explain_and_place_agree(placement: LayoutState, cells: list[Cell]) -> None:
     for cell in cells:
@@ -83,9 +76,6 @@ def test_order_does_not_matter_and_fewer_modules_are_no_worse(
     fewer = LayoutState.of(scenario, some)
     assert all(fewer.free[cell] for cell in set(full.cells) - set(some))
     assert (fewer.free >= full.free).all()
-
-
-# --- The bundled scenarios of single modules, as they are and with every condition added.
 
 
 # --- Whole layouts.
