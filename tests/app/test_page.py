@@ -250,7 +250,7 @@ def field_of(user: User, label: str) -> NumberField:
 
 
 def test_a_number_is_read_as_it_is_meant_or_refused(tmp_path: Path) -> None:
-    """tests/test_values.py has what is clear; what is not changes nothing."""
+    """tests/test_documents.py has what is clear; what is not changes nothing."""
 
     async def story(user: User, sessions: Sessions) -> None:
         session = await opened(user, sessions, hut())
