@@ -70,11 +70,9 @@ def advise(
     cell_m: CellOption = None,
     cells: CellsOption = None,
     judge_cell_m: float | None = typer.Option(
-        None, "--judge-cell", help="Side of the cells for judging the layouts found, m; else 0.25."
-    ),
-    judge_cells: str | None = typer.Option(
         None,
-        help="The same as --cells, for judging the layouts found.",
+        "--judge-cell",
+        help="Side of the cells for judging the layouts found, m.",
         show_default=FINAL_CELLS,
     ),
     out: Path | None = writes("Layout file of the best layout of all", ".json"),
@@ -100,7 +98,7 @@ def advise(
             f"budget is {budget} blasts, must be at least {len(threats)}: one per charge"
         )
     engine = find_engine(JUDGE, cell_m, cells=cells)
-    judge = final_engine(JUDGE, [site], judge_cell_m, cells=judge_cells)
+    judge = final_engine(JUDGE, [site], judge_cell_m)
     evaluator = BlastEvaluator(site, engine, cache=cache)
     problem = DesignProblem(evaluator, LoadCaseSet(site, threats), processes)
     kinds = kinds_for(site)

@@ -40,7 +40,6 @@ if TYPE_CHECKING:  # takes a third of a second to import
     )
 
 ReferenceName = Literal["paper_ufc", "reflected_impulse", "incident_impulse"]
-Burst = Literal["hemispherical", "spherical"]
 _ENGINES: Final = f"{' or '.join(CALIBRATED_ENGINES)}."
 
 
@@ -67,9 +66,6 @@ def calibrate(
         "impulse",
         help="Convert impulse (m|v|), or transferred_impulse (momentum really transferred).",
         metavar="QUANTITY",
-    ),
-    burst: Burst = typer.Option(
-        "hemispherical", help="For Kingery-Bulmash: hemispherical or spherical.", metavar="BURST"
     ),
     tnt_kg: TntOption = None,
     tnt_range: str | None = typer.Option(
@@ -101,7 +97,7 @@ def calibrate(
     study = FreeFieldStudy(
         site, distances_m, tuple(range(first_seed, first_seed + seeds)), used.name
     )
-    compared = _reference(reference, study, burst)
+    compared = _reference(reference, study)
     stem = str(out / f"{name}.{engine}")
     kept = Path(f"{stem}.runs.sqlite")
     label = f"{seeds * len(distances_m)} blasts"
@@ -134,7 +130,7 @@ def _parse_range(text: str | None) -> tuple[float, float] | None:
     return low, high
 
 
-def _reference(name: ReferenceName, study: "FreeFieldStudy", burst: Burst) -> "Reference":
+def _reference(name: ReferenceName, study: "FreeFieldStudy") -> "Reference":
     from blast_env.particles.calibration.free_field import (
         kingery_bulmash_reference,
         paper_reference,
@@ -143,7 +139,7 @@ def _reference(name: ReferenceName, study: "FreeFieldStudy", burst: Burst) -> "R
     if name == "paper_ufc":
         return paper_reference(study.distances_m)
     charge_kg = study.scenario.charge[0].tnt_kg
-    return kingery_bulmash_reference(study.distances_m, charge_kg, name, burst)
+    return kingery_bulmash_reference(study.distances_m, charge_kg, name)
 
 
 def _write(report: "CalibrationReport", stored: Calibration, stem: str) -> list[Path]:

@@ -18,11 +18,9 @@ from blast_env.cli.options import (
     FinalCellOption,
     FinalCellsOption,
     GivenCharge,
-    JsonAllOption,
     JsonOption,
     ProcessesOption,
     TntOption,
-    any_json,
     resume_words,
     running_on,
 )
@@ -78,7 +76,6 @@ def evaluate(
     cluster: ClusterAddress = None,
     cache: CacheOption = None,
     as_json: JsonOption = False,
-    json_all: JsonAllOption = False,
 ) -> None:
     """Compare layouts with no barrier, both exposed to the same threats.
 
@@ -99,7 +96,7 @@ def evaluate(
         **{name: context.params[name] for name in own - {"seeds"}},
         given=GivenCharge.of(charge, tnt_kg),
         seeds=drawn,
-        is_json=any_json(as_json, json_all),
+        is_json=as_json,
     )
     with running_on(cluster), resumable(resume_words(cache)):
         if run is not None:

@@ -61,7 +61,6 @@ class EvaluateOptions:
     export: Path | None
     out: Path | None
     is_json: bool
-    json_all: bool
 
     def engine_for(self, engine: str | Engine, sites: Sequence[Scenario]) -> Engine:
         """Return an engine with the requested cells, for final statements on sites."""
@@ -146,8 +145,8 @@ def print_if_all_charges(
         )
 
 
-_NOT_IN_SHORT: Final = ("scenario", "threats", "modules", "cases")
-"""Parts of a record that `--json` leaves out."""
+_LEFT_OUT: Final = ("scenario", "threats", "modules", "cases")
+"""Parts of a record that `--json` leaves out; those of `--out` are complete."""
 
 
 def print_json_record(
@@ -156,13 +155,12 @@ def print_json_record(
     options: EvaluateOptions,
     counts: BlastCounts,
 ) -> bool:
-    """Print a record as JSON, short or complete, if that is wanted; return whether it is."""
+    """Print a record as JSON, if that is wanted; return whether it is."""
     if options.is_json:
         rate = {"hits": counts.cache_hits, "hit_rate": counts.cache_hit_rate}
         cache = {"blasts": counts.blasts, **rate}
         more = {"cache": cache, "files": [str(path) for path in files]}
-        left_out = () if options.json_all else _NOT_IN_SHORT
-        print_json({key: x for key, x in {**record, **more}.items() if key not in left_out})
+        print_json({key: x for key, x in {**record, **more}.items() if key not in _LEFT_OUT})
     return options.is_json
 
 

@@ -106,16 +106,10 @@ def import_map(
     zone_around_m: float | None = typer.Option(
         None, "--zone-around", help="Width of a zone around the protected buildings, m."
     ),
-    stock: int = typer.Option(20, help="Modules that there are to place.", min=1),
-    wall_height_m: float = typer.Option(3.0, "--wall-height", help="Height of the modules, m."),
-    clearance_m: float = typer.Option(
-        1.0, "--clearance", help="Least distance of modules from structures, m.", min=0.0
-    ),
     glazing: str | None = typer.Option(
         None, help="Windows of protected buildings without any in the file, a component."
     ),
     wall: str | None = typer.Option(None, help="Their walls, a component."),
-    preset: str = typer.Option("collisional", help="Parameters of the particle model."),
     height_from: str | None = typer.Option(None, help="Property with the height."),
     default_height_m: float | None = typer.Option(
         None,
@@ -170,7 +164,8 @@ def _options(context: typer.Context) -> ImportOptions:
         elif isinstance(given, list | tuple):
             texts = [str(text) for text in given]
             values[name] = tuple(numbers(each.opts[0], x, form) if form else x for x in texts)
-    return ImportOptions(**{each.name: values[each.name] for each in fields(ImportOptions)})
+    known = {each.name for each in fields(ImportOptions)}
+    return ImportOptions(**{name: value for name, value in values.items() if name in known})
 
 
 def _plan(imported: "ImportedSite") -> "Figure":

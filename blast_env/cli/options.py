@@ -121,16 +121,6 @@ CacheOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary of the result as JSON.")]
-JsonAllOption = Annotated[
-    bool, typer.Option("--json-all", help="Print the complete result as JSON.")
-]
-
-
-def any_json(as_json: bool, json_all: bool) -> bool:
-    """Return whether the result is printed as JSON, short or complete; refuse both at once."""
-    if as_json and json_all:
-        raise BlastEnvError("--json and --json-all exclude each other: one of them is printed")
-    return as_json or json_all
 
 
 @contextmanager

@@ -74,12 +74,6 @@ def report(
     details: Path | None = typer.Option(
         None, help="TOML file with project, client, author, checker, revision and marking."
     ),
-    project: str = typer.Option("", help="Project, on the first page."),
-    client: str = typer.Option("", help="Client."),
-    author: str = typer.Option("", help="Author."),
-    checker: str = typer.Option("", help="Person who has checked the report."),
-    revision: str = typer.Option("", help="Revision."),
-    marking: str = typer.Option("", help="Marking of every page, as for confidentiality."),
     processes: ProcessesOption = 1,
     cache: CacheOption = None,
 ) -> None:
@@ -123,11 +117,11 @@ def report(
 def _study_options(scenario: Scenario, values: Mapping[str, Any]) -> "StudyOptions":
     """Return the options of the study from the values of the command line, by their names."""
     from blast_env.report import Limit, StudyOptions, final_cells
-    from blast_env.report.details import DETAILS, read_details
+    from blast_env.report.details import read_details
 
     given = {each.name: values[each.name] for each in fields(StudyOptions)}
     given |= {
-        "details": read_details(values["details"], {name: values[name] for name in DETAILS}),
+        "details": read_details(values["details"]),
         "charges": tuple(_charge(each, scenario) for each in values["charges"]),
         "limits": tuple(Limit.parsed(text) for text in values["limits"]),
         "cells": final_cells(scenario),

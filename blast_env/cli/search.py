@@ -1,7 +1,7 @@
 """`blast-env search`: the layout with the least load, for a budget of blasts, or for none."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import cycle, islice
 from math import nan
@@ -63,7 +63,6 @@ from blast_env.evaluation import (
     Evaluation,
     Evaluators,
     LoadCase,
-    LoadCaseSet,
     SeedRange,
     compare,
     draw_threats,
@@ -104,8 +103,8 @@ _NOT_OF_THE_SEARCH: Final = ("processes", "cluster", "cache", "out", "held_out",
 """Options that do not affect the layout."""
 
 _WITH_BLASTS: Final = (
-    *("seed", "threat", "threats", "realisations", "risk", "cvar_level", "engine", "cell_m"),
-    *("start_from", "surrogate", "held_out", "cluster", "cache"),
+    *("budget", "seed", "threat", "threats", "realisations", "risk", "cvar_level", "engine"),
+    *("cell_m", "start_from", "surrogate", "held_out", "cluster", "cache"),
 )
 """Options of the searches by blasts alone."""
 
@@ -116,9 +115,8 @@ def search(
     scenario: str = typer.Option("courtyard", help=SCENARIO_HELP),
     budget: int | None = typer.Option(
         None,
-        help="Most blasts that may be spent; with --verify, on the comparison: it limits the "
-        "rules, then the charges.",
-        show_default=f"{DEFAULT_BUDGET}; with --verify as many as are needed",
+        help="Most blasts that may be spent.",
+        show_default=f"{DEFAULT_BUDGET}",
         min=1,
     ),
     seed: int = typer.Option(0, help="Decides threats and search.", min=0),
@@ -173,11 +171,9 @@ def search(
     given = GivenCharge.of(charge, tnt_kg)
     if method == PACKAGE:
         refuse_given(context, _WITH_BLASTS, f"does not apply to --method {PACKAGE}")
-        if budget is not None and not verify:
-            raise BlastEnvError("--budget is for --verify: the proposal itself takes no blast")
         found = _package_proposal(load_scenario(scenario), given, cells, processes, out)
         if verify:
-            _verify(*found, budget, cells)
+            _verify(*found, cells)
         return
     if verify:
         raise BlastEnvError(f"--verify is for --method {PACKAGE}, not {method}")
@@ -474,65 +470,35 @@ def _write_proposal(
     print_written(written + save_pictures((out / LAYOUT_PICTURE, picture)))
 
 
-def _verify(problem: DesignProblem, layout: Layout, budget: int | None, cells: str | None) -> None:
-    """Compare a proposal by gas dynamics with no barrier and the rules, within the budget."""
-    if budget is not None and budget < 2:
-        raise BlastEnvError(f"--budget is {budget}, must be at least 2 with --verify")
-    case, rules = problem.case, layouts_by_rule(problem.scenario, problem.known_charge)
+def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
+    """Print one row per layout by gas dynamics: no barrier, the rules by load, the proposal."""
+    case, scenario = problem.case, problem.scenario
+    engine = final_engine(JUDGE, [scenario], cells=cells)
+    rules = layouts_by_rule(scenario, problem.known_charge)
     layouts = {_NOTHING: (), _PROPOSAL: layout, **rules}
-    if budget is not None:
-        case = replace(case, threats=case.threats[: budget // 2])
-        most = budget // len(case.threats)
-        distinct = list(dict.fromkeys(layouts.values()))[:most]
-        layouts = {name: each for name, each in layouts.items() if each in distinct}
-    engine = final_engine(JUDGE, [problem.scenario], cells=cells)
-    _print_verdict(_compared(Evaluators(engine), case, layouts, problem.processes), case)
-    left_out = [name for name in rules if name not in layouts]
-    if left_out:
-        print_line(f"note: not compared, for lack of blasts: {', '.join(left_out)}")
-    if len(case.threats) < len(problem.threats):
-        print_line(f"note: {len(case.threats)} of {len(problem.threats)} charges were used")
-
-
-def _compared(
-    evaluators: Evaluators, case: LoadCaseSet, layouts: Mapping[str, Layout], processes: int
-) -> dict[str, Evaluation]:
-    """Return each layout compared with no barrier, with its error of the cells."""
-    engine, distinct = evaluators.engine, list(dict.fromkeys(layouts.values()))
+    distinct = list(dict.fromkeys(layouts.values()))
     print_line(engine.describe())
     asked = [(engine, each) for each in case.threats] + [(engine.coarser, case.threats[0])]
-    print_cost((each, case.scenario, threat.charge) for each, threat in asked for _ in distinct)
-    found = {}
+    print_cost((each, scenario, threat.charge) for each, threat in asked for _ in distinct)
+    evaluators, found = Evaluators(engine), dict[Layout, Evaluation]()
     with progress_bar(f"{len(distinct) * len(case.threats)} blasts of gas dynamics") as progress:
         for number, each in enumerate(distinct):
+            share = share_of(progress, number, len(distinct))
             found[each] = compare(
-                evaluators,
-                [case],
-                [each],
-                processes,
-                with_error=True,
-                progress=share_of(progress, number, len(distinct)),
+                evaluators, [case], [each], problem.processes, with_error=True, progress=share
             )
-    return {name: found[each] for name, each in layouts.items()}
-
-
-def _print_verdict(found: Mapping[str, Evaluation], case: LoadCaseSet) -> None:
-    """Print one row per layout: no barrier, the rules with the best last, and the proposal."""
-    charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
-    objective = case.scenario.objective
-    loads = {
-        name: case.objective_value(each.loads[0], each.layouts[0]) for name, each in found.items()
-    }
-    rules = sorted(loads.keys() - {_NOTHING, _PROPOSAL}, key=lambda name: -loads[name])
+    loads = {name: found[each].load for name, each in layouts.items()}
+    best_last = sorted(rules, key=lambda name: -loads[name])
     rows = []
-    for name in (_NOTHING, *rules, _PROPOSAL):
-        each, load = found[name], Estimate(loads[name], nan, nan)
+    for name in (_NOTHING, *best_last, _PROPOSAL):
+        each, load = found[layouts[name]], Estimate(loads[name], nan, nan)
         share = share_text(each.reduction, each.reduction_error) if name != _NOTHING else "-"
-        rows.append((name, load_text(objective, load, each.objective_error), share))
-    title = f"{case.scenario.name}: judged by gas dynamics on {charges}"
+        rows.append((name, load_text(scenario.objective, load, each.objective_error), share))
+    charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
+    title = f"{scenario.name}: judged by gas dynamics on {charges}"
     print_table(title, ("layout", "load", "reduction"), rows)
-    error = found[_PROPOSAL].grid_error
+    error = found[layout].grid_error
     if error is not None:
         print_line(error.words)
-    if rules and loads[rules[-1]] < loads[_PROPOSAL]:
-        print_line(f"note: {rules[-1]} does better here than the proposal")
+    if best_last and loads[best_last[-1]] < loads[_PROPOSAL]:
+        print_line(f"note: {best_last[-1]} does better here than the proposal")

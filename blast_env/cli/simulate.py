@@ -18,12 +18,10 @@ from blast_env.cli.options import (
     UNTIL_HELP,
     ChargeOption,
     GivenCharge,
-    JsonAllOption,
     JsonOption,
     LayoutOption,
     ScenarioArgument,
     TntOption,
-    any_json,
     refuse_given,
 )
 from blast_env.cli.output import (
@@ -138,14 +136,13 @@ def simulate(
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     as_json: JsonOption = False,
-    json_all: JsonAllOption = False,
 ) -> None:
     """Run one blast and print the load on each structure.
 
     Each picture shows the same for either engine: --film the spread of the blast, --heat-map the
     places of the load, --history its course over time.
     """
-    is_json, given = any_json(as_json, json_all), GivenCharge.of(charge, tnt_kg)
+    given = GivenCharge.of(charge, tnt_kg)
     own = load_scenario(scenario)
     site = own if stand_off_m is None else own.at_stand_off(stand_off_m)
     site = site.with_simulation(preset)
@@ -168,8 +165,8 @@ def simulate(
     if parquet is not None:
         written.append(result.to_parquet(parquet))
     written += files.draw(results)
-    if is_json:
-        print_json(_record(result, written, all_of_it=json_all))
+    if as_json:
+        print_json(_record(result, written))
         return
     print_line(used.describe([site]))
     if isinstance(result, BlastResult):
@@ -319,18 +316,16 @@ def _scaled(result: "BlastResult | GasResult", name: str) -> dict[str, Any]:
     return {**impulse._asdict(), "psi_s": impulse.psi_s}
 
 
-def _record(
-    result: "BlastResult | GasResult", written: Sequence[Path], *, all_of_it: bool
-) -> dict[str, object]:
+def _record(result: "BlastResult | GasResult", written: Sequence[Path]) -> dict[str, object]:
     """Return the result as plain data; missing numbers are null.
 
-    The short form leaves out the modules and the single parameters, which the preset implies.
+    The modules and the single parameters, which the preset implies, are in the workbook.
     """
     content: dict[str, object] = {
         "run": {
             name: value
             for name, value in result.run_record.items()
-            if all_of_it or not name.startswith("parameter ")
+            if not name.startswith("parameter ")
         },
         "structures": table_records(result.structures),
         "buildings": table_records(result.buildings),
@@ -340,6 +335,4 @@ def _record(
         content["gauges"] = table_records(result.gauges)
         content["bays"] = table_records(result.bays)
         content["pieces"] = table_records(result.pieces)
-    if all_of_it:
-        content["modules"] = table_records(result.modules)
     return content | {"files": [str(path) for path in written]}

@@ -1,6 +1,6 @@
 """Details of a report for its reader: project, client, author, checker, revision, marking."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Final
 
@@ -51,20 +51,15 @@ class ReportDetails:
         return {name: value for name, value in vars(self).items() if value and name != "marking"}
 
 
-DETAILS: Final = tuple(each.name for each in fields(ReportDetails))
-"""Names of the details."""
-
-
-def read_details(path: Path | None, options: dict[str, str]) -> ReportDetails:
-    """Return details from a TOML file, if any, with those of options in their place.
+def read_details(path: Path | None) -> ReportDetails:
+    """Return details from a TOML file; empty ones without a file.
 
     Raises:
         BlastEnvError: If the file cannot be read, or has an unknown key or one that is no text.
     """
-    given = {name: value for name, value in options.items() if value}
     if path is None:
-        return ReportDetails(**given)
+        return ReportDetails()
     try:
-        return checked_as(ReportDetails, parse_toml(read_text(path)) | given)
+        return checked_as(ReportDetails, parse_toml(read_text(path)))
     except (DocumentError, ValueError) as error:
         raise BlastEnvError(f"{path}: {error}") from error

@@ -33,7 +33,6 @@ BAD: dict[str, str] = {
     "simulate site.toml --charge 5,19,60 --tnt-kg 50": (
         "--charge has the mass 60 kg, and --tnt-kg is 50: give one of them"
     ),
-    "simulate site.toml --json --json-all": "exclude each other",
     "simulate street_junction --layout courtyard.json": (
         "courtyard.json: the layout was saved for 'courtyard' (hash "
     ),

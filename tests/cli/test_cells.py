@@ -68,7 +68,7 @@ def test_growing_cells_are_those_of_commands_that_run_gas(
         ("simulate", site, "--engine", "gas"),
         ("search", *searched, "--held-out", 1, "--out", tmp_path / "found"),
         ("assess", site),
-        ("search", "--method", "package", "--scenario", site, "--verify", "--budget", 2),
+        ("search", "--method", "package", "--scenario", site, "--verify"),
     )
     for arguments in commands:
         used.clear()

@@ -94,10 +94,13 @@ def test_a_hidden_threat_gets_one_layout(hidden: Path, tmp_path: Path) -> None:
     assert len(space.query('*[layer=="CHARGE"]')) == 0
 
 
-def test_json_has_every_case_and_nothing_else_is_printed(visible: Path) -> None:
-    result = evaluate("--run", visible, "--seeds", 2, "--first-seed", 1_000_000, "--json-all")
-    content = json.loads(result.stdout)
-    assert [case["seed"] for case in content["cases"]] == [1_000_000, 1_000_001]
+def test_json_is_all_that_is_printed_and_the_file_has_every_case(
+    visible: Path, tmp_path: Path
+) -> None:
+    given = ("--seeds", 2, "--first-seed", 1_000_000, "--out", tmp_path, "--json")
+    content = json.loads(evaluate("--run", visible, *given).stdout)
+    cases = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+    assert [case["seed"] for case in cases] == [1_000_000, 1_000_001]
     assert content["cache"] == {"blasts": 4, "hits": 0, "hit_rate": 0.0}
     assert content["result"]["reduction"]["ci95_low"] is not None
 

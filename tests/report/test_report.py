@@ -340,14 +340,13 @@ def test_details_and_currency_are_on_the_page_and_the_marking_on_every_page(stud
     assert r'@top-center { content: "\22 \3c \2f style\3e  X"' in page
 
 
-def test_details_come_from_a_file_and_options_have_precedence(tmp_path: Path) -> None:
+def test_details_come_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "details.toml"
     path.write_text('client = "City"\nrevision = "A"\n')
-    found = read_details(path, {"revision": "B", "author": ""})
-    assert found == ReportDetails(client="City", revision="B")
+    assert read_details(path) == ReportDetails(client="City", revision="A")
     path.write_text('clients = "City"\n')
     with pytest.raises(BlastEnvError, match="clients"):
-        read_details(path, {})
+        read_details(path)
     with pytest.raises(BlastEnvError, match="marking has 201 characters"):
         ReportDetails(marking="x" * 201)
 
