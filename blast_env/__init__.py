@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checke
     from blast_env.evaluation.engines.contract import Engine
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
     from blast_env.evaluation.engines.particles import Blast, BlastResult
-    from blast_env.evaluation.engines.simulate import simulate, simulate_many
+    from blast_env.evaluation.engines.simulate import simulate
     from blast_env.evaluation.evaluate import evaluate_layout
     from blast_env.layout import LayoutState, load_layout, write_layout
     from blast_env.site import Scenario, load_scenario, save_scenario
@@ -47,7 +47,6 @@ _PLACES: Final[Mapping[str, str]] = MappingProxyType(
         "save_scenario": "blast_env.site",
         "search": "blast_env.design.proposal",
         "simulate": "blast_env.evaluation.engines.simulate",
-        "simulate_many": "blast_env.evaluation.engines.simulate",
         "write_layout": "blast_env.layout",
     }
 )
@@ -73,7 +72,6 @@ __all__ = [
     "save_scenario",
     "search",
     "simulate",
-    "simulate_many",
     "write_layout",
 ]
 

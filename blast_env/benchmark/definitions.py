@@ -14,9 +14,8 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.cases import (
     fixed_charges,
-    hidden_search_set,
-    known_search_set,
     one_of_each_charge,
+    search_set,
     visible_case,
 )
 from blast_env.layout.build_scene import draw_threat
@@ -118,7 +117,7 @@ class Definition:
         alone = scenario.model_copy(update={"charge": (source,)})
         charge = draw_threat(alone, seed)
         judged = visible_case(scenario, charge, [seed])
-        return replace(judged, search_set=known_search_set(scenario, charge, 1, 0))
+        return replace(judged, search_set=search_set(scenario, charge))
 
     def _hidden(self) -> LoadCaseSet:
         scenario = self.scenario
@@ -128,9 +127,9 @@ class Definition:
         own = _JUDGED_UNSEEN if self.family == "unseen" else _JUDGED_CHARGES
         judged, met = (_DRAWS, _DRAWS) if few else (own, _PRACTICE_CHARGES)
         threats = draw_threats(scenario, SeedRange.TEST.seeds(0, judged))
-        search_set = hidden_search_set(scenario, met, 1, 0)
-        search_set = replace(search_set, threats=one_of_each_charge(search_set.threats))
-        return LoadCaseSet(scenario, one_of_each_charge(threats), search_set=search_set)
+        drawn = search_set(scenario, None, charges=met)
+        drawn = replace(drawn, threats=one_of_each_charge(drawn.threats))
+        return LoadCaseSet(scenario, one_of_each_charge(threats), search_set=drawn)
 
 
 def _charge(threat: LoadCase) -> object:

@@ -69,6 +69,7 @@ from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
+from blast_env.response.facade import response_words
 from blast_env.response.requirements import Requirement
 from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.presets import (
@@ -342,16 +343,8 @@ def _print_threats(
     for each in found.threats:
         rows.append(found.threat_row(each, required))
         if each.name in beside:
-            rows.append(("  by gas", *[""] * 4, *_gas_row(beside[each.name])))
+            by_gas = beside[each.name]
+            words = response_words([each.facade for each in by_gas.responses])
+            flagged = "flagged" if by_gas.is_flagged else ""
+            rows.append(("  by gas", *[""] * 4, *words, flagged))
     print_table(title, THREAT_HEADERS, rows, text_columns=2)
-
-
-def _gas_row(found: Consequences) -> tuple[str, ...]:
-    facades = [each.facade for each in found.responses]
-    return (
-        min(each.level_of_protection for each in facades).label,
-        f"{sum(each.broken_panes for each in facades):.1f}",
-        max(each.worst_condition for each in facades).words,
-        max(each.worst_damage for each in facades).name.lower(),
-        "flagged" if found.is_flagged else "",
-    )

@@ -64,7 +64,7 @@ class EvaluateOptions:
 
     def engine_for(self, engine: str | Engine, sites: Sequence[Scenario]) -> Engine:
         """Return an engine with the requested cells, for final statements on sites."""
-        return final_engine(engine, sites, self.cell_m, self.until, self.cells)
+        return final_engine(engine, sites, self.cell_m, self.cells, until=self.until)
 
     def threats(self, scenario: Scenario, engine: Engine) -> tuple[LoadCase, ...]:
         """Return the threats drawn by the seeds, with the user's place and mass of the charge.

@@ -68,7 +68,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_against,
 )
-from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
+from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.evaluation.grid_error import final_engine, percent
 from blast_env.files import make_folder
@@ -189,11 +189,11 @@ def search(
             refuse_given(
                 context, ("charge", "tnt_kg"), "is for a visible threat: a hidden one is drawn"
             )
-            case = hidden_search_set(site, model.threats, repeats, seed, measure)
+            case = search_set(site, None, repeats, seed, measure, charges=model.threats)
         else:
             # The known charge is always drawn by the seed of the search.
             drawn = given.fixed(site, site.sample_charge(np.random.default_rng(seed)))
-            case = known_search_set(site, drawn, repeats, seed, measure)
+            case = search_set(site, drawn, repeats, seed, measure)
         problem = DesignProblem(BlastEvaluator(site, used, cache=cache), case, processes)
         run = _run(proposer, problem, DEFAULT_BUDGET if budget is None else budget, seed)
         if run.result.interrupted and not run.result.history:

@@ -148,7 +148,8 @@ def simulate(
     site = site.with_simulation(preset)
     # A layout belongs to the site of the file, before preset and stand-off change it.
     elements: Layout = () if layout is None else tuple(load_layout(layout, own))
-    used = find_engine(engine or default_engine(site), cell_m, until, cells)
+    name = engine or default_engine(site)
+    used = find_engine(name, cell_m, until=until, cells=cells)
     _refuse_of_other_engines(context, used)
     if side_by_side and not elements:
         raise BlastEnvError("--side-by-side compares with the empty site: --layout is missing")

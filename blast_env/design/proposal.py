@@ -21,7 +21,7 @@ from blast_env.evaluation import (
     SeedRange,
     draw_threats,
 )
-from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
+from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
@@ -238,11 +238,9 @@ def search(
     """
     found = find_scenario(scenario)
     evaluator = BlastEvaluator(found, engine, cache=cache)
-    if charge is None:
-        case = hidden_search_set(found, threats, 1, seed)
-    else:
-        realisations = find_realisations(None, "visible", evaluator.engine)
-        case = known_search_set(found, charge, realisations, seed)
+    known = "hidden" if charge is None else "visible"
+    realisations = find_realisations(None, known, evaluator.engine)
+    case = search_set(found, charge, realisations, seed, charges=threats)
     problem = DesignProblem(evaluator, case, processes)
     proposer = find_proposer(method, tuple(tuple(each) for each in initial))
     blasts = proposer_row(method).budget if budget is None else budget

@@ -270,39 +270,29 @@ def visible_case(
     return LoadCaseSet(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
 
 
-def known_search_set(
+def search_set(
     scenario: AnyScenario,
-    charge: AnyCharge,
-    realisations: int,
-    seed: int,
+    charge: AnyCharge | None,
+    realisations: int = 1,
+    seed: int = 0,
     risk: Risk | None = None,
+    *,
+    charges: int = 16,
 ) -> LoadCaseSet:
-    """Return the case for the blasts of a search with a known charge.
+    """Return the case for the blasts of a search, with a known charge or a hidden one (`None`).
 
-    The seed draws the seeds of the blasts, and seeds the search.
+    The seed draws the seeds of the blasts and `charges` hidden charges, and seeds the search. The
+    charges of vehicles come first, by rank, then the most central of the others, then each as far
+    as possible from those before it, so that the first few represent all.
     """
-    _at_least_one("realisations", realisations)
-    drawn = SeedRange.SEARCH.draw_distinct(generator(seed), realisations)
-    return replace(visible_case(scenario, charge, drawn, risk), seed=seed)
-
-
-def hidden_search_set(
-    scenario: AnyScenario, charges: int, realisations: int, seed: int, risk: Risk | None = None
-) -> LoadCaseSet:
-    """Return the case for the blasts of a search with a hidden charge.
-
-    The seed draws the charges and the seeds of the blasts, and seeds the search. The charges of
-    vehicles come first, by rank, then the most central of the others, then each as far as possible
-    from those before it, so that the first few represent all.
-    """
-    _at_least_one("charges", charges)
-    _at_least_one("realisations", realisations)
-    rng = generator(seed)
-    found = find_scenario(scenario)
-    drawn = _spread_first(found.sample_charges(rng, charges))
-    seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * charges)
-    threats = [LoadCase(drawn[index % charges], each) for index, each in enumerate(seeds)]
-    return LoadCaseSet(found, tuple(threats), realisations, risk, seed=seed)
+    for name, count in (("charges", charges), ("realisations", realisations)):
+        if count < 1:
+            raise BlastEnvError(f"{name} is {count}, must be at least 1")
+    rng, found = generator(seed), find_scenario(scenario)
+    drawn = [charge] if charge is not None else _spread_first(found.sample_charges(rng, charges))
+    seeds = SeedRange.SEARCH.draw_distinct(rng, realisations * len(drawn))
+    threats = tuple(LoadCase(drawn[k % len(drawn)], each) for k, each in enumerate(seeds))
+    return LoadCaseSet(found, threats, realisations, risk, charge, seed=seed)
 
 
 def one_of_each_charge(threats: Iterable[LoadCase]) -> tuple[LoadCase, ...]:
@@ -346,8 +336,3 @@ def _spread_places(charges: Sequence[Charge]) -> list[Charge]:
         nearest_m = apart_m[order].min(axis=0)
         nearest_m[order] = -np.inf
     return [charges[index] for index in order]
-
-
-def _at_least_one(name: str, count: int) -> None:
-    if count < 1:
-        raise BlastEnvError(f"{name} is {count}, must be at least 1")

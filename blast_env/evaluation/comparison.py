@@ -17,10 +17,8 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.contract import (
-    SIM_NAMES,
     BlastLoads,
     Engine,
-    ParticleLoad,
     StructureLoad,
     on_buildings,
 )
@@ -83,10 +81,6 @@ STRUCTURE_COLUMNS: Final = (
     Column("unprotected_impulse_error_pa_s", "Pa s", "the same without it"),
     Column("impulse_psi_s", "psi s", "calibrated impulse per area with the barrier"),
     Column("unprotected_impulse_psi_s", "psi s", "calibrated impulse per area without it"),
-    Column("impulse_sim", "sim", "sum of m |v| with the barrier"),
-    Column("unprotected_impulse_sim", "sim", "sum of m |v| without it"),
-    Column("transferred_impulse_sim", "sim", "momentum really transferred with the barrier"),
-    Column("unprotected_transferred_impulse_sim", "sim", "momentum transferred without it"),
     Column(
         "peak_pa", "Pa", "largest overpressure on its walls with the barrier, mean over threats"
     ),
@@ -94,9 +88,6 @@ STRUCTURE_COLUMNS: Final = (
     Column("threats_in_range", "", "threats that the calibration was made for"),
     *STANDING_COLUMNS,
 )
-
-_OF_PARTICLES: Final = (*SIM_NAMES, *(f"unprotected_{name}" for name in SIM_NAMES))
-"""Columns that only particle engines have."""
 
 
 def module_columns(has_particles: bool) -> tuple[Column, ...]:
@@ -155,12 +146,10 @@ def _structure_row(
         "standing": stood.standing.label,
         "reason": stood.reason,
     }
-    sums = SIM_NAMES if isinstance(first, ParticleLoad) else ()
     sides = zip(("", "unprotected_"), (loads, without), impulses, errors, strict=True)
     for side, each, impulse, off in sides:
         mean_pa_s = float(impulse.mean())
         peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
-        row |= {f"{side}{name}": np.mean([getattr(x, name) for x in each]) for name in sums}
         row[f"{side}impulse_pa_s"] = mean_pa_s
         row[f"{side}impulse_error_pa_s"] = off * mean_pa_s
         row[f"{side}impulse_psi_s"] = mean_pa_s / PA_PER_PSI
@@ -517,8 +506,7 @@ class Evaluation:
             _structure_row(*both, self.grid_error, partial(impulse_of, number=number))
             for number, both in enumerate(zip(loads, without, strict=True))
         ]
-        absent = () if self.blasts[0][0].has_particles else _OF_PARTICLES
-        return table_of(rows, [each for each in STRUCTURE_COLUMNS if each.name not in absent])
+        return table_of(rows, STRUCTURE_COLUMNS)
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":

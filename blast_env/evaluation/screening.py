@@ -33,11 +33,17 @@ from blast_env.particles.calibration.references import (
 )
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall, catalogue
-from blast_env.response.damage import damage_number, level_of, under_triangle
-from blast_env.response.facade import STOREY_M, FilledBay
-from blast_env.response.glass import GlazingCondition, GlazingResponses, Pane
+from blast_env.response.damage import damage_number, level_of, triangle, under_triangle
+from blast_env.response.facade import (
+    STOREY_M,
+    FacadeResponse,
+    FilledBay,
+    respond,
+    response_words,
+)
+from blast_env.response.glass import Pane
 from blast_env.response.requirements import Requirement
-from blast_env.response.walls import DamageLevel, Panel, PanelResponses, damage_level
+from blast_env.response.walls import Panel
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
 from blast_env.site.presets import NamedMass
 from blast_env.site.scene import BlastSite, Charge
@@ -79,8 +85,7 @@ class ScreenedBay:
         in_sight: Whether the charge sees its middle.
         peak_pa: Peak of its load.
         impulse_pa_s: Impulse of its load.
-        glazing: Response of its panes; `None` without.
-        wall_damage: Damage of its wall panel as a number; `None` without one.
+        response: Response of its windows and wall panel.
     """
 
     filled: FilledBay
@@ -88,13 +93,7 @@ class ScreenedBay:
     in_sight: bool
     peak_pa: float
     impulse_pa_s: float
-    glazing: GlazingResponses | None
-    wall_damage: float | None
-
-    def damage(self, *, glass_only: bool = False) -> float:
-        """Return the damage of its worst part as a number."""
-        glass = 0.0 if self.glazing is None else damage_number(self.glazing)
-        return glass if glass_only else max(glass, self.wall_damage or 0.0)
+    response: FacadeResponse
 
 
 @dataclass(frozen=True)
@@ -114,40 +113,14 @@ class Screened:
     bays: tuple[ScreenedBay, ...]
 
     @property
-    def level(self) -> LevelOfProtection:
-        """Level of protection, that of the worst part."""
-        return level_of(max(each.damage() for each in self.bays))
-
-    @property
     def nearest_m(self) -> float:
         """Distance of the nearest bay's middle."""
         return min(each.distance_m for each in self.bays)
 
     @property
-    def broken_panes(self) -> float:
-        """Expected number of broken panes."""
-        return sum(
-            each.filled.panes * float(each.glazing.break_probability[0])
-            for each in self.bays
-            if each.glazing is not None
-        )
-
-    @property
-    def panes(self) -> int:
-        """Number of panes."""
-        return sum(each.filled.panes for each in self.bays)
-
-    @property
-    def condition(self) -> GlazingCondition | None:
-        """Performance condition of the worst pane; `None` without panes."""
-        found = [int(each.glazing.condition[0]) for each in self.bays if each.glazing is not None]
-        return GlazingCondition(max(found)) if found else None
-
-    @property
-    def wall_damage(self) -> DamageLevel | None:
-        """Damage of the worst wall panel; `None` without one."""
-        found = [each.wall_damage for each in self.bays if each.wall_damage is not None]
-        return damage_level(np.array([max(found)]))[0] if found else None
+    def words(self) -> tuple[str, ...]:
+        """The level of protection, the panes broken, the worst pane and the worst panel."""
+        return response_words([each.response for each in self.bays])
 
     @property
     def may_breach(self) -> bool:
@@ -156,12 +129,7 @@ class Screened:
 
     def keeps(self, requirement: Requirement) -> bool:
         """Return whether every bay keeps a requirement."""
-        worst = max(each.damage(glass_only=requirement.glass_only) for each in self.bays)
-        return (
-            level_of(worst) >= requirement.level
-            and max(each.peak_pa for each in self.bays) <= requirement.peak_pa
-            and max(each.impulse_pa_s for each in self.bays) <= requirement.impulse_pa_s
-        )
+        return all(requirement.kept_by(each.response) for each in self.bays)
 
 
 @dataclass(frozen=True)
@@ -221,17 +189,13 @@ class Screening:
         kept = all(threat.keeps(each) for each in required)
         needed_m = max(self.needed_m(threat.name, each) for each in required)
         x_m, y_m = threat.charge.position_m
-        pane, panel = threat.condition, threat.wall_damage
         return (
             threat.name,
             f"({x_m:.1f}, {y_m:.1f})",
             f"{threat.charge.tnt_kg:g}",
             f"{threat.nearest_m:.1f}",
             self.stand_offs[threat.name][0].in_words(needed_m),
-            threat.level.label,
-            f"{threat.broken_panes:.1f} of {threat.panes}",
-            "-" if pane is None else pane.words,
-            "-" if panel is None else panel.name.lower(),
+            *threat.words,
             Verdict.of(kept).word().lower() + (" (may be breached)" if threat.may_breach else ""),
         )
 
@@ -538,19 +502,9 @@ def _screened(name: str, facade: _Facade, places: Sequence[Charge], seen: _Seen)
     bays = []
     for index, filled in enumerate(facade.bays):
         load = float(peaks[worst, index]), float(impulses[worst, index])
-        found = [under_triangle(each, *load) for each in parts[numbers[index]]]
-        glass = [each for each in found if isinstance(each, GlazingResponses)]
-        walls = [damage_number(each) for each in found if isinstance(each, PanelResponses)]
-        bays.append(
-            ScreenedBay(
-                filled,
-                float(seen.away_m[worst, index]),
-                bool(seen.seen[worst, index]),
-                *load,
-                glass[0] if glass else None,
-                walls[0] if walls else None,
-            )
-        )
+        response = respond([filled], *triangle(*load))
+        away_m, is_seen = seen.away_m[worst, index], seen.seen[worst, index]
+        bays.append(ScreenedBay(filled, float(away_m), bool(is_seen), *load, response))
     return Screened(name, places[worst], len(places), tuple(bays))
 
 

@@ -144,11 +144,16 @@ def under_triangle(
         peak_pa: Peak of the load.
         impulse_pa_s: Impulse, which determines the duration.
     """
-    lasts_s = min(2.0 * impulse_pa_s / peak_pa, _STATIC_S)
-    time_s, history_pa = np.array([0.0, lasts_s]), np.array([[peak_pa, 0.0]])
+    history = triangle(peak_pa, impulse_pa_s)
     if isinstance(part, Panel):
-        return panel_responses([part], time_s, history_pa)
-    return glazing_responses([part], time_s, history_pa)
+        return panel_responses([part], *history)
+    return glazing_responses([part], *history)
+
+
+def triangle(peak_pa: float, impulse_pa_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return the times, s, and the history (1, times) of such a load."""
+    lasts_s = min(2.0 * impulse_pa_s / peak_pa, _STATIC_S)
+    return np.array([0.0, lasts_s]), np.array([[peak_pa, 0.0]])
 
 
 def damage_number(found: GlazingResponses | PanelResponses) -> float:

@@ -362,6 +362,22 @@ def level_by_glass(condition: GlazingCondition) -> LevelOfProtection:
     }.get(condition, LevelOfProtection.BELOW_STANDARDS)
 
 
+def response_words(found: Sequence[FacadeResponse]) -> tuple[str, str, str, str]:
+    """Return the level of protection, the broken panes, the worst pane and the worst panel.
+
+    They are those of facades under one charge, in words; a dash without panes or panels.
+    """
+    panes = sum(each.panes for each in found)
+    conditions = [each.worst_condition for each in found if each.panes]
+    damage = [each.worst_damage for each in found if len(each.walled)]
+    return (
+        min(each.level_of_protection for each in found).label,
+        f"{sum(each.broken_panes for each in found):.1f} of {panes}",
+        max(conditions).words if conditions else "-",
+        max(damage).name.lower() if damage else "-",
+    )
+
+
 def force_words(found: Iterable[FacadeResponse]) -> str:
     """Return the largest forces that frames and connections have to carry, in a sentence."""
     edges, supports = zip(

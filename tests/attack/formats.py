@@ -157,7 +157,6 @@ def _loads(folder: Path) -> Format:
         ("a note",),
         "building",
         impulse_sim=5.0,
-        transferred_impulse_sim=2.0,
     )
     BlastStore(folder).add(key, BlastLoads((load,), np.arange(8.0)))
     path = folder / "blasts.sqlite"

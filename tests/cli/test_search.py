@@ -13,7 +13,7 @@ from blast_env.cli import app
 from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.design.surrogate import packaged_surrogate, search_by
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.cases import hidden_search_set, known_search_set
+from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import SegmentSource
@@ -43,7 +43,7 @@ def test_it_finds_what_the_library_finds_and_writes_all_files(site: Path, tmp_pa
     result = search("--method", "nsga2", "--scenario", site, *options)
     assert result.exit_code == 0, result.output
     evaluator = BlastEvaluator(load_scenario(site), "event")
-    problem = DesignProblem(evaluator, known_search_set(evaluator.scenario, CHARGE, 2, 3))
+    problem = DesignProblem(evaluator, search_set(evaluator.scenario, CHARGE, 2, 3))
     expected = find_proposer("nsga2").propose(problem, 20, 3)
     assert load_layout(out / "layout.json", evaluator.scenario) == expected.layout
     assert f"{expected.blasts} of 20 blasts spent" in result.stdout
@@ -70,7 +70,7 @@ def test_a_hidden_threat_is_searched_for_wherever_it_may_be(tmp_path: Path) -> N
     result = search("--scenario", site, "--method", "random", "--risk", "cvar", *options)
     assert result.exit_code == 0, result.output
     assert "mean of the worst 20 %" in result.stdout
-    threats = hidden_search_set(scenario, 3, 1, 0).threats
+    threats = search_set(scenario, None, 1, 0, charges=3).threats
     listed = json.loads((out / "layout.json").read_text())["provenance"]["threats"]
     assert [each["seed"] for each in listed] == [threat.seed for threat in threats]
     assert len({tuple(each["charge_position_m"]) for each in listed}) == 3
@@ -90,7 +90,7 @@ def test_the_surrogate_says_what_gets_a_blast(tmp_path: Path) -> None:
     assert provenance["options"]["surrogate"] == found.digest
     assert provenance["result"]["held_out_threats"] == 0
     assert provenance["result"]["held_out_reduction"] is None
-    case = known_search_set(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
+    case = search_set(scenario, scenario.sample_charge(np.random.default_rng(0)), 1, 0)
     problem = DesignProblem(BlastEvaluator(scenario, "gas"), case)
     expected = search_by(found).propose(problem, 1, 0)
     assert load_layout(out / "layout.json", scenario) == expected.layout != ()

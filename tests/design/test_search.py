@@ -15,7 +15,7 @@ from blast_env.design.search.operators import cut, repaired
 from blast_env.design.search.session import Plan, SearchEndedError, SearchSession
 from blast_env.errors import BlastEnvError, LayoutError
 from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCaseSet
-from blast_env.evaluation.cases import hidden_search_set, known_search_set
+from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
@@ -41,7 +41,7 @@ def test_the_number_is_the_environments(risk: MeanRisk | ConditionalValueAtRisk)
     """Mean over the realisations of a charge, then risk over the charges, as agents are paid."""
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    case = hidden_search_set(scenario, 3, 2, 1, risk)
+    case = search_set(scenario, None, 2, 1, risk, charges=3)
     layout = ((9, 0), (10, 0), (11, 0))
     expected = DesignProblem(evaluator, case).assess(layout).impulse_pa_s
     found = DesignProblem(evaluator, case).load(layout)
@@ -141,7 +141,7 @@ def test_it_reports_every_batch(problem: DesignProblem) -> None:
 def test_hidden_charges_come_first_and_spread() -> None:
     """A search that looks at the first three charges of the road has its middle and both ends."""
     scenario = ballistic("courtyard")
-    threats = hidden_search_set(scenario, 16, 2, seed=3).threats
+    threats = search_set(scenario, None, 2, seed=3, charges=16).threats
     assert [t.charge for t in threats[:16]] == [t.charge for t in threats[16:]]
     assert len({threat.seed for threat in threats}) == 32
     first, *others = (t.charge_against(scenario, ()).position_m[1] for t in threats[:16])
@@ -151,11 +151,11 @@ def test_hidden_charges_come_first_and_spread() -> None:
 
 def test_a_known_charge_has_its_realisations() -> None:
     scenario = small_scenario()
-    threats = known_search_set(scenario, WEST, 3, seed=1).threats
+    threats = search_set(scenario, WEST, 3, seed=1).threats
     assert {threat.charge for threat in threats} == {WEST}
     assert len({threat.seed for threat in threats}) == 3
-    assert threats == known_search_set(scenario, WEST, 3, seed=1).threats
-    assert threats != known_search_set(scenario, WEST, 3, seed=2).threats
+    assert threats == search_set(scenario, WEST, 3, seed=1).threats
+    assert threats != search_set(scenario, WEST, 3, seed=2).threats
 
 
 @pytest.mark.parametrize(

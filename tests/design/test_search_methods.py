@@ -21,7 +21,7 @@ from blast_env.design.search.methods import PopulationAnnealingSearch
 from blast_env.design.surrogate import LearntSearch
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, LoadCase
-from blast_env.evaluation.cases import hidden_search_set
+from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario
 from blast_env.site.scene import Charge
@@ -154,7 +154,7 @@ def test_layouts_are_legal_on_real_sites(method: str) -> None:
     """With no-build areas, a budget and an access way, against a hidden charge."""
     scenario = ballistic("street_junction")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = DesignProblem(evaluator, hidden_search_set(scenario, 3, 1, 0))
+    problem = DesignProblem(evaluator, search_set(scenario, None, 1, 0, charges=3))
     result = find_proposer(method).propose(problem, 10, 0)
     assert (
         LayoutState.of(scenario, result.layout).cells == result.layout == (*sorted(result.layout),)
@@ -193,7 +193,7 @@ def test_what_is_no_method_or_begins_with_no_layouts_is_told() -> None:
 def test_a_rule_against_a_hidden_charge_stands_in_the_middle() -> None:
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event")
-    problem = DesignProblem(evaluator, hidden_search_set(scenario, 8, 1, 0))
+    problem = DesignProblem(evaluator, search_set(scenario, None, 1, 0, charges=8))
     middle = Charge((5.0, 15.0), 100.0)
     found = find_proposer("wall_near_charge").propose(problem, 0)
     assert found.layout == tuple(sorted(wall_near_charge(scenario, middle)))
@@ -272,7 +272,7 @@ def test_genetic_search_beats_random_search_on_the_courtyard() -> None:
     """At equal cost: what makes it a baseline worth beating."""
     scenario = ballistic("courtyard")
     evaluator = BlastEvaluator(scenario, "event", cache_size=10_000)
-    problem = DesignProblem(evaluator, hidden_search_set(scenario, 1, 1, 0))
+    problem = DesignProblem(evaluator, search_set(scenario, None, 1, 0, charges=1))
     genetic, drawn = (
         problem.load(find_proposer(name).propose(problem, 100, 0).layout)
         for name in ("genetic", "random")

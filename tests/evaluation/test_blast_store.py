@@ -42,7 +42,6 @@ def loads(seed: int) -> BlastLoads:
         *("haus ß", True, 2.0, 1e-300, 0.7, 2.0, False, notes, "b"),
         stood=Stood(LoadStanding.OUTSIDE, "far"),
         impulse_sim=0.1 + 0.2,
-        transferred_impulse_sim=1.0 / 3.0,
     )
     structures = (house, replace(house, name="b", notes=()))
     return BlastLoads(structures, np.array([0.0, float(seed), np.pi, 1e300]))

@@ -10,7 +10,7 @@ import pytest
 from blast_env import Blast, Charge, load_scenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import LoadCase, LoadCaseSet, SeedRange, draw_threats
-from blast_env.evaluation.cases import are_all, fixed_charges, hidden_search_set, in_turn
+from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, search_set
 from blast_env.site import PointSource, Scenario
 from blast_env.statistics import ConditionalValueAtRisk
 from tests.evaluation.cases import COURTYARD, SEEDS
@@ -88,10 +88,10 @@ def test_an_environment_draws_seeds_for_training() -> None:
 
 def test_a_search_meets_none_of_the_threats_that_judge() -> None:
     scenario = load_scenario("courtyard")
-    search_set = hidden_search_set(scenario, 3, 2, seed=1)
-    assert all(threat.seed in SeedRange.SEARCH.value for threat in search_set.threats)
+    drawn = search_set(scenario, None, 2, seed=1, charges=3)
+    assert all(threat.seed in SeedRange.SEARCH.value for threat in drawn.threats)
     with pytest.raises(BlastEnvError, match="a search may not use"):
-        LoadCaseSet(scenario, search_set.threats[:1], search_set=search_set)
+        LoadCaseSet(scenario, drawn.threats[:1], search_set=drawn)
 
 
 def test_realisations_are_averaged_before_the_risk() -> None:

@@ -13,7 +13,7 @@ from blast_env.evaluation import (
     draw_threats,
     evaluate_layout,
 )
-from blast_env.evaluation.cases import hidden_search_set
+from blast_env.evaluation.cases import search_set
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.layout.build_scene import build_site, worst_places
@@ -85,7 +85,7 @@ def test_a_blast_without_a_charge_given_has_the_vehicle_at_its_worst_place() -> 
 def test_a_search_meets_the_worst_places_first() -> None:
     road = {"kind": "segment", "start_m": [2.0, 2.0], "end_m": [2.0, 6.0], "tnt_kg": 5.0}
     both = gate_site(charge=[vehicle_document(), road])
-    threats = hidden_search_set(both, 12, 1, seed=0).threats
+    threats = search_set(both, None, 1, seed=0, charges=12).threats
     vehicles = [each.charge for each in threats if isinstance(each.charge, VehicleCharge)]
     assert 0 < len(vehicles) < 12
     assert [each.charge for each in threats[: len(vehicles)]] == vehicles

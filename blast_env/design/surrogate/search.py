@@ -23,7 +23,7 @@ from blast_env.design.surrogate.network import Surrogate, packaged_surrogate
 from blast_env.design.surrogate.walls import SurrogateSite, site_of
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import DesignProblem, LoadCase, LoadCaseSet
-from blast_env.evaluation.cases import hidden_search_set, known_search_set, one_of_each_charge
+from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import generator
@@ -314,9 +314,9 @@ def _given(agent: SamplingAgent | None) -> SamplingAgent:
 
 def case_for(scenario: Scenario, charge: AnyCharge | None) -> LoadCaseSet:
     """Return the case of a proposal without blasts: the charge, or some of the possible ones."""
+    drawn = search_set(scenario, charge, charges=_DRAWN_CHARGES)
     if charge is not None:
-        return known_search_set(scenario, charge, 1, 0)
-    drawn = hidden_search_set(scenario, _DRAWN_CHARGES, 1, 0)
+        return drawn
     return replace(drawn, threats=one_of_each_charge(drawn.threats)[:_HIDDEN_CHARGES])
 
 

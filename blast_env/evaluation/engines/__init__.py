@@ -15,7 +15,7 @@ from blast_env.evaluation.engines.contract import (
     find_engine,
 )
 from blast_env.evaluation.engines.particles import Blast, BlastResult, ParticleEngine
-from blast_env.evaluation.engines.simulate import simulate, simulate_many
+from blast_env.evaluation.engines.simulate import simulate
 
 __all__ = [
     "CALIBRATED_ENGINES",
@@ -31,5 +31,4 @@ __all__ = [
     "default_engine",
     "find_engine",
     "simulate",
-    "simulate_many",
 ]

@@ -10,7 +10,7 @@ A custom engine is a class with a name, a version and `loads`; everything else h
 An instance is accepted wherever an engine's name is. An entry point registers a name.
 """
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,14 @@ from blast_env.geometry import Element
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import BayDamage, level_of, worst
-from blast_env.site import AnyCharge, AnyScenario, ObjectiveSection, Scenario, find_scenario
+from blast_env.site import (
+    AnyCharge,
+    AnyScenario,
+    ObjectiveSection,
+    Scenario,
+    ScenarioField,
+    find_scenario,
+)
 from blast_env.site.facade import NamedBay
 from blast_env.site.sections import StructureSection
 from blast_env.statistics import counted_parts, mean_over_area
@@ -111,11 +118,9 @@ class ParticleLoad(StructureLoad):
 
     Attributes:
         impulse_sim: Sum of m |v| over the collisions, simulation units.
-        transferred_impulse_sim: Momentum actually transferred, simulation units.
     """
 
     impulse_sim: float = field(kw_only=True)
-    transferred_impulse_sim: float = field(kw_only=True)
 
 
 def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
@@ -143,8 +148,8 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     is_known = len(areas_m2) == len(counted)
     peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
     impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
-    hit = [each for each in parts if isinstance(each, ParticleLoad)]
-    sums = {name: sum(getattr(each, name) for each in hit) for name in SIM_NAMES if hit}
+    hit = [each.impulse_sim for each in parts if isinstance(each, ParticleLoad)]
+    sums = {"impulse_sim": sum(hit)} if hit else {}
     return replace(
         counted[0],
         **sums,
@@ -297,10 +302,6 @@ def structure_response(
     return objective.response(np.array(damage), np.array(area_m2)), worst(damage)
 
 
-SIM_NAMES: Final = ("impulse_sim", "transferred_impulse_sim")
-"""The sums of a `ParticleLoad` in simulation units."""
-
-
 class BlastOutcome(Protocol):
     """The outcome of a blast on any engine."""
 
@@ -316,9 +317,25 @@ class BlastOutcome(Protocol):
         """Return the loads on all structures."""
 
 
-class RunnableBlast(Protocol):
-    """One blast that can be run to its end."""
+@dataclass(frozen=True, eq=False)
+class RunnableBlast(ABC):
+    """One blast of an engine, ready to run.
 
+    Attributes:
+        scenario: The scenario, or its bundled name or path.
+        layout: Cells of the build zone that hold a barrier module.
+        seed: Draws the charge where the scenario leaves it open; of particles the fan and the air.
+        engine: The engine.
+        charge: The charge, instead of one drawn from the scenario.
+    """
+
+    scenario: ScenarioField = ScenarioField()
+    layout: Sequence[Element] = ()
+    seed: int = 0
+    engine: Any = None
+    charge: AnyCharge | None = None
+
+    @abstractmethod
     def run(self, progress: Callable[[float], None] | None = None) -> BlastOutcome:
         """Run the blast.
 
@@ -496,16 +513,11 @@ def default_engine(*scenarios: Scenario, particles: str = ENGINE_NAMES[0]) -> st
     return JUDGE if any(each.height_notes for each in scenarios) else particles
 
 
-def find_engine(
-    engine: str | Engine,
-    cell_m: float | None = None,
-    until: str | float | None = None,
-    cells: str | None = None,
-) -> Engine:
+def find_engine(engine: str | Engine, cell_m: float | None = None, **settings: Any) -> Engine:
     """Return an engine by its name, or the engine itself, with any given settings.
 
-    The settings of gas dynamics are the side of its cells, the loads that a blast waits for, and
-    the growth of the cells.
+    The settings of gas dynamics are the side of its cells, the loads that a blast waits for
+    (`until`), and the growth of the cells (`cells`); `None` leaves one as it is.
 
     Raises:
         UnknownNameError: If there is no engine of that name.
@@ -514,7 +526,7 @@ def find_engine(
     found = _made(engine) if isinstance(engine, str) else engine
     if not isinstance(found, Engine):
         raise BlastEnvError(f"engine is {value_text(engine)}, must be a name or an engine")
-    return found.configured(cell_m=cell_m, until=until, cells=cells)
+    return found.configured(cell_m=cell_m, **settings)
 
 
 def _made(name: str) -> Engine:

@@ -26,6 +26,7 @@ from blast_env.evaluation.engines.bays import (
 from blast_env.evaluation.engines.contract import (
     BlastLoads,
     Engine,
+    RunnableBlast,
     StructureLoad,
 )
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS, PieceLoads
@@ -68,7 +69,6 @@ from blast_env.site import (
     AnyCharge,
     AnyScenario,
     Scenario,
-    ScenarioField,
     VehicleCharge,
     find_scenario,
 )
@@ -193,22 +193,10 @@ class GasEngine(GasSettings, Engine):
 
 
 @dataclass(frozen=True, eq=False)
-class GasBlast:
-    """One blast of the gas engine, ready to run.
+class GasBlast(RunnableBlast):
+    """One blast of the gas engine, ready to run."""
 
-    Attributes:
-        scenario: The scenario, or its bundled name or path.
-        layout: Cells of the build zone that hold a barrier module.
-        seed: Draws the charge where the scenario leaves it open, and nothing else.
-        engine: The engine.
-        charge: The charge, instead of one drawn from the scenario.
-    """
-
-    scenario: ScenarioField = ScenarioField()
-    layout: Sequence[Element] = ()
-    seed: int = 0
     engine: GasEngine = field(default_factory=GasEngine)
-    charge: AnyCharge | None = None
 
     @cached_property
     def site(self) -> BlastSite:

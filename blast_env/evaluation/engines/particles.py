@@ -14,7 +14,13 @@ from typing import TYPE_CHECKING, ClassVar, Final, Literal
 import numpy as np
 
 from blast_env.errors import BlastEnvError, UnknownNameError, value_text
-from blast_env.evaluation.engines.contract import BlastLoads, Engine, ParticleLoad, find_engine
+from blast_env.evaluation.engines.contract import (
+    BlastLoads,
+    Engine,
+    ParticleLoad,
+    RunnableBlast,
+    find_engine,
+)
 from blast_env.evaluation.standing import LoadStanding, Stood
 from blast_env.geometry import Element, layout_text
 from blast_env.layout.build_scene import build_scene
@@ -28,7 +34,7 @@ from blast_env.particles.calibration.model import (
 from blast_env.particles.run import BallStates, BlastRun, CollisionArray, EndReason
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
 from blast_env.provenance import versions
-from blast_env.site import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.site.scene import Scene
 from blast_env.site.structure import ModularObstacle
 from blast_env.values import path_of
@@ -140,22 +146,10 @@ def find_particle_engine(engine: str | Engine) -> ParticleEngine:
 
 
 @dataclass(frozen=True, eq=False)
-class Blast:
-    """One blast of a particle engine, ready to run; see the arguments of `simulate`.
+class Blast(RunnableBlast):
+    """One blast of a particle engine, which may be given by its name."""
 
-    Attributes:
-        scenario: The scenario, or its bundled name or path.
-        layout: Cells of the build zone that hold a barrier module.
-        seed: Draws the charge, where the scenario leaves it open, the fan and the air.
-        engine: The engine or its name.
-        charge: The charge, instead of one drawn from the scenario.
-    """
-
-    scenario: ScenarioField = ScenarioField()
-    layout: Sequence[Element] = ()
-    seed: int = 0
     engine: str | Engine = "pymunk"
-    charge: AnyCharge | None = None
 
     @cached_property
     def scene(self) -> Scene:
@@ -316,7 +310,6 @@ class BlastResult:
                     protected=each.protected,
                     weight=each.weight,
                     impulse_sim=each.impulse,
-                    transferred_impulse_sim=each.transferred_impulse,
                     impulse_pa_s=scaled.pa_s,
                     peak_pa=None,
                     peak_weight=each.weight,

@@ -1,15 +1,11 @@
-"""Functions that run blasts; results depend only on scenario, layout, seed, charge and engine."""
+"""`simulate` runs a blast; its result depends only on scenario, layout, seed, charge and engine."""
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from itertools import count
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.contract import BlastOutcome, Engine, default_engine, find_engine
-from blast_env.evaluation.engines.particles import Blast, BlastResult
+from blast_env.evaluation.engines.particles import BlastResult
 from blast_env.geometry import Element
-from blast_env.runner import check_workers
 from blast_env.site import AnyCharge, AnyScenario, find_scenario
 
 if TYPE_CHECKING:  # Numba takes a third of a second to import
@@ -25,9 +21,7 @@ def simulate(  # type: ignore[overload-overlap]  # "gas" is a name too
     engine: "Literal['gas'] | GasEngine",
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
-    cell_m: float | None = ...,
-    until: str | float | None = ...,
-    cells: str | None = ...,
+    **settings: Any,
 ) -> "GasResult": ...
 
 
@@ -39,9 +33,7 @@ def simulate(
     engine: None = ...,
     charge: AnyCharge | None = ...,
     progress: Callable[[float], None] | None = ...,
-    cell_m: float | None = ...,
-    until: str | float | None = ...,
-    cells: str | None = ...,
+    **settings: Any,
 ) -> Any: ...  # depends on the site
 
 
@@ -63,9 +55,7 @@ def simulate(
     engine: str | Engine | None = None,
     charge: AnyCharge | None = None,
     progress: Callable[[float], None] | None = None,
-    cell_m: float | None = None,
-    until: str | float | None = None,
-    cells: str | None = None,
+    **settings: Any,
 ) -> BlastOutcome:
     """Run a blast to its end.
 
@@ -80,11 +70,11 @@ def simulate(
             on the site; see `default_engine`.
         charge: The charge, instead of one drawn from the scenario.
         progress: Called periodically with the elapsed share of the time limit.
-        cell_m: Side of the cells of gas dynamics, 0.5 m unless given.
-        until: Loads that a blast of gas dynamics waits for: protected `"structures"` (the
-            default), all `"walls"` or the `"gauges"`; or its duration in seconds.
-        cells: Growth of the cells of gas dynamics with the blast: `"uniform"` (the default, no
-            growth), `"coarse"` or `"fine"`; for large sites, see `GasSettings`.
+        settings: Settings of the engine, those of gas dynamics: `cell_m`, the side of its cells,
+            0.5 m unless given; `until`, the loads that a blast waits for, protected
+            `"structures"` (the default), all `"walls"` or the `"gauges"`, or its duration in
+            seconds; `cells`, their growth with the blast, `"uniform"` (the default, no growth),
+            `"coarse"` or `"fine"`, for large sites; see `GasSettings`.
 
     Returns:
         A `BlastResult` of the particle engines, a `GasResult` of gas dynamics.
@@ -100,39 +90,5 @@ def simulate(
     # Values that are not iterable are refused by the reader of the layout.
     elements = tuple(layout) if isinstance(layout, Iterable) else layout
     site = find_scenario(scenario)
-    found = find_engine(default_engine(site) if engine is None else engine, cell_m, until, cells)
+    found = find_engine(default_engine(site) if engine is None else engine, **settings)
     return found.blast(site, elements, seed, charge).run(progress)
-
-
-def simulate_many(
-    blasts: Sequence[Blast],
-    threads: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> list[BlastResult]:
-    """Run blasts to their ends, several at a time in threads of this process.
-
-    The results are those of `Blast.run`, to the last bit, in the order of the blasts. Threads
-    shorten the work of compiled engines only: the preparation of a blast and its result are Python
-    code, which one thread at a time executes. Progress is called in the caller's thread.
-
-    Raises:
-        BlastEnvError: If `threads` is not a whole number of at least 1, or if a blast cannot run;
-            the message names the first such blast.
-    """
-    check_workers("threads", threads)
-    results: list[BlastResult] = []
-    # Not joblib's threads: of several errors those raise the one that came first in time.
-    with ThreadPoolExecutor(threads) as pool:
-        for result in pool.map(_run_numbered, count(), blasts):
-            results.append(result)
-            if progress is not None:
-                progress(len(results) / len(blasts))
-    return results
-
-
-def _run_numbered(number: int, blast: Blast) -> BlastResult:
-    """Run a blast; errors in its arguments name its number."""
-    try:
-        return blast.run()
-    except ValueError as error:  # from unusable arguments; includes `BlastEnvError`
-        raise BlastEnvError(f"blasts[{number}]: {error}") from error
