@@ -165,12 +165,10 @@ def test_a_run_on_its_way_has_no_result() -> None:
         blast.result(blast.start())
 
 
-# --- Many blasts in threads: the same results as one by one, in order, and errors that say which.
+# --- Many blasts in threads, and many pieces of work.
 
 
 WALL = tuple((row, 0) for row in range(2, 12))
-KEEP_OUT = (18, 0)
-"""A cell of the courtyard that must stay empty."""
 
 
 def blasts(count: int, engine: str = "event") -> list[Blast]:

@@ -41,7 +41,6 @@ from blast_env.evaluation import (
     SeedRange,
     compare,
 )
-from blast_env.evaluation.comparison import case_table, comparison_record
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.evaluation.grid_error import percent
 from blast_env.files import write_text
@@ -134,7 +133,7 @@ def _report_cases(
             cvar_level=options.cvar_level,
             progress=progress,
         )
-    record = {**comparison_record(found), "provenance": provenance}
+    record = {**found.to_dict(), "provenance": provenance}
     written = [] if options.out is None else _write(found, record, options.out)
     exported: list[Path] = []
     if options.export is not None:
@@ -166,7 +165,7 @@ def _fixed(case: LoadCaseSet, options: EvaluateOptions) -> LoadCaseSet:
 
 
 def _print_cases(comparison: Evaluation, title: str) -> None:
-    cases, objective = case_table(comparison), comparison.cases[0].scenario.objective
+    cases, objective = comparison.case_table, comparison.cases[0].scenario.objective
     rows = [
         (
             row["scenario"],
@@ -192,7 +191,7 @@ def _print_cases(comparison: Evaluation, title: str) -> None:
 def _write(comparison: Evaluation, record: dict[str, Any], out: Path) -> list[Path]:
     text = json.dumps(record, indent=2, allow_nan=False)
     path = write_text(out / "evaluation.json", text + "\n")
-    table = write_csv(case_table(comparison), out / "cases.csv")
+    table = write_csv(comparison.case_table, out / "cases.csv")
     return [path, table, save_figure(comparison_figure(comparison), out / "evaluation.png")]
 
 

@@ -24,8 +24,8 @@ from blast_env.evaluation import (
     Evaluation,
     LoadCase,
     LoadCaseSet,
+    compare,
     draw_threats,
-    evaluate_against,
 )
 from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
@@ -190,16 +190,16 @@ def asked_blasts(
 def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: EvaluateOptions) -> None:
     """Evaluate a layout on the threats drawn by the seeds; print and write the result."""
     engine = evaluator.engine
-    threats = options.threats(plan.scenario, engine)
+    case = LoadCaseSet(plan.scenario, options.threats(plan.scenario, engine))
     options.prepare_files(1)
     if not options.is_json:
         print_line(engine.describe([plan.scenario]))
-        print_cost(asked_blasts([LoadCaseSet(plan.scenario, threats)], engine))
-    with progress_bar(f"{2 * len(threats)} blasts in {plan.scenario.name}") as progress:
-        evaluation = evaluate_against(
+        print_cost(asked_blasts([case], engine))
+    with progress_bar(f"{2 * len(case.threats)} blasts in {plan.scenario.name}") as progress:
+        evaluation = compare(
             evaluator,
-            plan.layout,
-            threats,
+            [case],
+            [plan.layout],
             options.processes,
             with_error=True,
             cvar_level=options.cvar_level,
@@ -211,7 +211,7 @@ def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: Evaluate
     record = {
         **evaluation.to_dict(),
         "scenario_name": plan.scenario.name,
-        "preset": engine.preset(plan.scenario),
+        "preset": plan.scenario.simulation.preset if engine.needs_calibration else None,
         "provenance": dict(plan.provenance),
     }
     if print_json_record(record, written, options, evaluator.counts):

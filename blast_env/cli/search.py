@@ -63,10 +63,10 @@ from blast_env.evaluation import (
     Evaluation,
     Evaluators,
     LoadCase,
+    LoadCaseSet,
     SeedRange,
     compare,
     draw_threats,
-    evaluate_against,
 )
 from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.evaluation.engines import JUDGE, find_engine
@@ -286,10 +286,10 @@ def _check(
     if not threats:
         return None
     with progress_bar(f"check on {len(threats)} other threats") as progress:
-        return evaluate_against(
+        return compare(
             problem.evaluator,
-            run.result.layout,
-            threats,
+            [LoadCaseSet(problem.scenario, threats)],
+            [run.result.layout],
             problem.processes,
             cvar_level=cvar_level,
             progress=progress,

@@ -3,7 +3,7 @@
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.comparison import Evaluation, ThreatOutcome
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad, StructureLoad
-from blast_env.evaluation.evaluate import compare, evaluate_against, evaluate_layout
+from blast_env.evaluation.evaluate import compare, evaluate_layout
 from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError, Evaluators
 from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.problem import Assessment, DesignProblem
@@ -39,7 +39,6 @@ __all__ = [
     "conditional_value_at_risk",
     "convergence_index",
     "draw_threats",
-    "evaluate_against",
     "evaluate_layout",
     "mean_estimate",
     "reduction_estimate",

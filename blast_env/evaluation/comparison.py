@@ -41,7 +41,6 @@ from blast_env.statistics import (
     reductions,
 )
 from blast_env.tables import Column, number_or_none, table_of, table_records
-from blast_env.units import PA_PER_PSI
 
 if TYPE_CHECKING:  # takes a third of a second to import
     import pandas as pd
@@ -79,8 +78,6 @@ STRUCTURE_COLUMNS: Final = (
     Column("reduction_error", "", "error of the cells of the reduction; particles have none"),
     Column("impulse_error_pa_s", "Pa s", "error of the cells of the impulse with the barrier"),
     Column("unprotected_impulse_error_pa_s", "Pa s", "the same without it"),
-    Column("impulse_psi_s", "psi s", "calibrated impulse per area with the barrier"),
-    Column("unprotected_impulse_psi_s", "psi s", "calibrated impulse per area without it"),
     Column(
         "peak_pa", "Pa", "largest overpressure on its walls with the barrier, mean over threats"
     ),
@@ -152,7 +149,6 @@ def _structure_row(
         peaks = [np.nan if load.peak_pa is None else load.peak_pa for load in each]
         row[f"{side}impulse_pa_s"] = mean_pa_s
         row[f"{side}impulse_error_pa_s"] = off * mean_pa_s
-        row[f"{side}impulse_psi_s"] = mean_pa_s / PA_PER_PSI
         row[f"{side}peak_pa"] = float(np.mean(peaks))
     return row
 
@@ -466,18 +462,6 @@ class Evaluation:
         """The threat with the largest load behind the barrier."""
         return max(self.outcomes, key=lambda outcome: outcome.load)
 
-    @property
-    def cvar_pa_s(self) -> float:
-        """Mean impulse of the worst threats with the barrier, Pa*s; see `cvar_level`."""
-        return conditional_value_at_risk(_impulses_pa_s(self.blasts[0]), self.cvar_level)
-
-    @property
-    def unprotected_cvar_pa_s(self) -> float:
-        """Mean impulse of the worst threats without the barrier, Pa*s."""
-        return conditional_value_at_risk(
-            _impulses_pa_s(self.unprotected_blasts[0]), self.cvar_level
-        )
-
     @cached_property
     def table(self) -> "pd.DataFrame":
         """One row per structure; see `STRUCTURE_COLUMNS`."""
@@ -536,10 +520,30 @@ class Evaluation:
         return table_of(rows, THREAT_COLUMNS)
 
     @cached_property
+    def case_table(self) -> "pd.DataFrame":
+        """One row per case; see `CASE_COLUMNS`."""
+        rows = []
+        for index, (case, layout) in enumerate(zip(self.cases, self.layouts, strict=True)):
+            threat = case.threats[0]
+            rows.append(
+                {
+                    "scenario": case.scenario.name,
+                    "seed": threat.seed,
+                    **charge_values(threat.charge_against(case.scenario, layout)),
+                    "modules": len(layout),
+                    "load": case.objective_value(self.loads[index], layout),
+                    "unprotected_load": case.objective_value(self.unprotected[index]),
+                    "unit": case.scenario.objective.unit,
+                    "reduction": float(self.case_reductions[index]),
+                    "in_range": bool(self.within[index].all()),
+                }
+            )
+        return table_of(rows, CASE_COLUMNS)
+
+    @cached_property
     def notes(self) -> tuple[str, ...]:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
-        notes = [self.engine.caveat] if self.engine.caveat else []
-        notes += [] if self.engine.knows_heights else self.scenario.height_notes
+        notes = [*self.engine.caveats(self.scenario)]
         checked = self.engine.validated_range
         if self.engine.needs_calibration:
             checked = f"the range of calibration {self.calibration!r}"
@@ -555,23 +559,74 @@ class Evaluation:
     def to_dict(self) -> dict[str, Any]:
         """Return the inputs, the versions and the results as plain data.
 
-        The same arguments and versions give the same data; NaN becomes `None`.
+        The same arguments and versions give the same data; NaN becomes `None`. Of a single case it
+        has the scenario, the threats and the tables of structures and modules as well.
         """
-        scenario = self.scenario
-        return {
+        objective = self.scenario.objective
+        record: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
-            "scenario": scenario.model_dump(mode="json", exclude_none=True),
-            "scenario_hash": scenario.content_hash,
-            "layout": [list(cell) for cell in self.layout],
             "engine": self.engine.name,
-            "calibration": self.calibration,
             "versions": versions(self.engine.version),
-            "result": _result(self),
-            "notes": list(self.notes),
-            "threats": table_records(self.threat_table),
-            "structures": table_records(self.table),
-            "buildings": table_records(self.building_table),
-            "modules": table_records(self.module_table),
+            "result": {
+                "reduction": estimate_record(self.reduction),
+                "load": estimate_record(self.mean),
+                "unprotected_load": estimate_record(self.unprotected_mean),
+                "unit": objective.unit,
+                "cvar_level": self.cvar_level,
+                "cvar": self.cvar,
+                "unprotected_cvar": self.unprotected_cvar,
+                "grid_error": self._grid_error_record(),
+                "in_range": self.in_range,
+            },
+            "cases": [
+                {
+                    **row,
+                    "scenario_hash": case.scenario.content_hash,
+                    "calibration": case.scenario.calibration,
+                    "layout": [list(cell) for cell in layout],
+                }
+                for row, case, layout in zip(
+                    table_records(self.case_table), self.cases, self.layouts, strict=True
+                )
+            ],
+        }
+        if self.has_one_case:
+            record |= {
+                "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
+                "scenario_hash": self.scenario.content_hash,
+                "layout": [list(cell) for cell in self.layout],
+                "calibration": self.calibration,
+                "notes": list(self.notes),
+                "threats": table_records(self.threat_table),
+                "structures": table_records(self.table),
+                "buildings": table_records(self.building_table),
+                "modules": table_records(self.module_table),
+            }
+            worst = self.outcomes.index(self.worst)
+            record["result"] |= {
+                "objective": {
+                    **objective.model_dump(mode="json", exclude_none=True),
+                    "load": self.load,
+                    "unprotected_load": self.unprotected_load,
+                },
+                "impulse_pa_s": estimate_record(self.impulse_pa_s),
+                "unprotected_impulse_pa_s": estimate_record(self.unprotected_impulse_pa_s),
+                "worst": record["threats"][worst],
+            }
+        return record
+
+    def _grid_error_record(self) -> dict[str, Any] | None:
+        """Return the errors of the cells as JSON-compatible data; `None` without any."""
+        error = self.grid_error
+        if error is None:
+            return None
+        return {
+            "engine": self.engine.words,
+            "coarser": error.coarser.words,
+            "worst_seed": error.threat.seed,
+            "reduction": number_or_none(self.reduction_error),
+            "load": number_or_none(self.mean_error),
+            "unprotected_load": number_or_none(self.unprotected_mean_error),
         }
 
     def to_json(self, path: str | Path) -> Path:
@@ -579,120 +634,12 @@ class Evaluation:
         return write_text(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
 
-def _impulses_pa_s(loads: Sequence[BlastLoads]) -> FloatArray:
-    return np.array([load.protected_impulse_pa_s for load in loads])
-
-
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
 """Version of the file written by `Evaluation.to_json`."""
 
 
-def _result(evaluation: "Evaluation") -> dict[str, Any]:
-    impulses: dict[str, Any] = {}
-    for side, impulse, cvar in (
-        ("", evaluation.impulse_pa_s, evaluation.cvar_pa_s),
-        ("unprotected_", evaluation.unprotected_impulse_pa_s, evaluation.unprotected_cvar_pa_s),
-    ):
-        impulses[f"{side}impulse_pa_s"] = estimate_record(impulse)
-        impulses[f"{side}impulse_psi_s"] = estimate_record(impulse.scaled(1.0 / PA_PER_PSI))
-        impulses[f"{side}cvar_pa_s"] = cvar
-        impulses[f"{side}cvar_psi_s"] = cvar / PA_PER_PSI
-    objective = evaluation.scenario.objective
-    return {
-        "reduction": estimate_record(evaluation.reduction),
-        **impulses,
-        "cvar_level": evaluation.cvar_level,
-        "objective": {
-            **objective.model_dump(mode="json", exclude_none=True),
-            "unit": objective.unit,
-            "load": evaluation.load,
-            "unprotected_load": evaluation.unprotected_load,
-        },
-        "worst": _worst(evaluation.worst),
-        "grid_error": grid_error_record(evaluation),
-        "in_range": evaluation.in_range,
-    }
-
-
-def _worst(outcome: "ThreatOutcome") -> dict[str, Any]:
-    return {
-        "seed": outcome.threat.seed,
-        "charge_position_m": list(outcome.charge.position_m),
-        "charge_height_m": outcome.charge.height_m,
-        "tnt_kg": outcome.charge.tnt_kg,
-        "impulse_pa_s": outcome.impulse_pa_s,
-        "unprotected_impulse_pa_s": outcome.unprotected_impulse_pa_s,
-        "load": outcome.load,
-        "unprotected_load": outcome.unprotected_load,
-        "reduction": number_or_none(outcome.reduction),
-        "in_range": outcome.in_range,
-    }
-
-
-def case_table(comparison: Evaluation) -> "pd.DataFrame":
-    """Return one row per case; see `CASE_COLUMNS`."""
-    rows = []
-    for index, (case, layout) in enumerate(zip(comparison.cases, comparison.layouts, strict=True)):
-        threat = case.threats[0]
-        rows.append(
-            {
-                "scenario": case.scenario.name,
-                "seed": threat.seed,
-                **charge_values(threat.charge_against(case.scenario, layout)),
-                "modules": len(layout),
-                "load": case.objective_value(comparison.loads[index], layout),
-                "unprotected_load": case.objective_value(comparison.unprotected[index]),
-                "unit": case.scenario.objective.unit,
-                "reduction": float(comparison.case_reductions[index]),
-                "in_range": bool(comparison.within[index].all()),
-            }
-        )
-    return table_of(rows, CASE_COLUMNS)
-
-
-def comparison_record(comparison: Evaluation) -> dict[str, Any]:
-    """Return a comparison as JSON-compatible data; NaN becomes `None`."""
-    cases = [
-        {
-            **row,
-            "scenario_hash": case.scenario.content_hash,
-            "calibration": case.scenario.calibration,
-            "layout": [list(cell) for cell in layout],
-        }
-        for row, case, layout in zip(
-            table_records(case_table(comparison)), comparison.cases, comparison.layouts, strict=True
-        )
-    ]
-    return {
-        "engine": comparison.engine.name,
-        "versions": versions(comparison.engine.version),
-        "result": {
-            "grid_error": grid_error_record(comparison),
-            "reduction": estimate_record(comparison.reduction),
-            "load": estimate_record(comparison.mean),
-            "unprotected_load": estimate_record(comparison.unprotected_mean),
-            "unit": comparison.cases[0].scenario.objective.unit,
-            "cvar_level": comparison.cvar_level,
-            "cvar": comparison.cvar,
-            "unprotected_cvar": comparison.unprotected_cvar,
-        },
-        "cases": cases,
-    }
-
-
-def grid_error_record(comparison: Evaluation) -> dict[str, Any] | None:
-    """Return the errors of the cells as JSON-compatible data; `None` without any."""
-    error = comparison.grid_error
-    if error is None:
-        return None
-    return {
-        "engine": comparison.engine.words,
-        "coarser": error.coarser.words,
-        "worst_seed": error.threat.seed,
-        "reduction": number_or_none(comparison.reduction_error),
-        "load": number_or_none(comparison.mean_error),
-        "unprotected_load": number_or_none(comparison.unprotected_mean_error),
-    }
+def _impulses_pa_s(loads: Sequence[BlastLoads]) -> FloatArray:
+    return np.array([load.protected_impulse_pa_s for load in loads])
 
 
 def estimate_record(estimate: Estimate) -> dict[str, float | None]:

@@ -73,39 +73,12 @@ def evaluate_layout(
     judge = final_engine(engine, [found], cell_m, cells=cells)
     evaluator = BlastEvaluator(found, judge, cache=cache)
     drawn = in_turn(found, draw_threats(found, seeds)) if threats is None else tuple(threats)
-    return evaluate_against(
-        evaluator,
-        layout,
-        drawn,
-        processes,
-        with_error=True,
-        cvar_level=cvar_level,
-        progress=progress,
-    )
-
-
-def evaluate_against(
-    evaluator: BlastEvaluator,
-    layout: Sequence[Element],
-    threats: Sequence[LoadCase],
-    processes: int = 1,
-    *,
-    with_error: bool = False,
-    cvar_level: float = CVAR_LEVEL,
-    progress: Callable[[float], None] | None = None,
-) -> Evaluation:
-    """Evaluate a layout as in `evaluate_layout`, with the cached blasts of an evaluator.
-
-    For several layouts on the same threats, the empty site is simulated only once. `with_error` is
-    that of `compare`.
-    """
-    scenario = evaluator.scenario
     return compare(
         evaluator,
-        [LoadCaseSet(scenario, tuple(threats))],
-        [sorted(check_layout(scenario, layout))],
+        [LoadCaseSet(found, drawn)],
+        [layout],
         processes,
-        with_error=with_error,
+        with_error=True,
         cvar_level=cvar_level,
         progress=progress,
     )
@@ -126,7 +99,8 @@ def compare(
     Args:
         evaluators: Run and cache the blasts; a single one is for cases on its scenario.
         cases: At least one, all with the same number of threats.
-        layouts: One per case: (row, column) of the cells that hold a module, in any order.
+        layouts: One per case: (row, column) of the cells that hold a module, in any order. For
+            several layouts on the same threats, the empty site is simulated only once.
         processes: Number of worker processes; it changes only the time.
         with_error: Whether the worst threat runs on coarser cells too, for the error of the cells.
         cvar_level: The CVaR is the mean of the worst share 1 - `cvar_level`.
@@ -139,7 +113,7 @@ def compare(
     if not cases:
         raise BlastEnvError("cases: there are none, must be at least one")
     pairs = zip(cases, layouts, strict=True)
-    cells = [tuple(check_layout(case.scenario, layout)) for case, layout in pairs]
+    cells = [tuple(sorted(check_layout(case.scenario, layout))) for case, layout in pairs]
     blasts, unprotected = zip(
         *loads_of_both(evaluators.of, cases, cells, processes, progress), strict=True
     )

@@ -40,7 +40,7 @@ def test_it_prints_the_evaluation_and_writes_all_files(layout: Path, tmp_path: P
     half = 100.0 * (expected.mean_reduction - expected.ci95[0])
     interval = f"+- {half:.1f} (95 %, threats)"
     assert f"mean reduction {100.0 * expected.mean_reduction:.1f} % {interval}" in result.stdout
-    assert f"mean of the worst 20 % {expected.cvar_pa_s:,.0f} Pa s" in result.stdout
+    assert f"mean of the worst 20 % {expected.cvar:,.0f} Pa s" in result.stdout
     assert f"seed {expected.worst.threat.seed}: {expected.worst.impulse_pa_s:,.0f}" in result.stdout
     assert "means over 3 threats (seeds 7 to 9)" in result.stdout
     tables = [f"{each}.csv" for each in ("structures", "buildings", "modules", "threats")]

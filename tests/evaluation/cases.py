@@ -1,9 +1,21 @@
 """Scenario, layouts and threats that the tests of evaluations share."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from blast_env import Charge, load_scenario
-from blast_env.evaluation import BlastLoads, LoadCase, StructureLoad, draw_threats
+from blast_env.evaluation import (
+    BlastEvaluator,
+    BlastLoads,
+    Evaluation,
+    LoadCase,
+    LoadCaseSet,
+    StructureLoad,
+    compare,
+    draw_threats,
+)
+from blast_env.geometry import Element
 from blast_env.site import Scenario
 
 COURTYARD = load_scenario("courtyard")
@@ -25,3 +37,10 @@ def loads_of(scenario: Scenario, impulse_pa_s: float, *, in_range: bool = True) 
     """Return loads by hand, the same on every structure."""
     loads = (StructureLoad.on(each, impulse_pa_s, 0.0, in_range) for each in scenario.structures)
     return BlastLoads(tuple(loads), np.zeros(0))
+
+
+def evaluate_against(
+    evaluator: BlastEvaluator, layout: Sequence[Element], threats: Sequence[LoadCase]
+) -> Evaluation:
+    """Compare one layout with no barrier on some threats."""
+    return compare(evaluator, [LoadCaseSet(evaluator.scenario, tuple(threats))], [layout])

@@ -2,8 +2,8 @@
 
 import pytest
 
-from blast_env.evaluation import BlastEvaluator, Evaluation, evaluate_against
-from tests.evaluation.cases import COURTYARD, THREATS, WALL
+from blast_env.evaluation import BlastEvaluator, Evaluation
+from tests.evaluation.cases import COURTYARD, THREATS, WALL, evaluate_against
 from tests.figures import undrawn_package as undrawn_package
 
 

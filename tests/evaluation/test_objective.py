@@ -14,12 +14,12 @@ from blast_env.evaluation import (
     LoadCase,
     LoadCaseSet,
     draw_threats,
-    evaluate_against,
 )
 from blast_env.site import ObjectiveSection, Scenario, ScenarioError
 from blast_env.site.scene import Charge
 from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, WorstRisk
 from blast_env.units import PA_PER_PSI
+from tests.evaluation.cases import evaluate_against
 from tests.gas_sites import WALL, hut, site_document
 
 NEAR, FAR = (LoadCase(Charge(place, 5.0), 0) for place in ((2.0, 4.0), (2.0, 1.5)))

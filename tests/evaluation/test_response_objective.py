@@ -11,7 +11,7 @@ from blast_env.design.search import DesignProblem, find_proposer
 from blast_env.design.surrogate.engine import SurrogateEngine
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet, evaluate_against
+from blast_env.evaluation import BlastEvaluator, LoadCase, LoadCaseSet
 from blast_env.evaluation.engines import find_engine
 from blast_env.geometry import Measure
 from blast_env.layout import LayoutState
@@ -19,6 +19,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import peak_corrected, peak_factor, respond
 from blast_env.site.scene import Charge
 from tests.catalogue_sites import WALL
+from tests.evaluation.cases import evaluate_against
 from tests.site.test_hardening import TAKEN, glazed_yard
 
 THREAT = LoadCase(Charge((2.0, 6.0), 5.0), 0)

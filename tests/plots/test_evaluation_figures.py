@@ -83,7 +83,7 @@ def test_every_threat_has_its_pair_and_the_worst_comes_first(
     assert texts == [
         f"without barrier, mean {evaluation.unprotected_impulse_pa_s.value:,.0f} Pa·s",
         f"with barrier, mean {evaluation.impulse_pa_s.value:,.0f} Pa·s",
-        f"mean of the worst 20 % with barrier, {evaluation.cvar_pa_s:,.0f} Pa·s",
+        f"mean of the worst 20 % with barrier, {evaluation.cvar:,.0f} Pa·s",
     ]
 
 

@@ -47,9 +47,6 @@ class SurrogateEngine(Engine):
     has_peaks: ClassVar[bool] = True
     at_once: ClassVar[int] = 256
     title: ClassVar[str] = "Surrogate"
-    caveat: ClassVar[str] = (
-        "These are predictions of a surrogate, not blasts: judge with engine 'gas'."
-    )
     validated_range: ClassVar[str] = "a validated range: they are predictions of the surrogate"
 
     surrogate: Surrogate = field(default_factory=packaged_surrogate, repr=False)
@@ -91,6 +88,10 @@ class SurrogateEngine(Engine):
                 `safe` is set.
         """
         return self.loads_at_once([EngineBlast(scenario, layout, charge, seed)])[0]
+
+    def caveats(self, scenario: Scenario) -> tuple[str, ...]:  # noqa: ARG002
+        """Return that these are no blasts."""
+        return ("These are predictions of a surrogate, not blasts: judge with engine 'gas'.",)
 
     def loads_at_once(self, blasts: Sequence[EngineBlast]) -> list[BlastLoads]:
         """Return the same for several blasts, by one pass of the networks per site."""

@@ -362,10 +362,8 @@ class Engine(ABC):
         has_noise: Whether one charge has several realisations, selected by a seed.
         has_peaks: Whether it computes overpressures as well as impulses.
         at_once: Largest number of blasts that take less time together than one by one.
-        knows_heights: Whether blasts pass over structures and barriers.
         needs_calibration: Whether a calibration of the scenario converts its impulses to Pa s.
         title: Its kind, for display.
-        caveat: Warning with every result, one sentence; empty for none.
         validated_range: The range in which it was validated, for "outside ...".
         options: Names of the settings that only this engine has.
         medium: What carries its blasts, which decides how they are shown; empty where there is no
@@ -375,10 +373,8 @@ class Engine(ABC):
     has_noise: ClassVar[bool] = False
     has_peaks: ClassVar[bool] = False
     at_once: ClassVar[int] = 1
-    knows_heights: ClassVar[bool] = True
     needs_calibration: ClassVar[bool] = False
     title: ClassVar[str] = "Own engine"
-    caveat: ClassVar[str] = ""
     validated_range: ClassVar[str] = "the validated range of the engine"
     options: ClassVar[tuple[str, ...]] = ()
     medium: ClassVar[Literal["", "gas", "particles"]] = ""
@@ -439,9 +435,9 @@ class Engine(ABC):
         """Return the calibration that converts its impulses to Pa s; `None` if it needs none."""
         return None
 
-    def preset(self, scenario: Scenario) -> str | None:  # noqa: ARG002
-        """Return the name of the preset of parameters in the scenario; `None` if it has none."""
-        return None
+    def caveats(self, scenario: Scenario) -> Sequence[str]:  # noqa: ARG002
+        """Return the warnings with every result on a site, one sentence each."""
+        return ()
 
     @property
     def words(self) -> str:

@@ -61,10 +61,8 @@ class ParticleEngine(Engine):
     """An engine of the particle model, which runs scenes of balls."""
 
     has_noise: ClassVar[bool] = True
-    knows_heights: ClassVar[bool] = False
     needs_calibration: ClassVar[bool] = True
     title: ClassVar[str] = "Particles"
-    caveat: ClassVar[str] = PARTICLES_OVERRATE
     medium: ClassVar[Literal["", "gas", "particles"]] = "particles"
     step_name: ClassVar[str] = "steps"
 
@@ -92,9 +90,9 @@ class ParticleEngine(Engine):
         """Return the scenario's calibration, checked against its parameters and this engine."""
         return scenario_calibration(scenario, self.name)
 
-    def preset(self, scenario: Scenario) -> str:
-        """Return the name of the scenario's parameters."""
-        return scenario.simulation.preset
+    def caveats(self, scenario: Scenario) -> Sequence[str]:
+        """Return that particles overrate barriers, and which heights they ignore."""
+        return (PARTICLES_OVERRATE, *scenario.height_notes)
 
     def describe(self, scenarios: Iterable[Scenario] = ()) -> str:
         """Describe the engine and its presets in one line."""
