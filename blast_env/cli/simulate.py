@@ -36,6 +36,7 @@ from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.engines import BlastResult, Engine, default_engine, find_engine
+from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
 from blast_env.evaluation.engines.pieces import pieces_answer
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
@@ -43,8 +44,6 @@ from blast_env.layout.build_scene import draw_threat
 from blast_env.plots.blast_files import BlastFiles
 from blast_env.site import load_scenario
 from blast_env.site.scene import Charge
-from blast_env.site.sections import buildings_of
-from blast_env.site.structure import ModularObstacle
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
@@ -114,20 +113,6 @@ def simulate(
         show_default="the scenario's first",
         rich_help_panel=_GAS,
     ),
-    film_height_m: float | None = typer.Option(
-        None,
-        "--film-height",
-        help="Height of the film's plan, m.",
-        show_default="1.5",
-        rich_help_panel=_GAS,
-    ),
-    film_section: str | None = typer.Option(
-        None,
-        help="The film's vertical section: x=12.5 or y=4.",
-        metavar="AXIS=M",
-        show_default="through the charge",
-        rich_help_panel=_GAS,
-    ),
     preset: str | None = typer.Option(
         None,
         help="Parameters of this name instead of the scenario's.",
@@ -189,11 +174,8 @@ def _refuse_of_other_engines(context: typer.Context, engine: Engine) -> None:
 def _print_particles(result: BlastResult) -> None:
     """Print a table of the buildings' loads, and the end of the run."""
     blast, scene = result.blast, result.blast.scene
-    obstacles = [each for each in result.obstacles if not each.is_barrier]
-    scaled = {each.name: _scaled(result, each.name) for each in obstacles}
-    names, parts = blast.scenario.building_names, dict[str, list[ModularObstacle]]()
-    for each in obstacles:
-        parts.setdefault(names.get(each.name, each.name), []).append(each)
+    loads, error = _loads(result)
+    impulses = _impulse_texts(loads)
     rows = [
         (
             building_words(blast.scenario, row["building"]),
@@ -202,44 +184,45 @@ def _print_particles(result: BlastResult) -> None:
             f"{row['hits']:,}",
             f"{row['impulse_sim']:,.0f}",
             f"{row['transferred_impulse_sim']:,.0f}",
-            _mean_text(parts.get(row["building"], ()), scaled),
+            impulses.get(row["building"], "-"),
             _number(MS_PER_S * row["first_hit_s"], ".1f", "never"),
         )
         for row in result.buildings.to_dict("records")
     ]
     _print_loads(result, scene.charge, f"seed {blast.seed}", _PARTICLE_HEADERS, rows)
-    notes = {str(each["error"]) for each in scaled.values() if "error" in each}
-    for name, found in scaled.items():
-        where = f"outside the range of the calibration (marked ~): {name}"
-        notes |= {f"{where}, {text}" for text in found.get("notes", ())}
+    outside = "outside the range of the calibration (marked ~)"
+    notes = {f"{outside}: {each.name}, {note}" for each in loads for note in each.notes}
+    notes |= {error} if error else set()
     texts = [*(f"impulse (Pa s): {note}" for note in sorted(notes)), *blast.scenario.height_notes]
     _print_end(result, f"{len(scene.balls):,} balls", result.step_name, texts)
 
 
-def _mean_text(parts: Sequence[ModularObstacle], scaled: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the impulse on a building: the mean over its parts by weight; a dash without one."""
-    counted = [each for each in parts if each.protected] or parts
-    found = [scaled[each.name] for each in counted]
-    if not found or not all("pa_s" in each for each in found):
-        return "-"
-    total = sum(each.weight for each in counted)
-    mean = sum(each.weight * own["pa_s"] / total for each, own in zip(counted, found, strict=True))
-    return f"{'' if all(each['in_range'] for each in found) else '~'}{mean:,.0f}"
+def _loads(result: "BlastResult | GasResult") -> tuple[tuple[StructureLoad, ...], str]:
+    """Return the loads on the structures, or none with the reason."""
+    try:
+        return result.loads().structures, ""
+    except BlastEnvError as error:
+        return (), str(error)
+
+
+def _impulse_texts(loads: Sequence[StructureLoad]) -> dict[str, str]:
+    """Return the impulse on each building, marked if it is outside the range."""
+    return {
+        each.name: f"{'' if each.in_range else '~'}{each.impulse_pa_s:,.0f}"
+        for each in on_buildings(loads)
+    }
 
 
 def _print_gas(result: "GasResult") -> None:
     """Print tables of the buildings' loads and of the gauges, and the end of the run."""
     scenario, charge = result.blast.scenario, result.run.site.charge
-    scaled = {name: _scaled(result, name) for name in result.structures["structure"]}
-    in_range = {
-        name: all(scaled[each.name]["in_range"] for each in parts)
-        for name, parts in buildings_of(scenario.structures).items()
-    }
+    loads, _ = _loads(result)
+    impulses = _impulse_texts(loads)
     rows = [
         (
             building_words(scenario, each["building"]),
             "yes" if each["protected"] else "no",
-            f"{'' if in_range[each['building']] else '~'}{each['impulse_pa_s']:,.0f}",
+            impulses[each["building"]],
             _captured(each),
             f"{each['peak_pa'] / PA_PER_KPA:,.1f}",
             _number(MS_PER_S * each["arrival_s"], ".1f"),
@@ -262,7 +245,7 @@ def _print_gas(result: "GasResult") -> None:
     if gauges:
         print_table("gauges", _GAUGES, gauges)
     print_answer(pieces_answer(result.pieces, "stability of the barrier"))
-    notes = dict.fromkeys(note for each in scaled.values() for note in each.get("notes", ()))
+    notes = dict.fromkeys(note for each in loads for note in each.notes)
     texts = [*standing_lines(scenario, result.buildings, "building")]
     texts += [f"outside the validated range (marked ~): {note}" for note in notes]
     texts += (*result.stepped_notes, *result.moved_gauges)

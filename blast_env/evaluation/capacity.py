@@ -6,7 +6,7 @@ nearer to the building is as severe as a larger one of the same scaled distance.
 all levels.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import log
 from typing import Final
@@ -89,10 +89,15 @@ def mass_near(judged: Consequences, level: LevelOfProtection) -> tuple[float, bo
     kept, lost = 1.0 / MASS_RANGE, MASS_RANGE
     if keeps(lost) or not keeps(kept):
         return charge.tnt_kg * (lost if keeps(lost) else kept), False
+    return charge.tnt_kg * _most_kept(keeps, kept, lost), True
+
+
+def _most_kept(keeps: Callable[[float], bool], kept: float, lost: float) -> float:
+    """Return about the largest of the values that are kept, between one that is and one not."""
     for _ in range(_BISECTIONS):
         middle = (kept * lost) ** 0.5
         kept, lost = (middle, lost) if keeps(middle) else (kept, middle)
-    return charge.tnt_kg * kept, True
+    return kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,14 +163,11 @@ class Ladder:
             low, high = high, high + 1
         if keeps(high) is None:
             return edge(_STEP**low, is_end=True)
-        kept, lost = _STEP**low, _STEP**high
-        for _ in range(_BISECTIONS):
-            middle = (kept * lost) ** 0.5
-            if self._near(middle, nearer).passes(level):
-                kept = middle
-            else:
-                lost = middle
-        return edge(kept)
+
+        def between(severity: float) -> bool:
+            return self._near(severity, nearer).passes(level)
+
+        return edge(_most_kept(between, _STEP**low, _STEP**high))
 
     def curve(
         self, level: LevelOfProtection, uncertainty: Uncertainty, draws: int = CURVE_DRAWS

@@ -140,6 +140,11 @@ class BuildingResponse:
         return bay_standings(self.site, bays, cells_of(self.peak_factor), self.known)
 
     @property
+    def rows(self) -> list[dict[str, object]]:
+        """One row per bay; see `LOADED_BAY_COLUMNS`."""
+        return bay_rows(self.facade, self.known, self.standings)
+
+    @property
     def deciding_bay(self) -> int:
         """The index of the bay with the worst component."""
         facade = self.facade
@@ -483,14 +488,10 @@ BAY_CASE_COLUMNS: Final = (*CASE_COLUMNS, *LOADED_BAY_COLUMNS)
 def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
     """Return one row per layout (by its name), charge and bay; see `BAY_CASE_COLUMNS`."""
     rows = [
-        {"layout": name}
-        | charge_values(each.charge)
-        | row
-        | {"known": each.known.get(str(row["bay"]), False)}
-        | {"standing": stood.standing.label, "reason": stood.reason}
+        {"layout": name} | charge_values(each.charge) | row
         for name, judged in found.items()
         for each in judged.responses
-        for row, stood in zip(bay_rows(each.facade), each.standings, strict=True)
+        for row in each.rows
     ]
     return table_of(rows, BAY_CASE_COLUMNS)
 

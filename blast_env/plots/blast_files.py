@@ -1,7 +1,6 @@
 """The film and the pictures of one blast by either engine, or of two side by side."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,12 +9,10 @@ from typing import TYPE_CHECKING, Any
 from blast_env.errors import BlastEnvError, UnknownNameError, import_extra
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.runner import Tell, share_of
-from blast_env.values import plain_number
 
 if TYPE_CHECKING:  # Numba takes half a second to import
     from blast_env.evaluation.engines.gas import GasBlast, GasResult
     from blast_env.gas.engine import Recorders
-    from blast_env.plots.pressure_frames import VerticalSection
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,8 +28,6 @@ class BlastFiles:
         risk_map: Risks to windows and eardrums.
         quantity: Quantity of the heat map by gas dynamics: impulse, unless peak.
         gauge: Gauge of the history; by default the scenario's first.
-        film_height_m: Height of the film's plan by gas dynamics, m.
-        film_section: Vertical section of the film: x=M or y=M.
     """
 
     film: Path | None = None
@@ -43,29 +38,20 @@ class BlastFiles:
     risk_map: Path | None = None
     quantity: str | None = None
     gauge: str | None = None
-    film_height_m: float | None = None
-    film_section: str | None = None
 
     def check(self, blast: "Blast | GasBlast") -> None:
         """Refuse files that cannot be made, before the blast.
 
         Raises:
-            BlastEnvError: If an option is invalid, or lacks its film, history or gauge.
+            BlastEnvError: If an option is invalid, or lacks its history or gauge.
             MissingExtraError: If the extra `render` is missing for one of them.
         """
         if isinstance(blast, Blast):
             return
-        for option, value in (
-            ("--film-height", self.film_height_m),
-            ("--film-section", self.film_section),
-        ):
-            if value is not None and self.film is None:
-                raise BlastEnvError(f"{option} is for --film: no film is to be written")
         if self.heat_map is not None:
             with import_extra("render", "pictures and films"):
                 from blast_env.plots.gas import kind_of
             kind_of(self.quantity or "impulse")
-        self._section()
         names = [each.name for each in blast.site.gauges]
         if self.history is None:
             if self.gauge is not None:
@@ -97,14 +83,12 @@ class BlastFiles:
             )
         # Here, because films need the extra `render`.
         if is_gas:
-            from blast_env.plots.pressure_film import PLAN_HEIGHT_M, write_pressure_film
+            from blast_env.plots.pressure_film import write_pressure_film
 
             return write_pressure_film(
                 blast,
                 self.film,
                 beside=unprotected,
-                height_m=PLAN_HEIGHT_M if self.film_height_m is None else self.film_height_m,
-                section=self._section(),
                 further=self._recorders(),
                 progress=progress,
             )
@@ -164,26 +148,6 @@ class BlastFiles:
         from blast_env.plots.ground_map import ground_recorders
 
         return ground_recorders
-
-    def _section(self) -> "VerticalSection | None":
-        """Return the section of the film.
-
-        Raises:
-            BlastEnvError: If it is no section.
-        """
-        if self.film_section is None:
-            return None
-        with import_extra("render", "pictures and films"):
-            from blast_env.plots.pressure_frames import VerticalSection
-
-        axis, _, number = self.film_section.partition("=")
-        with suppress(BlastEnvError):
-            at_m = plain_number("--film-section", number)
-            if axis in ("x", "y"):
-                return VerticalSection("x" if axis == "x" else "y", at_m)
-        raise BlastEnvError(
-            f"--film-section is {self.film_section!r}, must be x=M or y=M, e.g. x=12.5"
-        )
 
 
 def _named(path: Path, number: int) -> Path:

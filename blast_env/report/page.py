@@ -17,7 +17,6 @@ import tomli_w
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation.capacity import mass_near
 from blast_env.evaluation.consequences import Verdict
-from blast_env.evaluation.engines.bays import bay_rows
 from blast_env.evaluation.engines.pieces import outcome_words
 from blast_env.evaluation.grid_error import FACTOR, ORDER, worse
 from blast_env.evaluation.probability import level_probability, probability_text
@@ -325,18 +324,14 @@ def _bay_tables(study: Study) -> list[BayTable]:
     for unprotected, protected in zip(
         study.unprotected.responses, study.protected.responses, strict=True
     ):
-        standings = {
-            each.bay.name: stood.standing.label
-            for each, stood in zip(protected.facade.bays, protected.standings, strict=True)
-        }
-        both = list(zip(bay_rows(unprotected.facade), bay_rows(protected.facade), strict=True))
+        both = list(zip(unprotected.rows, protected.rows, strict=True))
         # "5" is worse than "3b", and "3b" than "3a": the order of texts is right.
         both.sort(key=lambda rows: (str(rows[1]["condition"]), _share(rows[1])), reverse=True)
         rows = tuple(
             (
                 str(first["bay"]),
                 *(text for each in (first, second) for text in _bay_texts(each)),
-                standings[str(first["bay"])],
+                str(second["standing"]),
             )
             for first, second in both[:_MOST_BAYS]
         )

@@ -38,7 +38,6 @@ BAD: dict[str, str] = {
     ),
     f"{GAS} --preset ballistic": "--preset is for particles",
     f"{GAS} --gauge front": "--gauge is for --history: no history is to be drawn",
-    f"{GAS} --film a.mp4 --film-section z=1": "must be x=M or y=M, e.g. x=12.5",
     f"{GAS} --impulse-map a.png --side-by-side": "--layout is missing",
     f"{GAS} --cell 0.2": "cell_m is 0.2, must be 0.5 m",
     "simulate hut.toml --engine event --impulse-map a.png": "--impulse-map is for gas dynamics",

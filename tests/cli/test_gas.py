@@ -66,7 +66,7 @@ def test_a_layout_and_the_empty_site_are_shown_in_every_picture(
     layout = write_layout(tmp_path / "wall.json", hut(), WALL, {"made by": "hand"})
     names = ("heat-map", "history", "impulse-map")
     options = [text for name in names for text in (f"--{name}", tmp_path / f"{name}.svg")]
-    film = ("--film", tmp_path / "film.gif", "--film-height", 1, "--film-section", "x=3")
+    film = ("--film", tmp_path / "film.gif")
     chosen = ("--gauge", "behind", "--quantity", "peak", "--side-by-side", *film)
     result = run("simulate", site, "--engine", "gas", "--layout", layout, *options, *chosen)
     assert result.exit_code == 0, result.output

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.standing import STANDING_COLUMNS, bay_standings
+from blast_env.evaluation.standing import STANDING_COLUMNS, Stood, bay_standings
 from blast_env.gas.ending import is_known
 from blast_env.gas.settings import FACE_NAMES
 from blast_env.gas.tables import KNOWN_COLUMN
@@ -134,13 +134,7 @@ class BayLoads:
         known = self.known(run)
         cells = cbrt(run.site.charge.tnt_kg) / run.grid.cell_m
         standings = bay_standings(run.site, [each.bay for each in self.bays], cells, known)
-        rows = [
-            row
-            | {"known": known[str(row["bay"])]}
-            | {"standing": stood.standing.label, "reason": stood.reason}
-            for row, stood in zip(bay_rows(self.response), standings, strict=True)
-        ]
-        return table_of(rows, LOADED_BAY_COLUMNS)
+        return table_of(bay_rows(self.response, known, standings), LOADED_BAY_COLUMNS)
 
     def known(self, run: "GasRun") -> dict[str, bool]:
         """Return whether the load of each bay was known at the end of the run, by its name."""
@@ -207,8 +201,16 @@ def unjudged_walls(
     return tuple(found)
 
 
-def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
-    """Return the response of bays, one row each, with the keys of `BAY_COLUMNS`."""
+def bay_rows(
+    found: FacadeResponse, known: Mapping[str, bool], standings: Sequence[Stood]
+) -> list[dict[str, object]]:
+    """Return the response of bays, one row each, with the keys of `LOADED_BAY_COLUMNS`.
+
+    Args:
+        found: The response.
+        known: Whether the loads are known, by bay.
+        standings: The standing of each load.
+    """
     panes = {index: row for row, index in enumerate(found.glazed.tolist())}
     panels = {index: row for row, index in enumerate(found.walled.tolist())}
     rows = []
@@ -234,6 +236,9 @@ def bay_rows(found: FacadeResponse) -> list[dict[str, object]]:
             "damage": "",
             "edge_force_n_m": np.nan,
             "support_force_n_m": np.nan,
+            "known": known.get(bay.name, False),
+            "standing": standings[index].standing.label,
+            "reason": standings[index].reason,
         }
         if index in panes:
             pane = panes[index]
