@@ -29,8 +29,7 @@ from blast_env.envs.strategies import (
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import BlastEvaluator, Evaluators
-from blast_env.evaluation.problem import Assessment, DesignProblem
+from blast_env.evaluation.evaluator import Assessment, BlastEvaluator, DesignProblem, Evaluators
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnySource, Scenario

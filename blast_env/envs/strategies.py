@@ -9,7 +9,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.problem import DesignProblem
+from blast_env.evaluation.evaluator import DesignProblem
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
 from blast_env.site.vehicles import source_of

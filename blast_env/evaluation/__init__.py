@@ -4,9 +4,14 @@ from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_th
 from blast_env.evaluation.comparison import Evaluation, ThreatOutcome
 from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad, StructureLoad
 from blast_env.evaluation.evaluate import compare, evaluate_layout
-from blast_env.evaluation.evaluator import BlastEvaluator, BudgetError, Evaluators
+from blast_env.evaluation.evaluator import (
+    Assessment,
+    BlastEvaluator,
+    BudgetError,
+    DesignProblem,
+    Evaluators,
+)
 from blast_env.evaluation.grid_error import GridError, convergence_index
-from blast_env.evaluation.problem import Assessment, DesignProblem
 from blast_env.evaluation.store import BlastKey, BlastStore
 from blast_env.statistics import (
     CVAR_LEVEL,

@@ -1,9 +1,8 @@
 """The largest charge at a place, and the least stand-off of a charge, that keep a level.
 
 Blasts are run on a ladder of charges, each 1.69 times as severe as the one before; between them,
-histories are scaled by at most a factor of 1.3 in mass (`blast_env.evaluation.scaling`). A charge
-nearer to the building is as severe as a larger one of the same scaled distance. The blasts serve
-all levels.
+histories are scaled by at most a factor of 1.3 in mass (`scaled_to`). A charge nearer to the
+building is as severe as a larger one of the same scaled distance. The blasts serve all levels.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,8 +14,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import AnswerPart, AnswerTable
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.probability import Uncertainty, level_probability
-from blast_env.evaluation.scaling import MASS_RANGE, scaled_to
+from blast_env.evaluation.probability import MASS_RANGE, Uncertainty, level_probability, scaled_to
 from blast_env.evaluation.shared import shared_consequences
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import charge_against

@@ -316,6 +316,16 @@ def check_distinct(threats: Sequence[LoadCase]) -> None:
             raise BlastEnvError(f"threats[{index}] is {threat}, appears twice, must be unique")
 
 
+def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
+    """Refuse a case whose load without a barrier is 0 under every threat (cases, threats)."""
+    for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
+        if not mean > 0.0:
+            raise BlastEnvError(
+                f"{case.name or case.scenario.name}: nothing arrives at the protected structures "
+                f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
+            )
+
+
 def _spread_first(charges: Sequence[AnyCharge]) -> list[AnyCharge]:
     """Order charges: those of vehicles by rank, then the central one, then by largest distance.
 

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCase, LoadCaseSet
+from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_something_arrives
 from blast_env.evaluation.engines.contract import (
     BlastLoads,
     Engine,
@@ -157,16 +156,6 @@ def charge_values(charge: Charge) -> dict[str, object]:
     """Return the values of `CHARGE_COLUMNS`."""
     values = (*charge.position_m, charge.height_m, charge.tnt_kg)
     return {column.name: value for column, value in zip(CHARGE_COLUMNS, values, strict=True)}
-
-
-def check_something_arrives(cases: Sequence[LoadCaseSet], unprotected: FloatArray) -> None:
-    """Refuse a case whose load without a barrier is 0 under every threat (cases, threats)."""
-    for case, mean in zip(cases, np.atleast_2d(unprotected).mean(axis=1), strict=True):
-        if not mean > 0.0:
-            raise BlastEnvError(
-                f"{case.name or case.scenario.name}: nothing arrives at the protected structures "
-                f"without a barrier ({len(case.threats)} threats): there is nothing to reduce"
-            )
 
 
 @dataclass(frozen=True)

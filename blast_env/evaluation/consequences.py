@@ -34,8 +34,7 @@ from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls,
 from blast_env.evaluation.engines.contract import BlastLoads, Engine
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
-from blast_env.evaluation.places import BayPlaces, bay_places
-from blast_env.evaluation.standing import Stood, bay_standings
+from blast_env.evaluation.standing import BayPlaces, Stood, bay_places, bay_standings
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.gas.tables import means_by_wall

@@ -9,9 +9,10 @@ Five quantities are uncertain, and drawn once for all charges and bays:
   that of `blast_env.response.glass`;
 - the resistance of wall panels: log-normal.
 
-No blast is run: histories are scaled. Pressures and times follow Kingery and Bulmash's reflected
-peak and impulse for the other mass at the distance of the bay (Hopkinson-Cranz scaling). Errors of
-the load multiply the pressures, so that the impulse scatters as much as the peak.
+No blast is run: histories are scaled (Hopkinson-Cranz). At the distance of each bay, Kingery and
+Bulmash's reflected peak and impulse of both charges give the factors on the pressures and on the
+times of its history. This leaves shielding and echoes as they are. Errors of the load multiply the
+pressures, so that the impulse scatters as much as the peak.
 
 Only the bays that can decide are drawn: of each component those with the largest damage, peak and
 impulse. The response that counts is the worst of those with and without suction and with and
@@ -19,7 +20,7 @@ without sharper peaks, as in a verdict; which of them is found without draws.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan, log, nan, sqrt
 from typing import Final
 
@@ -29,12 +30,66 @@ from blast_env.arrays import FloatArray, IntArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.consequences import BuildingResponse, Consequences
 from blast_env.evaluation.grid_error import GridError
-from blast_env.evaluation.scaling import MASS_RANGE, load_factors
+from blast_env.evaluation.standing import bay_places
+from blast_env.particles.calibration.references import Quantity, burst_of, within_curves
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
-from blast_env.response.facade import LoadDraws, drawn_levels, pushes
+from blast_env.response.facade import LoadDraws, drawn_levels, pushes, rescaled, respond
 from blast_env.response.sdof import impulses
+from blast_env.site.scene import Charge
 from blast_env.values import generator
+
+MASS_RANGE: Final = 1.3
+"""Largest factor on the mass of a charge, and on its inverse, for which histories are scaled."""
+
+
+def load_factors(
+    charge: Charge,
+    distance_m: FloatArray | float,
+    other_kg: FloatArray | float,
+    other_m: FloatArray | float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the factors on pressures and on times for another mass or distance.
+
+    Distances are those from the charge and from the other one; the masses of the other one have a
+    shape that broadcasts with them.
+    """
+    old = np.broadcast_arrays(distance_m, charge.tnt_kg, other_m, other_kg)[:2]
+    new = np.broadcast_arrays(other_m, other_kg, distance_m)[:2]
+    peaks, impulses = (
+        _curve(quantity, charge, *new) / _curve(quantity, charge, *old)
+        for quantity in ("reflected_overpressure", "reflected_impulse")
+    )
+    return peaks, impulses / peaks
+
+
+def _curve(
+    quantity: Quantity, charge: Charge, distance_m: FloatArray, tnt_kg: FloatArray
+) -> FloatArray:
+    return within_curves(quantity, distance_m, tnt_kg, burst_of(charge.height_m, charge.tnt_kg))
+
+
+def scaled_to(judged: Consequences, charge: Charge) -> Consequences:
+    """Return the consequences of another charge for buildings with a facade, without a blast.
+
+    It may be of another mass or at another place than the one charge of `judged`.
+    """
+    return Consequences(
+        tuple(_scaled(each, charge) for each in judged.responses),
+        unchecked=judged.unchecked,
+        unjudged=judged.unjudged,
+    )
+
+
+def _scaled(response: BuildingResponse, charge: Charge) -> BuildingResponse:
+    assert response.site is not None
+    facade, old = response.on_cells, response.site.charge
+    site = replace(response.site, charge=charge)
+    other_m = bay_places(site, [each.bay for each in facade.bays]).distance_m
+    factors = load_factors(old, response.places.distance_m, charge.tnt_kg, other_m)
+    histories = rescaled(facade.time_s, facade.pressure_pa, *factors)
+    return replace(response, charge=charge, site=site, on_cells=respond(facade.bays, *histories))
+
 
 DRAWS: Final = 1000
 """Default number of draws."""

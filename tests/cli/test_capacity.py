@@ -9,7 +9,7 @@ import blast_env
 from blast_env.cli import app
 from blast_env.evaluation import BlastEvaluator, capacity
 from blast_env.evaluation.consequences import Consequences, consequences
-from blast_env.evaluation.scaling import scaled_to
+from blast_env.evaluation.probability import scaled_to
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge
 from blast_env.site.scene import Charge

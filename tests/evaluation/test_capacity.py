@@ -9,8 +9,7 @@ from blast_env.evaluation import BlastEvaluator, capacity
 from blast_env.evaluation.capacity import Edge, Ladder
 from blast_env.evaluation.consequences import Consequences, consequences
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.probability import Uncertainty
-from blast_env.evaluation.scaling import scaled_to
+from blast_env.evaluation.probability import Uncertainty, scaled_to
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site.scene import Charge
 from tests.gas_sites import glazed_hut

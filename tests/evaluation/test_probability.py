@@ -13,8 +13,8 @@ from blast_env.evaluation.probability import (
     Uncertainty,
     level_probability,
     probability_text,
+    scaled_to,
 )
-from blast_env.evaluation.scaling import scaled_to
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.sdof import impulses
 from blast_env.site.scene import Charge

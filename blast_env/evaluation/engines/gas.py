@@ -69,6 +69,7 @@ from blast_env.site import (
     AnyCharge,
     AnyScenario,
     Scenario,
+    ScenarioField,
     VehicleCharge,
     find_scenario,
 )
@@ -196,6 +197,7 @@ class GasEngine(GasSettings, Engine):
 class GasBlast(RunnableBlast):
     """One blast of the gas engine, ready to run."""
 
+    scenario: ScenarioField = ScenarioField()  # again, because mypy takes it for no field here
     engine: GasEngine = field(default_factory=GasEngine)
 
     @cached_property

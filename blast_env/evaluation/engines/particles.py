@@ -34,7 +34,7 @@ from blast_env.particles.calibration.model import (
 from blast_env.particles.run import BallStates, BlastRun, CollisionArray, EndReason
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
 from blast_env.provenance import versions
-from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
 from blast_env.site.scene import Scene
 from blast_env.site.structure import ModularObstacle
 from blast_env.values import path_of
@@ -147,6 +147,7 @@ def find_particle_engine(engine: str | Engine) -> ParticleEngine:
 class Blast(RunnableBlast):
     """One blast of a particle engine, which may be given by its name."""
 
+    scenario: ScenarioField = ScenarioField()  # again, because mypy takes it for no field here
     engine: str | Engine = "pymunk"
 
     @cached_property
