@@ -11,8 +11,9 @@ import numpy as np
 from blast_env import load_scenario, simulate
 from blast_env.design.surrogate.relations import relations
 from blast_env.design.surrogate.ways import Ways
-from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.shared import consequences
 from blast_env.gas.faces import ground_faces
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
@@ -63,7 +64,7 @@ def driving() -> None:
 def response() -> None:
     """Of facades and pieces, after a blast on cells that are merged."""
     site = glazed_hut()
-    consequences(site, WALL, [draw_charge(site, 0)], GasEngine(cells="coarse"))
+    consequences(BlastEvaluator(site, GasEngine(cells="coarse")), WALL, [draw_charge(site, 0)])
 
 
 def main() -> None:

@@ -49,7 +49,6 @@ from blast_env.evaluation.consequences import (
     BuildingResponse,
     Consequences,
     bay_table,
-    consequences,
     piece_table,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
@@ -65,6 +64,7 @@ from blast_env.evaluation.screening import (
     facades_for,
 )
 from blast_env.evaluation.screening import screen as screen_site
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
 from blast_env.provenance import versions
@@ -325,10 +325,10 @@ def _by_gas(
     """Return the consequences of each worst place by gas dynamics."""
     print_line(engine.describe([scenario]))
     print_cost((engine, scenario, each.charge) for each in found.threats)
-    result = {}
+    result, evaluator = {}, BlastEvaluator(scenario, engine)
     with progress_bar(f"{len(found.threats)} blasts") as progress:
         for number, each in enumerate(found.threats, start=1):
-            result[each.name] = consequences(scenario, layout, [each.charge], engine)
+            result[each.name] = consequences(evaluator, layout, [each.charge])
             progress(number / len(found.threats))
     return result
 

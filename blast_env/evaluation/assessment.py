@@ -21,7 +21,6 @@ from blast_env.evaluation.consequences import (
     Consequences,
     Neighbour,
     Verdict,
-    consequences,
     other_glazing,
 )
 from blast_env.evaluation.engines.contract import Engine
@@ -29,7 +28,7 @@ from blast_env.evaluation.engines.pieces import pieces_answer
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.grid_error import GridError, convergence_index
 from blast_env.evaluation.probability import Uncertainty, level_probability
-from blast_env.evaluation.shared import shared_consequences
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.requirements import Requirement
@@ -234,16 +233,12 @@ def assess(
     def all_of(
         engine: Engine, charges: Sequence[AnyCharge], tell: Tell | None
     ) -> dict[str, Consequences]:
-        found = {}
+        found, evaluator = {}, BlastEvaluator(scenario, engine, cache=cache)
         for number, (name, layout) in enumerate(layouts.items()):
             part = share_of(tell, number, len(layouts))
-            if without_fallen:
-                found[name] = consequences(
-                    scenario, layout, charges, engine, part, without_fallen=True
-                )
-                continue
-            evaluator = BlastEvaluator(scenario, engine, cache=cache)
-            found[name] = shared_consequences(evaluator, layout, charges, part)
+            found[name] = consequences(
+                evaluator, layout, charges, part, without_fallen=without_fallen
+            )
         return found
 
     found = all_of(engine, charges, share_of(progress, 0, 100, 100 - _COARSER))

@@ -15,7 +15,7 @@ from blast_env.evaluation.answers import AnswerPart, AnswerTable
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.probability import MASS_RANGE, Uncertainty, level_probability, scaled_to
-from blast_env.evaluation.shared import shared_consequences
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import charge_against
 from blast_env.response.buildings import LevelOfProtection
@@ -189,7 +189,7 @@ class Ladder:
 
     def _blast(self, charge: Charge, number: int) -> Consequences | None:
         try:
-            return shared_consequences(self.evaluator, self.layout, [charge])
+            return consequences(self.evaluator, self.layout, [charge])
         except BlastEnvError:
             if number == 0:
                 raise

@@ -18,7 +18,7 @@ In the open the first is exact. The second is within 7 % of Kingery and Bulmash'
 reflected pressure round the edges of a small wall, and coarse cells underestimate peaks.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
@@ -28,18 +28,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from blast_env.arrays import FloatArray
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation.comparison import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
-from blast_env.evaluation.engines.contract import BlastLoads, Engine
+from blast_env.evaluation.engines.contract import BlastLoads
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.standing import BayPlaces, Stood, bay_places, bay_standings
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.gas.tables import means_by_wall
-from blast_env.geometry import Element, Layout
-from blast_env.layout.build_scene import charge_against
+from blast_env.geometry import Layout
 from blast_env.response.buildings import (
     BuildingDamage,
     LevelOfProtection,
@@ -58,7 +56,7 @@ from blast_env.response.facade import (
 from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
 from blast_env.response.walls import DamageLevel
-from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
+from blast_env.site import Scenario
 from blast_env.site.facade import with_glass
 from blast_env.site.scene import WALLS, BlastSite, Charge
 from blast_env.site.sections import buildings_of
@@ -506,42 +504,6 @@ def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
     return table_of(rows, (*CASE_COLUMNS, *PIECE_COLUMNS))
 
 
-def consequences(
-    scenario: AnyScenario,
-    layout: Sequence[Element],
-    charges: Iterable[AnyCharge],
-    engine: Engine,
-    progress: Callable[[float], None] | None = None,
-    *,
-    without_fallen: bool = False,
-) -> Consequences:
-    """Run one blast per charge and return the consequences for the buildings behind a layout.
-
-    `without_fallen` removes pieces that overturn before the end of a blast, and repeats the blast
-    until no other piece falls.
-
-    Raises:
-        BlastEnvError: If no structure has a facade, or the engine computes no overpressure or
-            records no bays.
-    """
-    found = find_scenario(scenario)
-    if not found.bays:
-        raise BlastEnvError(
-            f"scenario {found.name!r}: no structure has a facade with bays: add [structures.facade]"
-        )
-    if not engine.has_peaks:
-        raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
-    parts: list[Consequences] = []
-    every = list(charges)
-    for number, charge in enumerate(every, start=1):
-        where = charge_against(found, layout, charge)
-        result, fallen = _blast(found, tuple(layout), charge, where, engine, without_fallen)
-        parts.append(consequences_of(found, result, where, fallen))
-        if progress is not None:
-            progress(number / len(every))
-    return Consequences.together(parts)
-
-
 def consequences_of(
     scenario: Scenario, result: "GasResult", charge: Charge, taken_away: Layout = ()
 ) -> Consequences:
@@ -580,29 +542,6 @@ def unchecked(scenario: Scenario, result: "GasResult") -> Iterator[tuple[str, st
             if scaled_distance(result.run.site, outline) < CHECKED_SCALED_DISTANCE[0]:
                 own[_BREACH] = None
     yield from ((building, "; ".join(own)) for building, own in reasons.items() if own)
-
-
-def _blast(
-    scenario: Scenario,
-    layout: Layout,
-    charge: AnyCharge,
-    where: Charge,
-    engine: Engine,
-    without_fallen: bool,
-) -> tuple[Any, Layout]:
-    """Return the result of a blast, and the pieces that were removed for it."""
-    fallen: Layout = ()
-    result: Any = engine.blast(scenario, layout, 0, charge).run()
-    if getattr(result, "bay_loads", None) is None:
-        raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
-    while without_fallen and result.piece_loads is not None:
-        falling = result.piece_loads.fallen(result.time_s)
-        if not falling:
-            break
-        fallen += falling
-        standing = tuple(each for each in layout if each not in fallen)
-        result = engine.blast(scenario, standing, 0, where).run()
-    return result, fallen
 
 
 def by_building(

@@ -1,33 +1,34 @@
-"""The consequences of blasts in a store, so that commands with the same charges share them.
+"""The consequences of charges, with blasts in a store, so that commands share them.
 
 A content has the histories of the bays, from which the response is computed again, and the other
 numbers as they were. Its key has all inputs: those of the blast, and the whole site and layout.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter
 
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.consequences import (
     BarrierResponse,
     Consequences,
     Neighbour,
     by_building,
-    consequences,
+    consequences_of,
 )
 from blast_env.evaluation.engines.bays import UnjudgedWalls
 from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.geometry import Layout
-from blast_env.layout.build_scene import build_site
+from blast_env.geometry import Element, Layout
+from blast_env.layout.build_scene import build_site, charge_against
 from blast_env.response.facade import respond
 from blast_env.site import AnyCharge, Scenario
 from blast_env.tables import table_of
@@ -54,29 +55,75 @@ class _Header:
 _HEADER: Final = TypeAdapter(_Header)
 
 
-def shared_consequences(
+def consequences(
     evaluator: BlastEvaluator,
-    layout: Layout,
-    charges: Sequence[AnyCharge],
+    layout: Sequence[Element],
+    charges: Iterable[AnyCharge],
     progress: Callable[[float], None] | None = None,
+    *,
+    without_fallen: bool = False,
 ) -> Consequences:
-    """Return `consequences`, with those of blasts in the store of an evaluator; others are kept.
+    """Return the consequences of charges for the buildings behind a layout, by a blast for each.
 
-    The evaluator is that of the scenario, with gas dynamics.
+    Those in the store of the evaluator need no blast; others are kept there. `without_fallen`
+    removes pieces that overturn before the end of a blast, and repeats the blast until no other
+    piece falls; such blasts are not kept.
+
+    Raises:
+        BlastEnvError: If no structure has a facade, or the engine computes no overpressure or
+            records no bays.
     """
-    scenario, parts = evaluator.scenario, []
-    for number, charge in enumerate(charges, start=1):
-        decode = partial(_decoded, scenario=scenario, layout=layout, charge=charge)
-        found = evaluator.store.read(_key(evaluator, layout, charge), decode)
-        if found is None:
-            found = consequences(scenario, layout, [charge], evaluator.engine)
-            keep_consequences(evaluator, layout, charge, found)
-            if not scenario.objective.is_response:  # whose loads have the damage of bays
-                evaluator.keep(layout, LoadCase(charge), *found.loads)
-        parts.append(found)
+    scenario, engine = evaluator.scenario, evaluator.engine
+    if not scenario.bays:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r}: no structure has a facade with bays: add "
+            "[structures.facade]"
+        )
+    if not engine.has_peaks:
+        raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
+    parts, every = [], list(charges)
+    for number, charge in enumerate(every, start=1):
+        of_one = _without_fallen if without_fallen else _shared
+        parts.append(of_one(evaluator, tuple(layout), charge))
         if progress is not None:
-            progress(number / len(charges))
+            progress(number / len(every))
     return Consequences.together(parts)
+
+
+def _shared(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> Consequences:
+    scenario = evaluator.scenario
+    decode = partial(_decoded, scenario=scenario, layout=layout, charge=charge)
+    found = evaluator.store.read(_key(evaluator, layout, charge), decode)
+    if found is None:
+        where = charge_against(scenario, layout, charge)
+        found = consequences_of(scenario, _blasted(evaluator, layout, charge), where)
+        keep_consequences(evaluator, layout, charge, found)
+        if not scenario.objective.is_response:  # whose loads have the damage of bays
+            evaluator.keep(layout, LoadCase(charge), *found.loads)
+    return found
+
+
+def _without_fallen(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> Consequences:
+    fallen: Layout = ()
+    where = charge_against(evaluator.scenario, layout, charge)
+    result = _blasted(evaluator, layout, charge)
+    while result.piece_loads is not None:
+        falling = result.piece_loads.fallen(result.time_s)
+        if not falling:
+            break
+        fallen += falling
+        standing = tuple(each for each in layout if each not in fallen)
+        result = _blasted(evaluator, standing, where)
+    return consequences_of(evaluator.scenario, result, where, fallen)
+
+
+def _blasted(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> Any:
+    """Return the result of a blast, with its bays."""
+    engine = evaluator.engine
+    result: Any = engine.blast(evaluator.scenario, layout, 0, charge).run()
+    if getattr(result, "bay_loads", None) is None:
+        raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
+    return result
 
 
 def keep_consequences(

@@ -12,8 +12,8 @@ from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.session import Session, Sessions
 from blast_env.errors import BlastEnvError, LayoutError
-from blast_env.evaluation.consequences import consequences
-from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout, Measure, Piece
 from blast_env.site import Scenario, ScenarioError
 from tests.app.here import Here, rows_of
@@ -57,7 +57,7 @@ def test_a_measure_changes_cost_and_verdict_but_no_blast(blasted: Session) -> No
     there = blasted.folder.blasts_there()
     blasted.harden("glass", taken=True)
     _, after = rows_of(blasted.verdicts())
-    found = consequences(blasted.scenario, (*WALL, GLASS), [threat.charge], find_engine("gas"))
+    found = consequences(BlastEvaluator(blasted.scenario, "gas"), (*WALL, GLASS), [threat.charge])
     facade = found.responses[0].facade
     assert after.panes_broken == f"{facade.broken_panes:.1f} of {facade.panes}"
     assert after.worst_pane == facade.worst_condition.words

@@ -31,10 +31,9 @@ from blast_env.app.verdicts import verdict_table
 from blast_env.app.work import Status, Teller, read_status, write_status
 from blast_env.design.search import ProposerKind, proposers
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import LoadCase, StructureLoad, evaluate_layout
-from blast_env.evaluation.consequences import consequences
-from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation import BlastEvaluator, LoadCase, StructureLoad, evaluate_layout
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.report import StudyOptions
 from blast_env.response.buildings import LevelOfProtection
@@ -186,7 +185,7 @@ def test_the_table_of_buildings_says_what_the_library_says(gas: Session) -> None
         ("no barrier", threat.name, "hut"),
         ("A", threat.name, "hut"),
     ]
-    found = consequences(glazed_hut(), WALL, [threat.charge], find_engine("gas"))
+    found = consequences(BlastEvaluator(glazed_hut(), "gas"), WALL, [threat.charge])
     (facade,) = (each.facade for each in found.of("hut"))
     assert rows[1].level_of_protection == found.level_words("hut")
     assert rows[1].panes_broken == f"{facade.broken_panes:.1f} of {facade.panes}"

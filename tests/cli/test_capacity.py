@@ -8,8 +8,9 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.evaluation import BlastEvaluator, capacity
-from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.probability import scaled_to
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.site import AnyCharge
 from blast_env.site.scene import Charge
@@ -26,12 +27,10 @@ def test_a_row_for_each_layout_and_place(tmp_path: Path, monkeypatch: pytest.Mon
     def scaled(evaluator: BlastEvaluator, layout: Layout, charges: list[AnyCharge]) -> Consequences:
         (charge,) = charges
         assert isinstance(charge, Charge)
-        first[1:] = first[:1] or [
-            consequences(evaluator.scenario, layout, charges, evaluator.engine)
-        ]
+        first[1:] = first[:1] or [consequences(evaluator, layout, charges)]
         return scaled_to(first[-1], charge)
 
-    monkeypatch.setattr(capacity, "shared_consequences", scaled)
+    monkeypatch.setattr(capacity, "consequences", scaled)
     options = ("--tnt-kg", "0.1", "--cell", "0.5", "--layout", layout)
     done = CliRunner().invoke(app, ["assess", "--capacity", *map(str, (site, *options))])
     assert done.exit_code == 0, done.output

@@ -7,9 +7,10 @@ import pytest
 
 from blast_env.evaluation import BlastEvaluator, capacity
 from blast_env.evaluation.capacity import Edge, Ladder
-from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.probability import Uncertainty, scaled_to
+from blast_env.evaluation.shared import consequences
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site.scene import Charge
 from tests.gas_sites import glazed_hut
@@ -19,7 +20,7 @@ CHARGE = Charge((2.0, 4.0), 0.1)
 
 @pytest.fixture(scope="module")
 def blast() -> Consequences:
-    return consequences(glazed_hut(), (), [CHARGE], GasEngine())
+    return consequences(BlastEvaluator(glazed_hut(), GasEngine()), (), [CHARGE])
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def ladder(blast: Consequences, monkeypatch: pytest.MonkeyPatch) -> Ladder:
         evaluator.scenario.with_charge(charges[0])
         return scaled_to(blast, charges[0])
 
-    monkeypatch.setattr(capacity, "shared_consequences", scaled)
+    monkeypatch.setattr(capacity, "consequences", scaled)
     return Ladder(BlastEvaluator(glazed_hut(), GasEngine()), (), CHARGE)
 
 

@@ -2,8 +2,10 @@
 
 import pytest
 
-from blast_env.evaluation.consequences import Consequences, bay_table, consequences
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.consequences import Consequences, bay_table
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine
+from blast_env.evaluation.shared import consequences
 from blast_env.report.loads import measure, targets_of
 from blast_env.site.scene import Charge
 from tests.gas_sites import glazed_hut, hut
@@ -14,7 +16,7 @@ CUT, WHOLE = GasEngine(border_m=0.0, until=0.012), GasEngine(border_m=0.0, until
 
 def judged(engine: GasEngine) -> Consequences:
     scenario = glazed_hut()
-    return consequences(scenario, (), [Charge((2.0, 4.0), 5.0)], engine)
+    return consequences(BlastEvaluator(scenario, engine), (), [Charge((2.0, 4.0), 5.0)])
 
 
 def test_bays_that_are_cut_off_are_flagged() -> None:

@@ -7,17 +7,18 @@ import numpy as np
 import pytest
 
 from blast_env.calibration import kingery_bulmash
+from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.consequences import (
     BuildingResponse,
     Consequences,
     bay_table,
-    consequences,
     piece_table,
     side_on_impulse_pa_s,
     side_on_peak_pa,
 )
 from blast_env.evaluation.engines import simulate
 from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.response.buildings import BuildingDamage, LevelOfProtection
 from blast_env.response.facade import peak_corrected, peak_factor, respond
@@ -41,7 +42,8 @@ def site(**wall: Any) -> Scenario:
 def judge(
     scenario: Scenario, layout: Layout, without_fallen: bool = False, charge: Charge = CHARGE
 ) -> Consequences:
-    return consequences(scenario, layout, [charge], GasEngine(), without_fallen=without_fallen)
+    evaluator = BlastEvaluator(scenario, GasEngine())
+    return consequences(evaluator, layout, [charge], without_fallen=without_fallen)
 
 
 @pytest.fixture(scope="module")

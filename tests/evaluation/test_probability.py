@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.consequences import Consequences, consequences
+from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.probability import (
     LevelProbability,
@@ -15,6 +16,7 @@ from blast_env.evaluation.probability import (
     probability_text,
     scaled_to,
 )
+from blast_env.evaluation.shared import consequences
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.sdof import impulses
 from blast_env.site.scene import Charge
@@ -25,7 +27,9 @@ CERTAIN = Uncertainty(mass=0.0, scatter=0.0, in_sight=0.0, in_shade=0.0, panels=
 
 
 def judge(tnt_kg: float = CHARGE.tnt_kg) -> Consequences:
-    return consequences(glazed_hut(), WALL, [CHARGE._replace(tnt_kg=tnt_kg)], GasEngine())
+    return consequences(
+        BlastEvaluator(glazed_hut(), GasEngine()), WALL, [CHARGE._replace(tnt_kg=tnt_kg)]
+    )
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.consequences import Consequences, bay_table, piece_table
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.shared import shared_consequences
+from blast_env.evaluation.shared import consequences
 from blast_env.site import Scenario
 from blast_env.site.scene import Charge
 from tests.report.sites import LAYOUT, glazed_hut
@@ -28,9 +28,9 @@ def tables(found: Consequences) -> tuple[pd.DataFrame, pd.DataFrame]:
 def test_a_stored_blast_has_the_same_consequences(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = shared_consequences(evaluator(tmp_path), LAYOUT, [CHARGE])
-    monkeypatch.setattr("blast_env.evaluation.shared.consequences", None)  # no blast
-    again = shared_consequences(evaluator(tmp_path), LAYOUT, [CHARGE])
+    first = consequences(evaluator(tmp_path), LAYOUT, [CHARGE])
+    monkeypatch.setattr("blast_env.evaluation.shared._blasted", None)  # no blast
+    again = consequences(evaluator(tmp_path), LAYOUT, [CHARGE])
     for table, same in zip(tables(first), tables(again), strict=True):
         pd.testing.assert_frame_equal(table, same, check_exact=True)
     assert len(tables(first)[0]) > 0
@@ -45,4 +45,4 @@ def test_a_stored_blast_has_the_same_consequences(
     known.loads(LAYOUT, LoadCase(CHARGE))
     assert known.counts.blasts == 0  # an evaluation has the loads of the same blast, too
     with pytest.raises(TypeError):
-        shared_consequences(known, (), [CHARGE])  # another layout is another blast
+        consequences(known, (), [CHARGE])  # another layout is another blast

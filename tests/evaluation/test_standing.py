@@ -2,9 +2,10 @@
 
 import pytest
 
-from blast_env.evaluation import LoadCase, evaluate_layout
-from blast_env.evaluation.consequences import bay_table, consequences
+from blast_env.evaluation import BlastEvaluator, LoadCase, evaluate_layout
+from blast_env.evaluation.consequences import bay_table
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.shared import consequences
 from blast_env.evaluation.standing import LoadStanding, standing_of
 from blast_env.geometry import Layout
 from blast_env.site.scene import Charge
@@ -34,7 +35,7 @@ def test_the_worst_reason_decides(
 
 
 def test_bays_have_their_standing_in_tables_and_the_deciding_one_in_the_verdict() -> None:
-    found = consequences(glazed_hut(), WALL, [Charge((2.0, 4.0), 5.0)], GasEngine())
+    found = consequences(BlastEvaluator(glazed_hut(), GasEngine()), WALL, [Charge((2.0, 4.0), 5.0)])
     table = bay_table({"wall": found})
     assert set(table["standing"]) == {"approximate"}  # 3.4 cells per m/kg^(1/3)
     assert table["reason"].str.startswith("3.4 cells").all()

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.evaluation import draw_threats
-from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.shared import consequences
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
 from blast_env.site.scene import WALLS
@@ -43,7 +43,9 @@ def test_tables_and_notes_say_it() -> None:
 def test_an_assessment_says_it_of_a_building_with_a_facade() -> None:
     scenario = hall(SLANTED, facade={"wall": "concrete_200"})
     engine = GasEngine(border_m=0.0, until=0.01)
-    found = consequences(scenario, (), [draw_threats(scenario, [0])[0].charge], engine)
+    found = consequences(
+        BlastEvaluator(scenario, engine), (), [draw_threats(scenario, [0])[0].charge]
+    )
     assert found.notes[0].startswith(f"hall: {STEPPED}")
     assert not found.unjudged
 

@@ -19,7 +19,7 @@ from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, Structure
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.evaluation.grid_error import convergence_index
-from blast_env.evaluation.shared import shared_consequences
+from blast_env.evaluation.shared import consequences
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure, layout_text
 from blast_env.io.export.bill import LayoutPlan, bill_of_quantities
@@ -508,5 +508,5 @@ def test_the_blasts_that_are_counted_before_are_those_that_are_run(
     fine = BlastEvaluator(small_hut(), GasEngine.with_cells(options.cells[1]), cache=tmp_path)
     fine.loads_of_many([((), threat), (LAYOUT, threat)])
     assert fine.counts.blasts == 0  # an evaluation after the report has them too
-    monkeypatch.setattr("blast_env.evaluation.shared.consequences", None)
-    assert shared_consequences(fine, LAYOUT, [threat.charge]).barriers  # and so has `assess`
+    monkeypatch.setattr("blast_env.evaluation.shared._blasted", None)
+    assert consequences(fine, LAYOUT, [threat.charge]).barriers  # and so has `assess`

@@ -7,10 +7,10 @@ import pytest
 
 from blast_env.bundled import REAL_SIZE
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import draw_threats
+from blast_env.evaluation import BlastEvaluator, draw_threats
 from blast_env.evaluation.cases import one_of_each_charge
-from blast_env.evaluation.consequences import consequences
 from blast_env.evaluation.engines import find_engine
+from blast_env.evaluation.shared import consequences
 from blast_env.layout import LayoutState, load_layout
 from blast_env.response.plate_table import plate_curve
 from blast_env.response.walls import DamageLevel
@@ -33,13 +33,14 @@ def test_what_was_found_is_for_the_site_as_it_is_and_within_its_budget(name: str
 
 
 def test_the_guard_post_fails_empty_and_passes_with_what_was_found() -> None:
-    scenario, engine = load_scenario("guard_post"), find_engine("gas", 0.5)
+    scenario = load_scenario("guard_post")
+    evaluator = BlastEvaluator(scenario, find_engine("gas", 0.5))
     found, target = load_layout(FOUND / "guard_post.json", scenario), scenario.objective.level
     charges = [each.charge for each in one_of_each_charge(draw_threats(scenario, range(16)))]
     assert len(charges) == 2
     assert target is not None
-    assert not consequences(scenario, (), charges, engine).passes(target)
-    assert consequences(scenario, found, charges, engine).passes(target)
+    assert not consequences(evaluator, (), charges).passes(target)
+    assert consequences(evaluator, found, charges).passes(target)
 
 
 @pytest.mark.parametrize("steel_depth_m", BEAM_STEEL_DEPTHS_M)

@@ -26,7 +26,7 @@ from blast_env.evaluation.probability import (
     level_probability,
     probability_text,
 )
-from blast_env.evaluation.shared import shared_consequences
+from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout, layout_words
 from blast_env.layout import LayoutState
 from blast_env.layout.placement import load_relevant
@@ -115,7 +115,7 @@ class AdviceJudge:
         """Return the verdict on a layout; it takes a blast per charge, once."""
         if layout not in self.judged:
             charges = [each.charge for each in self.problem.threats]
-            self.judged[layout] = shared_consequences(self.evaluator, layout, charges)
+            self.judged[layout] = consequences(self.evaluator, layout, charges)
             likely = level_probability(self.judged[layout], Uncertainty(mass=self._mass_error))
             self.shares[layout] = likely.of(self.target)
         found = self.judged[layout].verdict(self.target)

@@ -149,7 +149,7 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
     impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
     hit = [each.impulse_sim for each in parts if isinstance(each, ParticleLoad)]
-    sums = {"impulse_sim": sum(hit)} if hit else {}
+    sums: dict[str, Any] = {"impulse_sim": sum(hit)} if hit else {}
     return replace(
         counted[0],
         **sums,

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 import blast_env
 from blast_env.cli import app
 from blast_env.errors import UnknownNameError
-from blast_env.evaluation.consequences import consequences
+from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
+from blast_env.evaluation.shared import consequences
 from blast_env.site import Scenario, save_scenario
 from tests.gas_sites import glazed_hut
 
@@ -114,7 +115,7 @@ def test_walls_of_a_strip_without_a_facade_are_named_with_their_area() -> None:
     assert GasBlast(glazed_hut(), engine=engine).run().unjudged == ()
     (west,) = GasBlast(strips(faces=["west"]), engine=engine).run().unjudged
     assert (west.area_m2, west.of_m2) == pytest.approx((1.0, 13.0))
-    judged = consequences(scenario, (), [CHARGE_OF_HUT] * 2, engine)
+    judged = consequences(BlastEvaluator(scenario, engine), (), [CHARGE_OF_HUT] * 2)
     words = "hall: 6.0 of 18.0 m2 of its walls stand in no bay (strip): no verdict covers them"
     assert judged.notes.count(words) == 1
 
