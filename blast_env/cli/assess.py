@@ -1,7 +1,6 @@
 """`blast-env assess`: the damage of buildings by charges; stand-offs, and largest charges."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -41,21 +40,16 @@ from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.answers import charge_text, counted
 from blast_env.evaluation.assessment import Assessed
 from blast_env.evaluation.assessment import assess as assessed_by
-from blast_env.evaluation.capacity import MOST_BLASTS, Capacity
+from blast_env.evaluation.capacity import MOST_BLASTS
 from blast_env.evaluation.capacity import capacity as capacity_of
 from blast_env.evaluation.consequences import (
-    BAY_CASE_COLUMNS,
-    CASE_COLUMNS,
     BuildingResponse,
     Consequences,
     bay_table,
-    piece_table,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import final_engine
-from blast_env.evaluation.probability import Uncertainty
 from blast_env.evaluation.screening import (
     LEFT_OUT,
     STAND_OFF_HEADERS,
@@ -67,7 +61,6 @@ from blast_env.evaluation.screening import screen as screen_site
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
-from blast_env.provenance import versions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.facade import response_words
 from blast_env.response.requirements import Requirement
@@ -92,6 +85,7 @@ _MASS_HELP: Final = (
 _OF_SCREENING: Final = ("mass", "gas")
 _OF_DRAWN_CHARGES: Final = ("target", "charges", "mass_error", "charge", "tnt_kg", "cache")
 _OF_ASSESSMENT: Final = ("without_fallen", "diagram", "table")
+_NOT_OF_CAPACITY: Final = (*_OF_ASSESSMENT, "require", "target", "mass_error", "picture")
 
 
 def assess(
@@ -128,12 +122,11 @@ def assess(
         None, help="Walls of protected structures that have no facade, a component."
     ),
     picture: Path | None = writes(
-        "Picture of the facades under the worst charge; of the stand-offs as rings (--screen); of "
-        "the probability over the mass (--capacity)",
+        "Picture of the facades under the worst charge; of the stand-offs as rings (--screen)",
         *PICTURES,
     ),
     diagram: Path | None = writes("Pressure-impulse diagram with every bay on it", *PICTURES),
-    table: Path | None = writes("Table of every bay under every charge", ".csv", ".xlsx"),
+    table: Path | None = writes("Table of every bay under every charge", ".csv"),
     charge: ChargeOption = None,
     tnt_kg: TntOption = None,
     cache: CacheOption = None,
@@ -178,12 +171,10 @@ def assess(
     drawn = [each.charge for each in threats]
     level = wanted_level(target, site, LevelOfProtection.LOW)
     if capacity:
-        refuse_given(context, (*_OF_ASSESSMENT, "require"), "does not apply to --capacity")
+        refuse_given(context, _NOT_OF_CAPACITY, "does not apply to --capacity")
         evaluator = BlastEvaluator(site, engine, cache=cache)
         with resumable(resume_words(cache)):
-            found = _capacity(evaluator, layouts, drawn)
-        figure = partial(_curves, found, site, level, mass_error)
-        print_written(save_figures((picture, figure)))
+            _capacity(evaluator, layouts, drawn)
         return
     print_line(engine.describe([site]))
     asked = [(engine, each) for each in drawn] + [(engine.coarser, drawn[0])]
@@ -201,13 +192,13 @@ def assess(
             )
         print_answer(assessed.answer(level, mass_error, required))
     if table is not None:
-        _write_table(assessed, table, engine)
+        print_written([write_csv(bay_table(assessed.found), table)])
     _draw(assessed, picture, diagram)
 
 
 def _capacity(
     evaluator: BlastEvaluator, layouts: Mapping[str, Layout], charges: Sequence[AnyCharge]
-) -> Capacity:
+) -> None:
     """Print the largest charges and the least stand-offs that keep each level."""
     site, engine = evaluator.scenario, evaluator.engine
     print_line(engine.describe([site]))
@@ -215,39 +206,6 @@ def _capacity(
     with progress_bar(f"{site.name}: masses and stand-offs") as progress:
         found = capacity_of(evaluator, layouts, charges, progress)
     print_answer(found.answer())
-    return found
-
-
-def _curves(
-    found: Capacity, site: Scenario, level: LevelOfProtection, mass_error: float
-) -> "Figure":
-    """Draw the probability of the level over the mass, at the least favourable place."""
-    from blast_env.plots.capacity import capacity_figure
-
-    least, shown = found.curves(level, Uncertainty(mass=mass_error))
-    title = f"{site.name}: charge at ({least.place}) m"
-    return capacity_figure(shown, level.label, least.charge.tnt_kg, title)
-
-
-def _write_table(assessed: Assessed, path: Path, engine: Engine) -> None:
-    """Write the table of the bays; a workbook also holds the barrier's pieces."""
-    bays, pieces = bay_table(assessed.found), piece_table(assessed.found)
-    if path.suffix.lower() == ".csv":
-        print_written([write_csv(bays, path)])
-        return
-    from blast_env.particles.workbook import SheetTable, write_tables
-
-    tables = [SheetTable("Bays", bays, BAY_CASE_COLUMNS)]
-    if len(pieces):
-        tables.append(SheetTable("Pieces", pieces, (*CASE_COLUMNS, *PIECE_COLUMNS)))
-    record: dict[str, str | int | float] = {
-        "scenario": assessed.scenario.name,
-        "scenario hash": assessed.scenario.content_hash,
-        "engine": engine.words,
-        "engine version": engine.version,
-        "blast-env version": versions(engine.version)["blast_env"],
-    }
-    print_written([write_tables(record, tables, path, f"Bays of {assessed.scenario.name}")])
 
 
 def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> None:

@@ -128,8 +128,9 @@ class Assessed:
 
     def _verdict(self, target: LevelOfProtection) -> Iterator[AnswerPart]:
         judged = self.judged
-        words, charges = judged.verdict_words(target), counted(len(judged.barriers))
-        yield f"{self.scenario.name}, {self.name}: {words}, under {charges}"
+        verdict, level = judged.verdict_word(target), judged.level_words_for(target)
+        charges = counted(len(judged.barriers))
+        yield f"{self.scenario.name}, {self.name}: {verdict}: {level}, under {charges}"
         for building in judged.buildings:
             stood = judged.standing(building).words
             yield f"standing of the load that decides, {building}: {stood}"

@@ -14,7 +14,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import AnswerPart, AnswerTable
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.evaluator import BlastEvaluator
-from blast_env.evaluation.probability import MASS_RANGE, Uncertainty, level_probability, scaled_to
+from blast_env.evaluation.probability import MASS_RANGE, scaled_to
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
 from blast_env.layout.build_scene import charge_against
@@ -27,16 +27,12 @@ from blast_env.site.worst_places import nearest_point_m, stand_off_m
 RUNGS: Final = 5
 """Number of rungs of a ladder above and below the charge of the scenario."""
 
-CURVE_DRAWS: Final = 200
-"""Default number of draws of the uncertain quantities for a point of a curve."""
-
 MOST_BLASTS: Final = 4 * RUNGS + 1
 """Most blasts of a ladder for masses and stand-offs."""
 
 _LEVELS: Final = tuple(LevelOfProtection)[1:]
 _STEP: Final = MASS_RANGE**2
 _BISECTIONS: Final = 6
-_SHARES: Final = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of a step, on both sides of a rung
 
 
 @dataclass(frozen=True)
@@ -167,18 +163,6 @@ class Ladder:
 
         return edge(_most_kept(between, _STEP**low, _STEP**high))
 
-    def curve(
-        self, level: LevelOfProtection, uncertainty: Uncertainty, draws: int = CURVE_DRAWS
-    ) -> list[tuple[float, float]]:
-        """Return masses and the probability of a level, over all masses with blasts so far."""
-        points = []
-        for nearer, number in sorted(key for key, each in self._blasts.items() if each is not None):
-            for share in () if nearer else _SHARES:
-                severity = _STEP ** (number + share)
-                likely = level_probability(self._near(severity, nearer), uncertainty, draws)
-                points.append((self.charge_at(severity, nearer).tnt_kg, likely.of(level)))
-        return points
-
     def _rung(self, number: int, nearer: bool) -> Consequences | None:
         """Return the consequences on a rung by a blast; `None` beyond an end of the ladder."""
         key = nearer and number != 0, number
@@ -254,24 +238,6 @@ class Capacity:
         ]
         title = f"{site}: least stand-off (m) that keeps each level of protection"
         yield AnswerTable.of(title, ("layout", "place (m)", "charge", *levels), rows, 2)
-
-    def curves(
-        self, target: LevelOfProtection, uncertainty: Uncertainty
-    ) -> tuple[Ladder, dict[str, list[tuple[float, float]]]]:
-        """Return the ladder of the place that bears least, and each layout's curve there.
-
-        Args:
-            target: The level of protection, of the last layout.
-            uncertainty: The uncertain quantities.
-        """
-        name, edges = list(self.masses.items())[-1]
-        number = _LEVELS.index(target)
-        of_target = [own[number].charge.tnt_kg for own in edges]
-        place = of_target.index(min(of_target))
-        curves = {
-            layout: own[place].curve(target, uncertainty) for layout, own in self.ladders.items()
-        }
-        return self.ladders[name][place], curves
 
 
 def capacity(

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,6 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.comparison import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
 from blast_env.evaluation.engines.contract import BlastLoads
-from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.standing import BayPlaces, Stood, bay_places, bay_standings
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
@@ -426,10 +425,6 @@ class Consequences:
         """Return the verdict in a word; see `Verdict.word`."""
         return self.verdict(target).word(self.is_flagged)
 
-    def verdict_words(self, target: LevelOfProtection) -> str:
-        """Return the verdict with the level: `DOES NOT COMPLY: level of protection below Low`."""
-        return f"{self.verdict_word(target)}: {self.level_words_for(target)}"
-
     def level_words_for(self, target: LevelOfProtection) -> str:
         """Return whether all buildings reach a level: `level of protection below Low`."""
         side = "at least" if self.passes(target) else "below"
@@ -472,13 +467,11 @@ def other_glazing(scenario: Scenario) -> dict[str, Glazing]:
     return {name: each for name, each in known.items() if isinstance(each, Glazing)}
 
 
-CASE_COLUMNS: Final = (
+BAY_CASE_COLUMNS: Final = (
     Column("layout", "", "the layout, or that there is none"),
     *CHARGE_COLUMNS,
+    *LOADED_BAY_COLUMNS,
 )
-"""The first columns in tables of bays and of pieces under several charges."""
-
-BAY_CASE_COLUMNS: Final = (*CASE_COLUMNS, *LOADED_BAY_COLUMNS)
 """The columns of `bay_table`."""
 
 
@@ -491,17 +484,6 @@ def bay_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
         for row in each.rows
     ]
     return table_of(rows, BAY_CASE_COLUMNS)
-
-
-def piece_table(found: Mapping[str, Consequences]) -> "pd.DataFrame":
-    """Return one row per layout, charge and piece: `CASE_COLUMNS`, then `PIECE_COLUMNS`."""
-    rows: list[dict[Any, Any]] = [
-        {"layout": name, **charge_values(each.charge), **row}
-        for name, judged in found.items()
-        for each in judged.barriers
-        for row in each.pieces.to_dict("records")
-    ]
-    return table_of(rows, (*CASE_COLUMNS, *PIECE_COLUMNS))
 
 
 def consequences_of(

@@ -12,7 +12,6 @@ from blast_env.evaluation.consequences import (
     BuildingResponse,
     Consequences,
     bay_table,
-    piece_table,
     side_on_impulse_pa_s,
     side_on_peak_pa,
 )
@@ -150,9 +149,8 @@ def test_no_verdict_passes_on_peaks_that_cells_clip() -> None:
     assert doubted == {False, True}
 
 
-def test_tables_have_a_row_a_layout_charge_and_bay_or_piece(found: Consequences) -> None:
+def test_the_table_has_a_row_a_layout_charge_and_bay(found: Consequences) -> None:
     both = {"none": judge(site(), ()), "walls": found}
     bays = bay_table(both)
     assert list(bays["layout"]) == ["none", "none", "walls", "walls"]
     assert list(bays["bay"][:2]) == ["hut/west/1/1", "hut/west/1/2"]
-    assert list(piece_table(both)["layout"]) == ["walls"] * 3

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from blast_env.evaluation import BlastEvaluator, LoadCase
-from blast_env.evaluation.consequences import Consequences, bay_table, piece_table
+from blast_env.evaluation.consequences import Consequences, bay_table
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.shared import consequences
 from blast_env.site import Scenario
@@ -22,7 +22,7 @@ def evaluator(folder: Path, scenario: Scenario | None = None) -> BlastEvaluator:
 
 
 def tables(found: Consequences) -> tuple[pd.DataFrame, pd.DataFrame]:
-    return bay_table({"": found}), piece_table({"": found})
+    return bay_table({"": found}), found.barriers[0].pieces
 
 
 def test_a_stored_blast_has_the_same_consequences(
