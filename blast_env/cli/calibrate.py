@@ -10,7 +10,6 @@ from blast_env.cli.command import writes
 from blast_env.cli.options import ClusterAddress, ProcessesOption, TntOption, numbers, running_on
 from blast_env.cli.output import (
     print_line,
-    print_table,
     print_written,
     progress_bar,
     resumable,
@@ -157,30 +156,10 @@ def _figure(report: "CalibrationReport", stored: Calibration) -> "Figure":
 
 
 def _print(report: "CalibrationReport", stored: Calibration) -> None:
-    rows = [
-        (
-            f"{row['distance_m']:g}",
-            f"{row['i_sim']:,.0f}",
-            f"{row['ci95']:,.0f}",
-            f"{row['reference_psi_s']:.4f}",
-            *(f"{row[f'{name}_psi_s']:.4f}" for name in report.laws),
-            f"{row[f'{stored.law}_error_percent']:+.1f} %",
-        )
-        for row in report.table().to_dict("records")
-    ]
-    title = (
+    print_line(
         f"{stored.name}: {len(stored.seeds)} seeds at each distance, reference "
         f"{stored.reference.source}, {stored.reference.quantity.replace('_', ' ')}"
     )
-    headers = (
-        "R (m)",
-        "i_sim",
-        "95 % +-",
-        "reference (psi s)",
-        *report.laws,
-        "error of stored law",
-    )
-    print_table(title, headers, rows, text_columns=0)
     for name, metrics in report.metrics.items():
         coefficients = ", ".join(
             f"{k} = {v:.5g}" for k, v in report.laws[name].coefficients.items()

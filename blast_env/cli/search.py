@@ -76,8 +76,7 @@ from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import LayoutState, load_layout, write_layout
 from blast_env.provenance import command, versions
 from blast_env.runner import share_of
-from blast_env.site import Scenario, load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import (
     CVAR_LEVEL,
@@ -429,17 +428,15 @@ def _package_proposal(
     return problem, result.layout
 
 
-def _given_charge(scenario: Scenario, given: GivenCharge) -> Charge | None:
+def _given_charge(scenario: Scenario, given: GivenCharge) -> AnyCharge | None:
     """Return the charge at the user's place; `None` without one."""
     if given.place_m is None:
         if given.mass_kg is not None:
             raise BlastEnvError("--tnt-kg is given without --charge, the place of the charge")
         return None
-    middle = expected_charge(scenario.charge)
-    tnt_kg = middle.tnt_kg if given.mass_kg is None else given.mass_kg
-    (x_m, y_m), charge = given.place_m, Charge(given.place_m, tnt_kg, middle.height_m)
-    scenario.with_possible_charges((charge,))  # refuses one that is not clear, or out of bounds
+    charge = given.fixed(scenario, expected_charge(scenario.charge))
     bounds = [source_bounds_m(source) for source in scenario.charge]
+    x_m, y_m = given.place_m
     if not any(
         each.left <= x_m <= each.right and each.bottom <= y_m <= each.top for each in bounds
     ):
@@ -491,9 +488,9 @@ def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:
     best_last = sorted(rules, key=lambda name: -loads[name])
     rows = []
     for name in (_NOTHING, *best_last, _PROPOSAL):
-        each, load = found[layouts[name]], Estimate(loads[name], nan, nan)
-        share = share_text(each.reduction, each.reduction_error) if name != _NOTHING else "-"
-        rows.append((name, load_text(scenario.objective, load, each.objective_error), share))
+        own, load = found[layouts[name]], Estimate(loads[name], nan, nan)
+        gone = share_text(own.reduction, own.reduction_error) if name != _NOTHING else "-"
+        rows.append((name, load_text(scenario.objective, load, own.objective_error), gone))
     charges = f"{len(case.threats)} charges" if case.charge is None else "this charge"
     title = f"{scenario.name}: judged by gas dynamics on {charges}"
     print_table(title, ("layout", "load", "reduction"), rows)
