@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from blast_env.cli.command import writes
+from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     FINAL_CELLS,
     TARGET_HELP,
@@ -33,7 +33,6 @@ from blast_env.cli.output import (
     resumable,
     save_figures,
 )
-from blast_env.cli.targets import PICTURES
 from blast_env.design.search import DesignProblem
 from blast_env.design.search.advice import kinds_for
 from blast_env.design.search.advised import ROUNDS, AdviceJudge, Advised, advised, asked_site

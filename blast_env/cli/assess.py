@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import typer
 
-from blast_env.cli.command import writes
+from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import (
     CacheOption,
     ChargeOption,
@@ -34,7 +34,6 @@ from blast_env.cli.output import (
     resumable,
     save_figures,
 )
-from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.answers import charge_text, counted

@@ -6,7 +6,7 @@ from typing import Final
 
 import typer
 
-from blast_env.cli.command import note_target, writes
+from blast_env.cli.command import Target, note_target, writes
 from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
 from blast_env.cli.options import (
     UNTIL_HELP,
@@ -25,7 +25,6 @@ from blast_env.cli.options import (
     running_on,
 )
 from blast_env.cli.output import resumable
-from blast_env.cli.targets import Target
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation import BlastEvaluator, SeedRange
 from blast_env.evaluation.engines import JUDGE

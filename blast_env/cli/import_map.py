@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import typer
 
-from blast_env.cli.command import writes
+from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.options import numbers
 from blast_env.cli.output import (
     print_json,
@@ -17,7 +17,6 @@ from blast_env.cli.output import (
     print_written,
     save_pictures,
 )
-from blast_env.cli.targets import PICTURES
 from blast_env.evaluation.answers import titled
 from blast_env.evaluation.screening import facades_for
 from blast_env.io.importing.options import MARGIN_M, MOST_MARGIN_M, ImportOptions

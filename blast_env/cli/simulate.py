@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from blast_env.cli.command import writes
+from blast_env.cli.command import PICTURES, writes
 from blast_env.cli.evaluation_report import standing_lines
 from blast_env.cli.options import (
     BY_SITE,
@@ -32,7 +32,6 @@ from blast_env.cli.output import (
     print_written,
     progress_bar,
 )
-from blast_env.cli.targets import PICTURES
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.engines import BlastResult, Engine, default_engine, find_engine
