@@ -14,7 +14,6 @@ from blast_env import Charge, load_scenario
 from blast_env.evaluation import Evaluation, LoadCase, LoadCaseSet, evaluate_layout
 from blast_env.evaluation.engines import find_engine
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.plots.capacity import capacity_figure
 from blast_env.plots.evaluation_figures import MOST_SHOWN, comparison_figure, evaluation_figure
 from blast_env.plots.figures import save_figure
 from blast_env.plots.plan import Kinds
@@ -285,17 +284,3 @@ def test_no_text_covers_another_or_leaves_the_page(count: int) -> None:
         assert box.x1 <= page.x1
         assert box.y1 <= page.y1
         assert box.count_overlaps(boxes[:index]) == 0
-
-
-# --- The picture of the probability of a level over the mass.
-
-
-def test_each_layout_is_a_curve_beside_the_charge_of_the_scenario() -> None:
-    curves = {"no barrier": [(10.0, 1.0), (20.0, 0.4)], "6 walls": [(10.0, 1.0), (40.0, 0.2)]}
-    (axes,) = capacity_figure(curves, "medium", 31.0, "yard").axes
-    *drawn, mark = axes.lines
-    assert [each.get_label() for each in drawn] == list(curves)
-    for line, points in zip(drawn, curves.values(), strict=True):
-        np.testing.assert_array_equal(np.asarray(line.get_xydata()), points)
-    np.testing.assert_array_equal(mark.get_xdata(), [31.0, 31.0])
-    assert axes.get_ylabel() == "probability of level 'medium'"
