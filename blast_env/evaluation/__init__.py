@@ -2,7 +2,7 @@
 
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, SeedRange, draw_threats
 from blast_env.evaluation.comparison import Evaluation, ThreatOutcome
-from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad, StructureLoad
+from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.evaluate import compare, evaluate_layout
 from blast_env.evaluation.evaluator import (
     Assessment,
@@ -36,7 +36,6 @@ __all__ = [
     "GridError",
     "LoadCase",
     "LoadCaseSet",
-    "ParticleLoad",
     "SeedRange",
     "StructureLoad",
     "ThreatOutcome",

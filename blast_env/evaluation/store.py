@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from blast_env.errors import BlastEnvError, value_text
-from blast_env.evaluation.engines import BlastLoads, Engine, ParticleLoad, StructureLoad
+from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad
 from blast_env.geometry import Layout
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.damage import BayDamage
@@ -186,9 +186,7 @@ _KEY: Final = TypeAdapter(BlastKey)
 def _encoded(loads: BlastLoads) -> bytes:
     """Encode loads as a line of JSON, followed by the impulses on the modules."""
     header = {
-        "particles" if loads.has_particles else "structures": [
-            asdict(load) for load in loads.structures
-        ],
+        "structures": [asdict(load) for load in loads.structures],
         "bays": [asdict(bay) for bay in loads.bays],
     }
     return json.dumps(header).encode() + b"\n" + loads.module_impulse.astype("<f8").tobytes()
@@ -197,8 +195,7 @@ def _encoded(loads: BlastLoads) -> bytes:
 @dataclass(frozen=True)
 class _Header:
     bays: tuple[BayDamage, ...]
-    structures: tuple[StructureLoad, ...] = ()
-    particles: tuple[ParticleLoad, ...] = ()
+    structures: tuple[StructureLoad, ...]
 
 
 _HEADER: Final = TypeAdapter(_Header)
@@ -209,4 +206,4 @@ def _decoded(content: bytes) -> BlastLoads:
     line, _, impulses = content.partition(b"\n")
     header = _HEADER.validate_json(line)
     modules = np.frombuffer(impulses, dtype="<f8").astype(np.float64)
-    return BlastLoads(header.particles or header.structures, modules, header.bays)
+    return BlastLoads(header.structures, modules, header.bays)

@@ -28,7 +28,7 @@ from blast_env.app.work import Answer, Question
 from blast_env.cluster import address_of
 from blast_env.evaluation.answers import AnswerTable
 from blast_env.evaluation.engines import simulate
-from blast_env.evaluation.engines.contract import BlastLoads, ParticleLoad
+from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.store import BlastKey, BlastStore
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile, write_layout
@@ -152,7 +152,7 @@ def _setting(_: Path) -> Format:
 
 def _loads(folder: Path) -> Format:
     key = BlastKey("0" * 64, ((0, 0),), Charge((1.0, 2.0), 100.0), 1, "event 1", "1" * 64, "2" * 64)
-    load = ParticleLoad(
+    load = StructureLoad(
         *("building", True, 1.0, 0.01, None, 0.0, True),
         ("a note",),
         "building",

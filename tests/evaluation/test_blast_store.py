@@ -16,7 +16,7 @@ from blast_env.evaluation import (
     BlastKey,
     BlastLoads,
     BlastStore,
-    ParticleLoad,
+    StructureLoad,
     draw_threats,
     evaluate_layout,
 )
@@ -38,7 +38,7 @@ def key(seed: int) -> BlastKey:
 def loads(seed: int) -> BlastLoads:
     """Loads with numbers that need every bit."""
     notes = ("far", "b\n")
-    house = ParticleLoad(
+    house = StructureLoad(
         *("haus ß", True, 2.0, 1e-300, 0.7, 2.0, False, notes, "b"),
         stood=Stood(LoadStanding.OUTSIDE, "far"),
         impulse_sim=0.1 + 0.2,

@@ -13,7 +13,7 @@ An instance is accepted wherever an engine's name is. An entry point registers a
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -66,6 +66,7 @@ class StructureLoad:
         response: Response of its bays in the objective; `None` unless the objective is a response.
         worst_damage: The largest damage of its bays, for the same objective.
         stood: Standing of the load, with its reason.
+        impulse_sim: Sum of m |v| over the collisions, simulation units; `None` without particles.
     """
 
     name: str
@@ -81,6 +82,7 @@ class StructureLoad:
     response: float | None = None
     worst_damage: float | None = None
     stood: Stood = UNSTATED
+    impulse_sim: float | None = None
 
     @classmethod
     def on(
@@ -89,14 +91,9 @@ class StructureLoad:
         impulse_pa_s: float,
         peak_pa: float | None = None,
         in_range: bool = False,
-        notes: tuple[str, ...] = (),
-        area_m2: float | None = None,
-        stood: Stood = UNSTATED,
+        **others: Any,
     ) -> Self:
-        """Return the load on a structure of a scenario by an engine without particles.
-
-        The other arguments are as the attributes.
-        """
+        """Return the load on a structure of a scenario; `others` are further attributes."""
         return cls(
             name=structure.name,
             protected=structure.protected,
@@ -105,22 +102,9 @@ class StructureLoad:
             peak_pa=peak_pa,
             peak_weight=structure.counted_peak_weight,
             in_range=in_range,
-            notes=notes,
             building=structure.building_name,
-            area_m2=area_m2,
-            stood=stood,
+            **({"notes": ()} | others),
         )
-
-
-@dataclass(frozen=True)
-class ParticleLoad(StructureLoad):
-    """The load on one structure by a particle engine.
-
-    Attributes:
-        impulse_sim: Sum of m |v| over the collisions, simulation units.
-    """
-
-    impulse_sim: float = field(kw_only=True)
 
 
 def on_buildings(loads: Sequence[StructureLoad]) -> tuple[StructureLoad, ...]:
@@ -148,11 +132,9 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
     is_known = len(areas_m2) == len(counted)
     peaks_pa = [each.peak_pa for each in counted if each.peak_pa is not None]
     impulses_pa_s = np.array([each.impulse_pa_s for each in counted])
-    hit = [each.impulse_sim for each in parts if isinstance(each, ParticleLoad)]
-    sums: dict[str, Any] = {"impulse_sim": sum(hit)} if hit else {}
+    hit = [each.impulse_sim for each in parts if each.impulse_sim is not None]
     return replace(
         counted[0],
-        **sums,
         name=name,
         weight=sum(weights),
         impulse_pa_s=mean_over_area(impulses_pa_s, np.array(areas_m2 if is_known else weights)),
@@ -160,6 +142,7 @@ def _on_building(name: str, parts: Sequence[StructureLoad]) -> StructureLoad:
         in_range=all(each.in_range for each in counted),
         area_m2=sum(areas_m2) if is_known else None,
         stood=worst_standing(each.stood for each in counted),
+        impulse_sim=sum(hit) if hit else None,
     )
 
 
@@ -199,7 +182,7 @@ class BlastLoads:
     @property
     def has_particles(self) -> bool:
         """Whether these are loads by a particle engine."""
-        return any(isinstance(load, ParticleLoad) for load in self.structures)
+        return any(load.impulse_sim is not None for load in self.structures)
 
     @property
     def level(self) -> LevelOfProtection:
@@ -254,8 +237,8 @@ class BlastLoads:
 
         `None` of an engine without particles.
         """
-        hit = [load for load in self.protected if isinstance(load, ParticleLoad)]
-        return sum(load.weight * load.impulse_sim for load in hit) if hit else None
+        sims = [(x.weight, x.impulse_sim) for x in self.protected if x.impulse_sim is not None]
+        return sum(weight * impulse for weight, impulse in sims) if sims else None
 
     @property
     def protected_peak_pa(self) -> float:

@@ -425,9 +425,9 @@ class GasResult:
                 scaled.pa_s,
                 float(self._peak_pa[self._walls(index)].max(initial=0.0)),
                 scaled.in_range,
-                scaled.notes,
-                self._area_m2(index),
-                self._stood[outline.name],
+                notes=scaled.notes,
+                area_m2=self._area_m2(index),
+                stood=self._stood[outline.name],
             )
             for index, outline in enumerate(self.run.site.structures)
             if not outline.is_barrier

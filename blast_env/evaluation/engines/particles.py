@@ -17,8 +17,8 @@ from blast_env.errors import BlastEnvError, UnknownNameError, value_text
 from blast_env.evaluation.engines.contract import (
     BlastLoads,
     Engine,
-    ParticleLoad,
     RunnableBlast,
+    StructureLoad,
     find_engine,
 )
 from blast_env.evaluation.standing import LoadStanding, Stood
@@ -302,22 +302,18 @@ class BlastResult:
         law = self.calibration if calibration is None else calibration
         structures = [obstacle for obstacle in self.obstacles if not obstacle.is_barrier]
         impulse = [part.impulse for obstacle in structures for part in obstacle.parts]
+        named = {each.name: each for each in self.blast.scenario.structures}
         return BlastLoads(
             structures=tuple(
-                ParticleLoad(
-                    name=each.name,
-                    protected=each.protected,
-                    weight=each.weight,
-                    impulse_sim=each.impulse,
-                    impulse_pa_s=scaled.pa_s,
-                    peak_pa=None,
-                    peak_weight=each.weight,
+                StructureLoad.on(
+                    named[each.name],
+                    scaled.pa_s,
                     in_range=scaled.in_range,
                     notes=scaled.notes,
-                    building=self.blast.scenario.building_names[each.name],
                     stood=_CALIBRATED
                     if scaled.in_range
                     else Stood(LoadStanding.OUTSIDE, "; ".join(scaled.notes)),
+                    impulse_sim=each.impulse,
                 )
                 for each in structures
                 for scaled in [self.impulse(each.name, law)]
