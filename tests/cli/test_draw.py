@@ -3,8 +3,8 @@
 import pytest
 
 from blast_env import load_scenario
+from blast_env.cli.draw import suitability
 from blast_env.evaluation import BlastEvaluator
-from blast_env.evaluation.suitability import suitability
 from blast_env.site import Scenario
 from tests.gas_sites import hut
 from tests.vehicle_sites import gate_site
@@ -13,12 +13,12 @@ PLACING = "placing barriers"
 
 
 def limits_of(scenario: Scenario | str) -> str:
-    return "\n".join(suitability(scenario).limits)
+    return "\n".join(suitability(scenario)[1])
 
 
 @pytest.mark.parametrize("name", ["courtyard", "perimeter_gate", "street_junction"])
 def test_bundled_scenarios_serve_for_placing_with_every_engine_said(name: str) -> None:
-    (_, placing, report) = suitability(name).uses
+    (_, placing, report) = suitability(name)[0]
     assert report == "report (gas)"
     scenario = load_scenario(name)
     for engine in ("pymunk", "event", "gas"):
@@ -27,9 +27,9 @@ def test_bundled_scenarios_serve_for_placing_with_every_engine_said(name: str) -
 
 
 def test_free_field_serves_for_blasts_alone_and_says_all_reasons_at_once() -> None:
-    found = suitability("free_field")
-    assert found.uses == ("simulate with every engine",)
-    said = "\n".join(found.limits)
+    uses, limits = suitability("free_field")
+    assert uses == ["simulate with every engine"]
+    said = "\n".join(limits)
     for words in (
         "no build zone: nothing can be placed",
         "preset 'ballistic' is not meant for design",
@@ -46,9 +46,9 @@ def test_what_has_everything_is_limited_only_by_what_it_lacks() -> None:
     assert "no gauges" not in said
     assert "no height (" not in said
     assert "overrates walls" not in said
-    assert PLACING in suitability(hut()).uses[1]
-    assert suitability(hut()).uses[1].endswith("with gas")
-    assert suitability(hut()).uses[2] == "report (gas)"
+    assert PLACING in suitability(hut())[0][1]
+    assert suitability(hut())[0][1].endswith("with gas")
+    assert suitability(hut())[0][2] == "report (gas)"
 
 
 def test_a_vehicle_is_said_with_what_refuses_it() -> None:
@@ -66,5 +66,5 @@ def test_masses_beyond_the_particles_are_said() -> None:
         charge=[{"kind": "point", "position_m": [2.0, 4.0], "tnt_kg": 90_000.0}],
         simulation={"preset": "collisional", "overrides": {"explosive": {"ball_count": 20_000}}},
     )
-    assert suitability(scenario).uses[0] == "simulate with gas"
+    assert suitability(scenario)[0][0] == "simulate with gas"
     assert "particles cannot run it, gas can: charge[0].tnt_kg: is 90000" in limits_of(scenario)
