@@ -1,10 +1,10 @@
 """The charges that a design is tested against, by name, at defined places."""
 
 from collections.abc import Iterator
+from math import cbrt
 from typing import Final
 
 from blast_env.evaluation import LoadCase
-from blast_env.evaluation.governing import Severity, governing
 from blast_env.site import (
     RectangleSource,
     Scenario,
@@ -14,6 +14,7 @@ from blast_env.site import (
 )
 from blast_env.site.scene import Charge
 from blast_env.site.sections import PointM
+from blast_env.site.worst_places import stand_off_m
 
 MOST_USUAL: Final = 4
 """Most sources of charges, without vehicles, that blasts are run with by default."""
@@ -67,19 +68,20 @@ def _of_vehicle(name: str, source: VehicleSource) -> Iterator[LoadCase]:
 def usual_threats(scenario: Scenario) -> tuple[str, ...]:
     """Return the names of the threats that blasts are run with by default.
 
-    Of each source, the place that governs by its load in the open; of a vehicle, the nearest one.
-    Of more than `MOST_USUAL` sources without a vehicle, those with the largest loads.
+    Of each source, the place with the least scaled stand-off, the first of equals; of a vehicle,
+    the nearest one. Of more than `MOST_USUAL` sources without a vehicle, those with the least.
     """
     sources: dict[str, list[LoadCase]] = {}
     for threat in threats_of(scenario):
         sources.setdefault(threat.name.partition(",")[0], []).append(threat)
 
-    def severity(threat: LoadCase) -> Severity:
-        if isinstance(threat.charge, VehicleCharge):
-            return Severity(load=-threat.charge.rank)
-        return Severity.in_the_open(scenario, threat.charge)
+    def severity(threat: LoadCase) -> float:
+        charge = threat.charge
+        if isinstance(charge, VehicleCharge):
+            return -charge.rank
+        return -stand_off_m(scenario.structures, charge.position_m) / cbrt(charge.tnt_kg)
 
-    chosen = [governing(own, severity) for own in sources.values()]
+    chosen = [max(own, key=severity) for own in sources.values()]
     fixed = [each for each in chosen if not isinstance(each.charge, VehicleCharge)]
     worst = sorted(fixed, key=severity, reverse=True)[:MOST_USUAL]
     return tuple(each.name for each in chosen if each in worst or each not in fixed)

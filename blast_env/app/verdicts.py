@@ -18,9 +18,9 @@ from blast_env.evaluation.consequences import (
     BuildingResponse,
     BuildingSummary,
     Consequences,
+    Severity,
     by_building,
 )
-from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.probability import Uncertainty, level_probability, probability_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
@@ -175,7 +175,7 @@ def verdict_table(
     for (name, building), own in found.items():
         title = scenario.title_of(building)
         if len(own) > 1:
-            worst = governing((each for _, each, _ in own), lambda each: each.severity)
+            worst = max((each for _, each, _ in own), key=lambda each: each.severity)
             every = dict.fromkeys(flag for *_, flags in own for flag in flags)
             rows.append(worst.row(name, f"worst of {len(own)}", title, every))
         rows += [each.row(name, threat, title, flags) for threat, each, flags in own]

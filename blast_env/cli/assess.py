@@ -47,7 +47,6 @@ from blast_env.evaluation.consequences import (
     bay_table,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.governing import governing
 from blast_env.evaluation.grid_error import final_engine
 from blast_env.evaluation.screening import (
     LEFT_OUT,
@@ -233,7 +232,7 @@ def _draw(assessed: Assessed, picture: Path | None, diagram: Path | None) -> Non
 def _worst_rows(assessed: Assessed) -> list[tuple[str, BuildingResponse]]:
     """Return the governing building and charge of the judged layout, one row per layout."""
     responses = assessed.judged.responses
-    number = responses.index(governing(responses, lambda each: each.severity))
+    number = responses.index(max(responses, key=lambda each: each.severity))
     return [(name, each.responses[number]) for name, each in assessed.found.items()]
 
 

@@ -31,7 +31,6 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation.comparison import CHARGE_COLUMNS, charge_values
 from blast_env.evaluation.engines.bays import LOADED_BAY_COLUMNS, UnjudgedWalls, bay_rows
 from blast_env.evaluation.engines.contract import BlastLoads
-from blast_env.evaluation.governing import Severity, governing
 from blast_env.evaluation.standing import BayPlaces, Stood, bay_places, bay_standings
 from blast_env.gas.oblique_walls import STEPPED, stepped_buildings
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
@@ -55,7 +54,7 @@ from blast_env.response.facade import (
 from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
 from blast_env.response.walls import DamageLevel
-from blast_env.site import Scenario
+from blast_env.site import ObjectiveSection, Scenario
 from blast_env.site.facade import with_glass
 from blast_env.site.scene import WALLS, BlastSite, Charge
 from blast_env.site.sections import buildings_of
@@ -98,6 +97,32 @@ class Verdict(IntEnum):
         if self is not Verdict.PASSES:
             return "DOES NOT COMPLY"
         return "COMPLIES (flagged)" if flagged else "COMPLIES"
+
+
+@dataclass(frozen=True, order=True)
+class Severity:
+    """The severity of a blast, with attributes in the order of comparison; the largest governs.
+
+    Where facades count, the lower level of protection governs, then the larger damage of all
+    components. Ties, and sites without facades, are decided by the load.
+
+    Attributes:
+        lost_levels: Levels of protection below "high" of buildings with a facade.
+        damage: Total damage of all components, or the response in the objective.
+        load: The load, in the same unit for all compared blasts.
+    """
+
+    lost_levels: int = 0
+    damage: float = 0.0
+    load: float = 0.0
+
+    @classmethod
+    def of_loads(cls, loads: BlastLoads, objective: ObjectiveSection) -> "Severity":
+        """Return the severity of a blast by the objective of a site."""
+        counted = loads.load(objective)
+        if not objective.is_response:
+            return cls(load=counted)
+        return cls(4 - loads.level, counted, loads.protected_impulse_pa_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,7 +300,7 @@ class Consequences:
     @property
     def worst_number(self) -> int:
         """The number of the charge with the governing response."""
-        worst = governing(self.responses, lambda each: each.severity)
+        worst = max(self.responses, key=lambda each: each.severity)
         return self.responses.index(worst) // len(self.buildings)
 
     @property
@@ -358,7 +383,7 @@ class Consequences:
 
     def standing(self, building: str) -> Stood:
         """Return the standing of the load on the bay that decides under the worst charge."""
-        worst = governing(self.of(building), lambda each: each.severity)
+        worst = max(self.of(building), key=lambda each: each.severity)
         return worst.standings[worst.deciding_bay]
 
     def level_words(self, building: str) -> str:
@@ -405,13 +430,13 @@ class Consequences:
         found: dict[str, list[Neighbour]] = {}
         for each in self.neighbours:
             found.setdefault(each.building, []).append(each)
-        return tuple(governing(own, _severity_of_neighbour) for own in found.values())
+        return tuple(max(own, key=_severity_of_neighbour) for own in found.values())
 
     @property
     def worst_barrier(self) -> BarrierResponse | None:
         """The barrier under the charge that tilts a piece most; `None` without pieces."""
         standing = [each for each in self.barriers if len(each.pieces)]
-        return governing(standing, _severity_of_barrier) if standing else None
+        return max(standing, key=_severity_of_barrier) if standing else None
 
     def passes(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level under every charge."""

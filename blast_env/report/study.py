@@ -12,9 +12,8 @@ import pandas as pd
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator, BlastLoads, LoadCase, ThreatOutcome
-from blast_env.evaluation.consequences import Consequences, consequences_of
+from blast_env.evaluation.consequences import Consequences, Severity, consequences_of
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.governing import Severity
 from blast_env.evaluation.probability import Uncertainty
 from blast_env.evaluation.shared import keep_consequences
 from blast_env.gas.settings import Cells

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.evaluation import LoadCase
-from blast_env.evaluation.governing import Severity, governing
+from blast_env.evaluation.consequences import Severity
 from blast_env.geometry import Layout, Rectangle
 from blast_env.site import (
     AnyCharge,
@@ -43,7 +43,7 @@ def chief_threats(
     sources: dict[int, list[LoadCase]] = {}
     for each in places:
         sources.setdefault(each.source, []).append(each)
-    worst = [governing(own, severity) for own in sources.values()]
+    worst = [max(own, key=severity) for own in sources.values()]
     ranked = sorted(worst, key=severity, reverse=True)[:most]
     return tuple(
         replace(each, name=f"T{number}", why=_why(each, len(sources[each.source])))

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import LoadCase
+from blast_env.evaluation.consequences import Severity
 from blast_env.evaluation.engines.gas import GasBlast
-from blast_env.evaluation.governing import Severity
 from blast_env.evaluation.standing import UNSTATED
 from blast_env.report import Limit, StudyOptions
 from blast_env.report.loads import TargetLoad, first_phase_s, targets_of

@@ -16,7 +16,6 @@ from blast_env.calibration import load_calibration
 from blast_env.envs.display import placing_text
 from blast_env.evaluation.engines import Blast, find_engine
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine
-from blast_env.evaluation.governing import Severity
 from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import clearance_outlines
@@ -141,16 +140,6 @@ def test_gas_loads_every_wall_and_the_courtyard() -> None:
     assert set(range(len(footprint.walls))) <= set(walls.tolist())
     by_face = result.walls.set_index("face")["impulse_pa_s"]
     assert by_face["west"] > by_face["east"]
-
-
-def test_the_worst_charge_is_guessed_as_for_a_rectangle() -> None:
-    """By the open impulse on points of the walls, which the modules before them do not hide."""
-    ring = [(6.0, 3.0), (8.0, 3.0), (8.0, 5.0), (6.0, 5.0)]
-    plain, own = (
-        Severity.in_the_open(each, Charge((2.0, 4.0), 5.0)).load
-        for each in (Scenario.from_document(site_document(), "hut"), museum(outline_m=ring))
-    )
-    assert own == pytest.approx(plain, rel=0.2)
 
 
 def test_the_surrogate_knows_its_walls() -> None:
