@@ -38,7 +38,6 @@ from blast_env.io.export import LayoutPlan, check_target, export_layouts
 from blast_env.site import AnyCharge, ObjectiveSection, Scenario
 from blast_env.statistics import Estimate
 from blast_env.tables import write_csv
-from blast_env.units import PA_PER_PSI
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -334,9 +333,8 @@ def print_means(
         ("without barrier", comparison.unprotected_mean, bare_error, bare_cvar),
         ("with barrier", comparison.mean, comparison.mean_error, comparison.cvar),
     ):
-        psi_s = "" if objective.needs_peaks else f" ({load.value / PA_PER_PSI:.4f} psi s)"
         print_line(
-            f"{words}: mean {load_text(objective, load, error, sampled)}{psi_s}, "
+            f"{words}: mean {load_text(objective, load, error, sampled)}, "
             f"mean of the worst {share} {objective.text(cvar)}"
         )
     if comparison.grid_error is not None:

@@ -291,12 +291,11 @@ def _number(value: float, form: str, missing: str = "-") -> str:
 
 
 def _scaled(result: "BlastResult | GasResult", name: str) -> dict[str, Any]:
-    """Return the impulse on a structure in Pa s and psi s, or the error without one."""
+    """Return the impulse on a structure in Pa s, or the error without one."""
     try:
-        impulse = result.impulse(name)
+        return result.impulse(name)._asdict()
     except BlastEnvError as error:
         return {"error": str(error)}
-    return {**impulse._asdict(), "psi_s": impulse.psi_s}
 
 
 def _record(result: "BlastResult | GasResult", written: Sequence[Path]) -> dict[str, object]:
