@@ -73,14 +73,6 @@ def consequences(
         BlastEnvError: If no structure has a facade, or the engine computes no overpressure or
             records no bays.
     """
-    scenario, engine = evaluator.scenario, evaluator.engine
-    if not scenario.bays:
-        raise BlastEnvError(
-            f"scenario {scenario.name!r}: no structure has a facade with bays: add "
-            "[structures.facade]"
-        )
-    if not engine.has_peaks:
-        raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
     parts, every = [], list(charges)
     for number, charge in enumerate(every, start=1):
         of_one = _without_fallen if without_fallen else _shared
@@ -119,8 +111,15 @@ def _without_fallen(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge
 
 def _blasted(evaluator: BlastEvaluator, layout: Layout, charge: AnyCharge) -> Any:
     """Return the result of a blast, with its bays."""
-    engine = evaluator.engine
-    result: Any = engine.blast(evaluator.scenario, layout, 0, charge).run()
+    scenario, engine = evaluator.scenario, evaluator.engine
+    if not scenario.bays:
+        raise BlastEnvError(
+            f"scenario {scenario.name!r}: no structure has a facade with bays: add "
+            "[structures.facade]"
+        )
+    if not engine.has_peaks:
+        raise BlastEnvError(f"engine {engine.name!r} knows no overpressure: must be 'gas'")
+    result: Any = engine.blast(scenario, layout, 0, charge).run()
     if getattr(result, "bay_loads", None) is None:
         raise BlastEnvError(f"engine {engine.name!r} records no bays: must be 'gas'")
     return result
