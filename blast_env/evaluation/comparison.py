@@ -86,21 +86,6 @@ STRUCTURE_COLUMNS: Final = (
 )
 
 
-def module_columns(has_particles: bool) -> tuple[Column, ...]:
-    """Return the columns of `Evaluation.module_table`, which end with loads and reduction."""
-    unit, words = ("sim", "sum of m |v|") if has_particles else ("n_s", "momentum on its walls")
-    shown = "sim" if has_particles else "N s"
-    return (
-        Column("module_id", "", "name of the module, made from its centre in metres"),
-        Column("structure", "", "structure that the module is part of"),
-        Column("x_m", "m", "centre, from the left border"),
-        Column("y_m", "m", "centre, from the lower border"),
-        Column(f"impulse_{unit}", shown, f"{words} with the barrier"),
-        Column(f"unprotected_impulse_{unit}", shown, f"{words} without it"),
-        Column("reduction", "", f"of the {words}"),
-    )
-
-
 THREAT_COLUMNS: Final = (
     Column("seed", "", "seed of fan and air"),
     *CHARGE_COLUMNS,
@@ -335,27 +320,27 @@ class Evaluation:
     @property
     def objective_error(self) -> float:
         """Error of the cells of the objective of the first case, as `mean_error`."""
-        error, case = self.grid_error, self.cases[0]
-        if error is None:
-            return np.nan
-        share = error.of_load(
-            lambda each: case.objective_value([error.objective(each)], self.layouts[0])
-        )
-        return share * case.objective_value(self.loads[0], self.layouts[0])
+
+        def share(error: GridError) -> float:
+            return error.of_load(
+                lambda each: self.case.objective_value([error.objective(each)], self.layout)
+            )
+
+        return self._error(self.load, share)
 
     @property
     def mean_error(self) -> float:
         """Error of the cells of `mean`, the share as under the worst threat; NaN without one."""
-        error = self.grid_error
-        return np.nan if error is None else self.mean.value * error.of_load(error.objective)
+        return self._error(self.mean.value, lambda error: error.of_load(error.objective))
 
     @property
     def unprotected_mean_error(self) -> float:
         """The same without a barrier."""
-        error = self.grid_error
-        if error is None:
-            return np.nan
-        return self.unprotected_mean.value * error.of_unprotected(error.objective)
+        mean = self.unprotected_mean.value
+        return self._error(mean, lambda error: error.of_unprotected(error.objective))
+
+    def _error(self, value: float, share: Callable[[GridError], float]) -> float:
+        return np.nan if self.grid_error is None else share(self.grid_error) * value
 
     @property
     def cvar(self) -> float:
@@ -483,7 +468,12 @@ class Evaluation:
 
     @cached_property
     def module_table(self) -> "pd.DataFrame":
-        """One row per module of the structures, in the scene's order; see `module_columns`."""
+        """One row per module of the structures, in the scene's order.
+
+        The columns are `module_id`, `structure`, `x_m`, `y_m`, the load on the module with the
+        barrier and without (of particles `impulse_sim`, the sum of m |v|; of gas `impulse_n_s`, the
+        momentum on its walls), and its `reduction`.
+        """
         from blast_env.particles.tables import module_table
 
         threat = self.threats[0]
@@ -492,10 +482,13 @@ class Evaluation:
             np.mean([load.module_impulse for load in loads], axis=0)
             for loads in (self.blasts[0], self.unprotected_blasts[0])
         )
-        names = [column.name for column in module_columns(self.blasts[0][0].has_particles)]
-        values = dict(
-            zip(names[-3:], (impulse, without, reductions(impulse, without)), strict=True)
-        )
+        name = "impulse_sim" if self.blasts[0][0].has_particles else "impulse_n_s"
+        values = {
+            name: impulse,
+            f"unprotected_{name}": without,
+            "reduction": reductions(impulse, without),
+        }
+        names = ["module_id", "structure", "x_m", "y_m", *values]
         return module_table(scene.obstacles()).assign(**values)[names]
 
     @cached_property
