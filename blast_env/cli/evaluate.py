@@ -7,7 +7,7 @@ from typing import Final
 import typer
 
 from blast_env.cli.command import Target, note_target, writes
-from blast_env.cli.evaluation_report import EvaluateOptions, report_layout
+from blast_env.cli.evaluation_report import EvaluateOptions, report
 from blast_env.cli.options import (
     UNTIL_HELP,
     CacheOption,
@@ -26,9 +26,9 @@ from blast_env.cli.options import (
 )
 from blast_env.cli.output import resumable
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.evaluation import BlastEvaluator, SeedRange
+from blast_env.evaluation import BlastEvaluator, LoadCaseSet, SeedRange
 from blast_env.evaluation.engines import JUDGE
-from blast_env.io.export import LayoutPlan, is_file
+from blast_env.io.export import is_file
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.site import load_scenario
 from blast_env.statistics import CVAR_LEVEL, check_cvar_level
@@ -108,10 +108,11 @@ def evaluate(
 
 def _evaluate_file(path: Path, name: str, options: EvaluateOptions) -> None:
     scenario = load_scenario(name)
-    layout = load_layout(path, scenario)
-    plan = LayoutPlan(scenario, layout, provenance=LayoutFile.load(path).provenance)
+    layout, provenance = load_layout(path, scenario), LayoutFile.load(path).provenance
     engine = options.engine_for(options.engine, [scenario])
-    report_layout(plan, BlastEvaluator(scenario, engine, cache=options.cache), options)
+    case = LoadCaseSet(scenario, options.threats(scenario, engine))
+    evaluator = BlastEvaluator(scenario, engine, cache=options.cache)
+    report(evaluator, [case], [layout], options, provenance)
 
 
 def _evaluate_run(

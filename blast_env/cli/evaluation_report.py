@@ -1,11 +1,12 @@
 """The printed and written output of `blast-env evaluate`."""
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isnan, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from blast_env.cli.options import GivenCharge
 from blast_env.cli.output import (
@@ -22,6 +23,7 @@ from blast_env.cli.output import (
 from blast_env.evaluation import (
     BlastEvaluator,
     Evaluation,
+    Evaluators,
     LoadCase,
     LoadCaseSet,
     compare,
@@ -30,12 +32,11 @@ from blast_env.evaluation import (
 from blast_env.evaluation.answers import building_words
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
 from blast_env.evaluation.engines import Engine
-from blast_env.evaluation.evaluator import BlastCounts
 from blast_env.evaluation.grid_error import final_engine, percent, points, with_errors, worse
-from blast_env.files import make_folder
-from blast_env.geometry import layout_counts
+from blast_env.files import make_folder, write_text
+from blast_env.geometry import Element, layout_counts
 from blast_env.io.export import LayoutPlan, check_target, export_layouts
-from blast_env.site import AnyCharge, ObjectiveSection, Scenario
+from blast_env.site import AnyCharge, ObjectiveSection, Scenario, save_scenario
 from blast_env.statistics import Estimate
 from blast_env.tables import write_csv
 
@@ -85,14 +86,6 @@ class EvaluateOptions:
             make_folder(self.out)
 
 
-def cache_text(counts: BlastCounts) -> str:
-    """Return the number of blasts run, and of those found in the cache, in words."""
-    return (
-        f"{counts.blasts:g} blasts run, {counts.cache_hits:g} known already "
-        f"(cache hit rate {percent(counts.cache_hit_rate)})"
-    )
-
-
 def interval(estimate: Estimate) -> str:
     """Return an interval of shares in words; a dash for a single threat."""
     if isnan(estimate.low):
@@ -129,14 +122,12 @@ def threats_text(count: int, seeds: range) -> str:
     return f"means over {count} threats (seeds {seeds[0]} to {seeds[-1]})"
 
 
-def print_if_all_charges(
-    scenario: Scenario, charges: Iterable[AnyCharge | None], training: str = ""
+def _print_if_all_charges(
+    scenario: Scenario, charges: Iterable[AnyCharge], *, is_trained: bool
 ) -> None:
-    """Print a note if charges include all possible ones of a scenario, which are fixed.
-
-    `training` has words on their part in a training.
-    """
+    """Print a note if charges include all possible ones of a scenario, which are fixed."""
     count = len(fixed_charges(scenario))
+    training = "training may have met them, and " if is_trained else ""
     if count > 1 and are_all(scenario, charges):
         print_line(
             f"note: the site has {count} fixed charges, which all count here; {training}the "
@@ -146,21 +137,6 @@ def print_if_all_charges(
 
 _LEFT_OUT: Final = ("scenario", "threats", "modules", "cases")
 """Parts of a record that `--json` leaves out; those of `--out` are complete."""
-
-
-def print_json_record(
-    record: Mapping[str, object],
-    files: Sequence[Path],
-    options: EvaluateOptions,
-    counts: BlastCounts,
-) -> bool:
-    """Print a record as JSON, if that is wanted; return whether it is."""
-    if options.is_json:
-        rate = {"hits": counts.cache_hits, "hit_rate": counts.cache_hit_rate}
-        cache = {"blasts": counts.blasts, **rate}
-        more = {"cache": cache, "files": [str(path) for path in files]}
-        print_json({key: x for key, x in {**record, **more}.items() if key not in _LEFT_OUT})
-    return options.is_json
 
 
 _HEADERS: Final = (
@@ -175,6 +151,12 @@ _HEADERS: Final = (
 )
 
 
+_CASE_HEADERS: Final = (
+    *("scenario", "charge (m)", "kg TNT", "modules", "without (Pa s)", "with (Pa s)"),
+    "reduction",
+)
+
+
 def asked_blasts(
     cases: Sequence[LoadCaseSet], engine: Engine
 ) -> Iterator[tuple[Engine | None, Scenario, AnyCharge]]:
@@ -186,63 +168,151 @@ def asked_blasts(
     yield from [(engine.coarser, worst.scenario, worst.threats[0].charge)] * 2
 
 
-def report_layout(plan: LayoutPlan, evaluator: BlastEvaluator, options: EvaluateOptions) -> None:
-    """Evaluate a layout on the threats drawn by the seeds; print and write the result."""
-    engine = evaluator.engine
-    case = LoadCaseSet(plan.scenario, options.threats(plan.scenario, engine))
-    options.prepare_files(1)
+def report(
+    evaluators: Evaluators | BlastEvaluator,
+    cases: Sequence[LoadCaseSet],
+    layouts: Sequence[Sequence[Element]],
+    options: EvaluateOptions,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Evaluate layouts, one per case; print and write the result.
+
+    Several cases are those of the agent of a run, with one charge each; a single one has the
+    threats drawn by the seeds. `provenance` has the origin of the layouts.
+    """
+    options.prepare_files(len(cases))
+    engine, scenarios = evaluators.engine, [case.scenario for case in cases]
     if not options.is_json:
-        print_line(engine.describe([plan.scenario]))
-        print_cost(asked_blasts([case], engine))
-    with progress_bar(f"{2 * len(case.threats)} blasts in {plan.scenario.name}") as progress:
-        evaluation = compare(
-            evaluator,
-            [case],
-            [plan.layout],
+        print_line(engine.describe(scenarios))
+        print_cost(asked_blasts(cases, engine))
+    names = [*dict.fromkeys(each.name for each in scenarios)]
+    place = names[0] if len(names) == 1 else f"{len(names)} sites"
+    blasts = 2 * sum(len(case.threats) for case in cases)
+    with progress_bar(f"{blasts} blasts in {place}") as progress:
+        found = compare(
+            evaluators,
+            cases,
+            layouts,
             options.processes,
             with_error=True,
             cvar_level=options.cvar_level,
             progress=progress,
         )
-    written = [] if options.out is None else _write(evaluation, options.out)
-    if options.export is not None:
-        written += export_layouts({"layout": plan}, options.export)
     record = {
-        **evaluation.to_dict(),
-        "scenario_name": plan.scenario.name,
-        "preset": plan.scenario.simulation.preset if engine.needs_calibration else None,
-        "provenance": dict(plan.provenance),
+        **found.to_dict(),
+        "scenario_name": place,
+        "preset": scenarios[0].simulation.preset if engine.needs_calibration else None,
+        "provenance": dict(provenance),
     }
-    if print_json_record(record, written, options, evaluator.counts):
+    written = [] if options.out is None else _write(found, record, options.out)
+    exported: list[Path] = []
+    if options.export is not None:
+        plans = _plans(found, provenance)
+        exported = export_layouts(plans, options.export)
+        if len(names) > 1:  # no other file has the sites
+            exported += _write_sites(plans, options.export)
+    counts = evaluators.counts
+    if options.is_json:
+        hits = {"hits": counts.cache_hits, "hit_rate": counts.cache_hit_rate}
+        cache = {"blasts": counts.blasts, **hits}
+        more = {"cache": cache, "files": [str(path) for path in (*written, *exported)]}
+        print_json({key: x for key, x in {**record, **more}.items() if key not in _LEFT_OUT})
         return
-    _print_evaluation(evaluation, options.seeds)
+    _print_evaluation(found, options.seeds, provenance)
     print_written(written)
-    print_line(cache_text(evaluator.counts))
-
-
-def _write(evaluation: Evaluation, out: Path) -> list[Path]:
-    written = [evaluation.to_json(out / "evaluation.json")]
-    tables = {
-        "structures.csv": evaluation.table,
-        "buildings.csv": evaluation.building_table,
-        "modules.csv": evaluation.module_table,
-        "threats.csv": evaluation.threat_table,
-    }
-    written += [write_csv(table, out / name) for name, table in tables.items()]
-    return written + save_pictures(
-        (out / "evaluation.png", partial(_figure, evaluation)),
-        (out / LAYOUT_PICTURE, partial(layout_picture, evaluation.scenario, evaluation.layout)),
+    if found.has_one_case:
+        print_written(exported)
+    elif exported:
+        print_line(f"wrote {len(cases)} layouts to {options.export}, files: {len(exported)}")
+    print_line(
+        f"{counts.blasts:g} blasts run, {counts.cache_hits:g} known already "
+        f"(cache hit rate {percent(counts.cache_hit_rate)})"
     )
 
 
-def _figure(evaluation: Evaluation) -> "Figure":
+def _write(found: Evaluation, record: Mapping[str, Any], out: Path) -> list[Path]:
+    text = json.dumps(record, indent=2, allow_nan=False)
+    written = [write_text(out / "evaluation.json", text + "\n")]
+    picture = (out / "evaluation.png", partial(_figure, found))
+    if not found.has_one_case:
+        return [*written, write_csv(found.case_table, out / "cases.csv"), *save_pictures(picture)]
+    tables = {
+        "structures.csv": found.table,
+        "buildings.csv": found.building_table,
+        "modules.csv": found.module_table,
+        "threats.csv": found.threat_table,
+    }
+    written += [write_csv(table, out / name) for name, table in tables.items()]
+    plan = partial(layout_picture, found.scenario, found.layout)
+    return written + save_pictures(picture, (out / LAYOUT_PICTURE, plan))
+
+
+def _plans(found: Evaluation, provenance: Mapping[str, Any]) -> dict[str, LayoutPlan]:
+    """Return the layouts by the names of their files, numbered if there are several."""
+    digits, plans = len(str(len(found.cases))), {}
+    for number, (case, layout) in enumerate(zip(found.cases, found.layouts, strict=True), start=1):
+        threat, own = case.threats[0], dict(provenance)
+        name = "layout" if found.has_one_case else f"layout_{number:0{digits}}"
+        if not found.has_one_case:
+            own["seed"] = threat.seed
+        charge = case.charge and threat.charge_against(case.scenario, layout)
+        plans[name] = LayoutPlan(case.scenario, layout, charge, own)
+    return plans
+
+
+def _write_sites(plans: Mapping[str, LayoutPlan], folder: Path) -> list[Path]:
+    """Write the scenario of each layout beside it."""
+    paths = [folder / f"{name}_site.toml" for name in plans]
+    for path, plan in zip(paths, plans.values(), strict=True):
+        save_scenario(plan.scenario, path)
+    return paths
+
+
+def _figure(found: Evaluation) -> "Figure":
     # Here, because pictures need the extra `render`.
-    from blast_env.plots.evaluation_figures import evaluation_figure
+    from blast_env.plots.evaluation_figures import comparison_figure, evaluation_figure
 
-    return evaluation_figure(evaluation)
+    return evaluation_figure(found) if found.has_one_case else comparison_figure(found)
 
 
-def _print_evaluation(evaluation: Evaluation, seeds: range) -> None:
+def _print_evaluation(found: Evaluation, seeds: range, provenance: Mapping[str, Any]) -> None:
+    if found.has_one_case:
+        _print_layout(found, seeds)
+    else:
+        title = f"{provenance['algorithm']} of {provenance['run']}, a layout a row"
+        _print_cases(found, f"{title}, {threats_text(len(found.cases), seeds)}")
+    charges = [threat.charge for case in found.cases for threat in case.threats]
+    _print_if_all_charges(found.scenario, charges, is_trained="run" in provenance)
+    for note in found.notes if found.has_one_case else ():
+        print_line(f"note: {note}")
+
+
+def _print_cases(found: Evaluation, title: str) -> None:
+    """Print the layout of each case, and the mean effect."""
+    objective = found.cases[0].scenario.objective
+    rows = [
+        (
+            row["scenario"],
+            f"({row['charge_x_m']:.1f}, {row['charge_y_m']:.1f})",
+            f"{row['tnt_kg']:g}",
+            str(row["modules"]),
+            objective.text(row["unprotected_load"]),
+            objective.text(row["load"]),
+            percent(row["reduction"]) + ("" if row["in_range"] else " ~"),
+        )
+        for row in found.case_table.to_dict("records")
+    ]
+    print_table(title, _CASE_HEADERS, rows)
+    outside = int((~found.within.all(axis=1)).sum())
+    if outside:
+        print_line(f"note: {outside} threats are outside the range of the calibration (marked ~)")
+    print_means(found, objective, "cases")
+    if found.engine.needs_calibration:
+        calibrations = dict.fromkeys(str(case.scenario.calibration) for case in found.cases)
+        print_line(f"calibration {', '.join(calibrations)}")
+
+
+def _print_layout(evaluation: Evaluation, seeds: range) -> None:
     """Print the buildings' mean loads, and the effect of the layout over all threats."""
     count = len(evaluation.threats)
     rows = []
@@ -266,9 +336,6 @@ def _print_evaluation(evaluation: Evaluation, seeds: range) -> None:
     for line in standing_lines(evaluation.scenario, evaluation.building_table, "structure"):
         print_line(line)
     _print_totals(evaluation)
-    print_if_all_charges(evaluation.scenario, [each.charge for each in evaluation.threats])
-    for note in evaluation.notes:
-        print_line(f"note: {note}")
 
 
 def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:

@@ -59,8 +59,7 @@ def test_a_visible_threat_gets_a_layout_for_each_charge(visible: Path, tmp_path:
         )
         assert (provenance["run"], provenance["seed"]) == (str(visible), threat.seed)
     assert f"mean reduction {100.0 * table['reduction'].mean():.1f} %" in result.stdout
-    assert "MaskablePPO of" in result.stdout
-    assert "ms each (median)" in result.stdout
+    assert "maskable_ppo of" in result.stdout
     assert "note:" not in result.stdout
     assert {path.name for path in out.iterdir()} == {
         "evaluation.json",
