@@ -78,13 +78,6 @@ class EvaluateOptions:
         )
         return threats if engine.has_noise else one_of_each_charge(threats)
 
-    def prepare_files(self, layouts: int) -> None:
-        """Check the targets for some layouts before the blasts, so that no result is lost."""
-        if self.export is not None:
-            check_target(self.export, layouts)
-        if self.out is not None:
-            make_folder(self.out)
-
 
 def interval(estimate: Estimate) -> str:
     """Return an interval of shares in words; a dash for a single threat."""
@@ -180,7 +173,10 @@ def report(
     Several cases are those of the agent of a run, with one charge each; a single one has the
     threats drawn by the seeds. `provenance` has the origin of the layouts.
     """
-    options.prepare_files(len(cases))
+    if options.export is not None:
+        check_target(options.export, len(cases))  # before the blasts, so that no result is lost
+    if options.out is not None:
+        make_folder(options.out)
     engine, scenarios = evaluators.engine, [case.scenario for case in cases]
     if not options.is_json:
         print_line(engine.describe(scenarios))
