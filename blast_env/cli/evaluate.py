@@ -108,7 +108,7 @@ def evaluate(
 
 def _evaluate_file(path: Path, name: str, options: EvaluateOptions) -> None:
     scenario = load_scenario(name)
-    layout, provenance = load_layout(path, scenario), LayoutFile.load(path).provenance
+    layout, provenance = sorted(load_layout(path, scenario)), LayoutFile.load(path).provenance
     engine = options.engine_for(options.engine, [scenario])
     case = LoadCaseSet(scenario, options.threats(scenario, engine))
     evaluator = BlastEvaluator(scenario, engine, cache=options.cache)

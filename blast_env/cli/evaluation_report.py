@@ -251,7 +251,8 @@ def _plans(found: Evaluation, provenance: Mapping[str, Any]) -> dict[str, Layout
         name = "layout" if found.has_one_case else f"layout_{number:0{digits}}"
         if not found.has_one_case:
             own["seed"] = threat.seed
-        charge = case.charge and threat.charge_against(case.scenario, layout)
+        known = case.charge is not None
+        charge = threat.charge_against(case.scenario, layout) if known else None
         plans[name] = LayoutPlan(case.scenario, layout, charge, own)
     return plans
 

@@ -76,7 +76,7 @@ def evaluate_layout(
     return compare(
         evaluator,
         [LoadCaseSet(found, drawn)],
-        [layout],
+        [sorted(check_layout(found, layout))],
         processes,
         with_error=True,
         cvar_level=cvar_level,
@@ -113,7 +113,7 @@ def compare(
     if not cases:
         raise BlastEnvError("cases: there are none, must be at least one")
     pairs = zip(cases, layouts, strict=True)
-    cells = [tuple(sorted(check_layout(case.scenario, layout))) for case, layout in pairs]
+    cells = [tuple(check_layout(case.scenario, layout)) for case, layout in pairs]
     blasts, unprotected = zip(
         *loads_of_both(evaluators.of, cases, cells, processes, progress), strict=True
     )
