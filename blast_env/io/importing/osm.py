@@ -3,8 +3,8 @@
 import bz2
 import gzip
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -32,7 +32,7 @@ with import_extra("maps", "maps and drawings"):
     import osmium
     import shapely
     from osmium import osm
-    from shapely.geometry import LineString, MultiLineString, MultiPolygon, Point, Polygon
+    from shapely.geometry import LineString, MultiLineString, Point, Polygon
     from shapely.geometry.base import BaseGeometry
 
 SUFFIXES: Final = (".osm", ".pbf", ".osm.bz2", ".osm.gz")
@@ -46,12 +46,12 @@ _PACKED: Final[Mapping[str, Callable[[Path, str], Any]]] = MappingProxyType(
 _PART_BYTES: Final = 2**20
 _WGS84: Final = "EPSG:4326"
 _LEAST_RING: Final = 4  # points, the first one again at the end
-_NEW_IDS: Final = 2**40
-"""Objects that JOSM has not uploaded have negative ids, for which osmium has no index of nodes."""
-
-_KINDS: Final = ("node", "way", "relation")
 _AREAS: Final = ("multipolygon", "boundary")
 """The types of relations that are outlines."""
+
+Places = list[tuple[float, float]]
+_Way = tuple[Tags, list[int]]
+_Relation = tuple[Tags, list[int]]
 
 CUT: Final = "ways of which the extract does not have all nodes"
 SHORT: Final = "ways of fewer than two nodes"
@@ -69,19 +69,12 @@ def read_osm(path: Path) -> SiteMap:
     Raises:
         BlastEnvError: If it cannot be read.
     """
-    found = _Found()
-    points = 0
     with (
         _unpacked(checked_file(path)) as plain,
-        scratch_folder() as folder,
         errors_of("osmium", path, "OpenStreetMap data"),
     ):
-        for feature in found.features_of(_in_order(plain, folder)):
-            points += int(shapely.get_num_coordinates(feature.geometry))
-            if len(found.features) > MOST_FEATURES:
-                raise too_many(path)
-            if points > MOST_POINTS:
-                raise too_many_points(path)
+        found = _Found(path, _deleted(plain))
+        found.read(plain)
     lost, remarks = tuple(found.lost), tuple(found.remarks)
     return SiteMap(path, MapCoordinates(_WGS84), tuple(found.features), lost, remarks)
 
@@ -123,135 +116,20 @@ def _copy(packed: IO[bytes], plain: IO[bytes], path: Path) -> None:
         plain.write(part)
 
 
-def _in_order(path: Path, folder: Path) -> Path:
-    """Return a file of the same objects: nodes, ways, relations, each by ids above 0."""
-    order = _Order.of(path)
-    if order.is_plain:
-        return path
-    if order.must_change:
-        changed = folder / "changed.osm.pbf"
-        with osmium.SimpleWriter(str(changed)) as writer:
-            for _ in osmium.FileProcessor(str(path)).with_filter(
-                _Renumbered(writer, order.deleted)
-            ):
-                pass
-        path = changed
-    ordered = folder / "ordered.osm.pbf"
-    reader = osmium.MergeInputReader()
-    try:
-        reader.add_file(str(path))
-    except RuntimeError as error:  # from C++, so `errors_of` finds no frame of osmium
-        raise BlastEnvError(f"{path}: cannot be read as OpenStreetMap data: {error}") from error
-    with osmium.SimpleWriter(str(ordered)) as writer:
-        reader.apply(writer)
-    return ordered
+def _deleted(path: Path) -> set[tuple[str, int]]:
+    """Return kinds and ids of the objects that JOSM has marked as deleted, which osmium ignores."""
+    found: set[tuple[str, int]] = set()
 
+    def start(kind: str, attributes: dict[str, str]) -> None:
+        if attributes.get("action") == "delete":
+            found.add((kind, int(attributes.get("id", "0"))))
 
-@dataclass
-class _Order:
-    """The order of a file, and the marks of JOSM, which osmium ignores.
-
-    Attributes:
-        is_plain: Whether the objects are in the order of types and ids, none new or deleted.
-        has_new: Whether there are negative ids.
-        deleted: Kinds and ids of the objects marked as deleted.
-    """
-
-    is_plain: bool = True
-    has_new: bool = False
-    deleted: set[tuple[str, int]] = field(default_factory=set)
-    _last: tuple[int, int] = (0, 0)
-
-    @classmethod
-    def of(cls, path: Path) -> "_Order":
-        """Return the order of a file; damaged ones are for osmium to refuse."""
-        order = cls()
-        if path.suffix.lower() == ".pbf":
-            for _ in osmium.FileProcessor(str(path)).with_filter(order):
-                pass
-            return order
-        parser = expat.ParserCreate()
-        parser.StartElementHandler = order._start
-        try:
-            with path.open("rb") as file:
-                parser.ParseFile(file)
-        except (expat.ExpatError, ValueError):
-            pass
-        return order
-
-    @property
-    def must_change(self) -> bool:
-        """Whether objects must be changed or dropped."""
-        return self.has_new or bool(self.deleted)
-
-    def node(self, node: Any) -> bool:
-        """Note the place of a node; true, which filters it out."""
-        return self._see(0, node.id)
-
-    def way(self, way: Any) -> bool:
-        """Note the place of a way."""
-        return self._see(1, way.id)
-
-    def relation(self, relation: Any) -> bool:
-        """Note the place of a relation."""
-        return self._see(2, relation.id)
-
-    def _start(self, kind: str, attributes: dict[str, str]) -> None:
-        """Note the place of an element of XML."""
-        if kind in _KINDS:
-            number = int(attributes.get("id", "0"))
-            self._see(_KINDS.index(kind), number)
-            if attributes.get("action") == "delete":
-                self.deleted.add((kind, number))
-                self.is_plain = False
-
-    def _see(self, kind: int, number: int) -> bool:
-        if number <= 0 or (kind, number) <= self._last:
-            self.has_new = self.has_new or number < 0
-            self.is_plain = False
-        self._last = (kind, number)
-        return True
-
-
-def _new_id(number: int) -> int:
-    return number if number >= 0 else _NEW_IDS - number
-
-
-def _old_id(number: int) -> int:
-    return number if number < _NEW_IDS else _NEW_IDS - number
-
-
-class _Renumbered:
-    """Writes objects with ids above 0, without the deleted ones; a filter that lets none pass.
-
-    Args:
-        writer: The writer of the new file.
-        deleted: Kinds and ids of the deleted objects.
-    """
-
-    def __init__(self, writer: Any, deleted: set[tuple[str, int]]) -> None:
-        self._writer = writer
-        self._deleted = deleted
-
-    def node(self, node: Any) -> bool:
-        """Write a node."""
-        if ("node", node.id) not in self._deleted:
-            self._writer.add_node(node.replace(id=_new_id(node.id)))
-        return True
-
-    def way(self, way: Any) -> bool:
-        """Write a way."""
-        if ("way", way.id) not in self._deleted:
-            nodes = [_new_id(node.ref) for node in way.nodes]
-            self._writer.add_way(way.replace(id=_new_id(way.id), nodes=nodes))
-        return True
-
-    def relation(self, relation: Any) -> bool:
-        """Write a relation."""
-        if ("relation", relation.id) not in self._deleted:
-            members = [(each.type, _new_id(each.ref), each.role) for each in relation.members]
-            self._writer.add_relation(relation.replace(id=_new_id(relation.id), members=members))
-        return True
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = start
+    if path.suffix.lower() != ".pbf":
+        with suppress(expat.ExpatError, ValueError), path.open("rb") as file:
+            parser.ParseFile(file)  # osmium refuses a damaged file
+    return found
 
 
 @dataclass
@@ -259,117 +137,126 @@ class _Found:
     """The objects of a file.
 
     Attributes:
+        path: The file, for errors.
+        deleted: Kinds and ids of the objects that are marked as deleted.
         features: Those that are usable.
         lost: The others.
         remarks: What was mended.
-        lines: Known part of each way without tags, by id, for relations.
+        lines: Known part of each way, by id.
+        left: Number of points that the outlines and lines may still have.
     """
 
+    path: Path
+    deleted: set[tuple[str, int]]
     features: list[MapFeature] = field(default_factory=list)
     lost: list[LostFeature] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
-    lines: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    lines: dict[int, Places] = field(default_factory=dict)
+    left: int = MOST_POINTS
 
-    def features_of(self, path: Path) -> Iterator[MapFeature]:
-        """Yield all usable objects, and collect them with the others."""
-        processor = osmium.FileProcessor(str(path)).with_areas()
-        processor.with_filter(osmium.filter.EmptyTagFilter())
-        processor.handler_for_filtered(self)
-        relations: dict[int, tuple[Tags, list[tuple[str, int, str]]]] = {}
-        whole: set[int] = set()  # osmium puts some together before it comes to the relations
-        for item in processor:
+    def read(self, plain: Path) -> None:
+        """Collect the objects with tags of the unpacked file, which may be in any order."""
+        ways, relations = dict[int, _Way](), dict[int, _Relation]()
+        points = 0
+        item: Any  # a way or a relation
+        for item in osmium.FileProcessor(str(plain), osm.WAY | osm.RELATION):
+            kind = "way" if isinstance(item, osm.Way) else "relation"
+            if (kind, item.id) in self.deleted:
+                continue
             tags: Tags = {tag.k: tag.v for tag in item.tags}
-            if isinstance(item, osm.Node):
-                if item.location.valid():
-                    self.features.append(
-                        MapFeature(Point(item.lon, item.lat), tags, _place("node", item.id))
-                    )
-                    yield self.features[-1]
-            elif isinstance(item, osm.Way):
-                yield from self._way(item, tags)
-            elif isinstance(item, osm.Relation):
-                members = [(each.type, each.ref, each.role) for each in item.members]
+            if kind == "way":
+                ways[item.id] = tags, [node.ref for node in item.nodes]
+                points += len(item.nodes) if tags else 0
+            elif tags:
+                members = [each.ref for each in item.members if each.type == "w"]
                 relations[item.id] = tags, members
-            elif isinstance(item, osm.Area) and not item.from_way():
-                rings = list(item.outer_rings())
-                if rings:
-                    whole.add(item.orig_id())
-                    parts = [
-                        Polygon(_places(ring), [_places(hole) for hole in item.inner_rings(ring)])
-                        for ring in rings
-                    ]
-                    geometry = parts[0] if len(parts) == 1 else MultiPolygon(parts)
-                    place = _place("relation", item.orig_id())
-                    self.features.append(MapFeature(geometry, tags, place))
-                    yield self.features[-1]
-        for number in relations.keys() - whole:
-            yield from self._relation(_place("relation", number), *relations[number])
+            if points > MOST_POINTS:
+                raise too_many_points(self.path)
+        places = self._nodes(plain, {node for _, nodes in ways.values() for node in nodes})
+        for number in sorted(ways, key=_by_age):
+            self._way(number, *ways[number], places)
+        for number in sorted(relations, key=_by_age):
+            self._relation(f"relation {number}", *relations[number])
 
-    def way(self, way: Any) -> None:
-        """Collect a way without tags, which may be the side of a relation."""
-        self.lines[way.id] = _known_places(way.nodes)
+    def _nodes(self, plain: Path, needed: set[int]) -> dict[int, tuple[float, float]]:
+        """Collect the nodes with tags; return longitude and latitude of the needed ones."""
+        places, tagged = dict[int, tuple[float, float]](), dict[int, MapFeature]()
+        node: Any
+        for node in osmium.FileProcessor(str(plain), osm.NODE):
+            if node.id not in needed and not len(node.tags):
+                continue
+            if node.location.valid() and ("node", node.id) not in self.deleted:
+                places[node.id] = node.lon, node.lat
+                if tags := {tag.k: tag.v for tag in node.tags}:
+                    point = Point(node.lon, node.lat)
+                    tagged[node.id] = MapFeature(point, tags, f"node {node.id}")
+        for number in sorted(tagged, key=_by_age):
+            self._add(tagged[number])
+        return places
 
-    def _way(self, way: Any, tags: Tags) -> Iterator[MapFeature]:
-        """Yield a way as an outline if it is closed and not a street, otherwise as a line."""
-        place, places = _place("way", way.id), _known_places(way.nodes)
-        self.lines[way.id] = places
-        if len(places) < len(way.nodes) or len(places) < 2:
-            reason = SHORT if len(way.nodes) < 2 else CUT
+    def _way(
+        self, number: int, tags: Tags, nodes: list[int], known: Mapping[int, tuple[float, float]]
+    ) -> None:
+        """Collect a way as an outline if it is closed and not a street, otherwise as a line."""
+        places = self.lines[number] = [known[node] for node in nodes if node in known]
+        place = f"way {number}"
+        if tags and (len(places) < len(nodes) or len(places) < 2):
+            reason = SHORT if len(nodes) < 2 else CUT
             self.lost.append(LostFeature(_line(places), tags, place, reason))
-            return
-        is_area = way.is_closed() and len(places) >= _LEAST_RING and "highway" not in tags
-        geometry = Polygon(places) if is_area else LineString(places)
-        self.features.append(MapFeature(geometry, tags, place))
-        yield self.features[-1]
+        elif tags:
+            is_area = nodes[0] == nodes[-1] and len(places) >= _LEAST_RING
+            is_area = is_area and "highway" not in tags
+            geometry = Polygon(places) if is_area else LineString(places)
+            self._add(MapFeature(geometry, tags, place))
 
-    def _relation(
-        self, place: str, tags: Tags, members: list[tuple[str, int, str]]
-    ) -> Iterator[MapFeature]:
-        """Yield a relation that osmium has not put together, if its ways give an outline."""
-        ways = [(self.lines.get(number), role) for kind, number, role in members if kind == "w"]
-        known = MultiLineString([line for line, _ in ways if line and len(line) > 1])
+    def _relation(self, place: str, tags: Tags, ways: list[int]) -> None:
+        """Collect a relation, if its ways give an outline."""
+        lines = [self.lines[each] for each in ways if len(self.lines.get(each, ())) > 1]
+        known = MultiLineString(lines)
         if tags.get("type") not in _AREAS:
             self.lost.append(LostFeature(known, tags, place, "relations that are no outlines"))
             return
-        if any(line is None for line, _ in ways):
+        if any(each not in self.lines for each in ways):
             self.lost.append(LostFeature(known, tags, place, INCOMPLETE))
             return
-        sides = {
-            is_inner: [line for line, role in ways if line and (role == "inner") is is_inner]
-            for is_inner in (False, True)
-        }
-        geometry = shapely.difference(_covered(sides[False]), _covered(sides[True]))
+        faces, *rest = shapely.polygonize_full([LineString(line) for line in lines])
+        rings = shapely.get_exterior_ring(shapely.get_parts(faces))
+        geometry: BaseGeometry = Polygon()
+        for ring in rings:
+            geometry = shapely.symmetric_difference(geometry, Polygon(ring))
         if geometry.area == 0.0:
             self.lost.append(LostFeature(known, tags, place, OPEN))
             return
-        self.remarks.append((TOUCHING, place, ""))
-        self.features.append(MapFeature(geometry, tags, place))
-        yield self.features[-1]
+        if MultiLineString(list(rings)).is_simple and all(each.is_empty for each in rest):
+            geometry = _ordered(geometry)
+        else:
+            self.remarks.append((TOUCHING, place, ""))
+        self._add(MapFeature(geometry, tags, place))
+
+    def _add(self, feature: MapFeature) -> None:
+        self.left -= int(shapely.get_num_coordinates(feature.geometry))
+        self.features.append(feature)
+        if len(self.features) > MOST_FEATURES:
+            raise too_many(self.path)
+        if self.left < 0:
+            raise too_many_points(self.path)
 
 
-def _place(kind: str, number: int) -> str:
-    return f"{kind} {_old_id(number)}"
+def _ordered(area: BaseGeometry) -> BaseGeometry:
+    """Return an area with its rings from the left, outer ones counterclockwise."""
+    parts = shapely.get_parts(shapely.reverse(shapely.normalize(area)))
+    polygons = [
+        Polygon(each.exterior, sorted(each.interiors, key=lambda ring: ring.coords[0]))
+        for each in sorted(parts, key=lambda each: each.exterior.coords[0])
+    ]
+    return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 
 
-def _covered(lines: Iterable[list[tuple[float, float]]]) -> BaseGeometry:
-    """Return the area that lines enclose."""
-    sound = [LineString(line) for line in lines if len(line) > 1]
-    return shapely.union_all(shapely.get_parts(shapely.polygonize(sound)))
+def _by_age(number: int) -> tuple[bool, int]:
+    """Return the order of ids; those of objects that are not uploaded are negative, and last."""
+    return number < 0, abs(number)
 
 
-def _line(places: list[tuple[float, float]]) -> BaseGeometry:
+def _line(places: Places) -> BaseGeometry:
     """Return the known part of a way."""
     return LineString(places) if len(places) > 1 else shapely.MultiPoint(places)
-
-
-def _known_places(nodes: Iterable[Any]) -> list[tuple[float, float]]:
-    """Return longitude and latitude of the nodes that the file has."""
-    try:
-        return _places(nodes)
-    except osmium.InvalidLocationError:
-        return [(node.lon, node.lat) for node in nodes if node.location.valid()]
-
-
-def _places(nodes: Iterable[Any]) -> list[tuple[float, float]]:
-    """Return longitude and latitude of nodes."""
-    return [(node.lon, node.lat) for node in nodes]
