@@ -314,6 +314,15 @@ def stacked_runs(cells: BoolArray) -> IntArray:
     return found[np.lexsort((first, row))]
 
 
+def fewest_runs(cells: BoolArray) -> IntArray:
+    """Return the `stacked_runs` of cells along rows or columns, whichever are fewer.
+
+    So two walls of every rectangle are hidden by no other.
+    """
+    by_rows, by_columns = stacked_runs(cells), stacked_runs(cells.T)
+    return by_rows if len(by_rows) <= len(by_columns) else by_columns[:, [1, 0, 3, 2]]
+
+
 Layout = tuple[Element, ...]
 """The modules, or the pieces, in the order of placement."""
 

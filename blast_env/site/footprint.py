@@ -15,7 +15,7 @@ import shapely
 
 from blast_env.arrays import BoolArray, FloatArray, IntArray
 from blast_env.errors import BlastEnvError
-from blast_env.geometry import Cell, Place, Rectangle, WallLine, stacked_runs
+from blast_env.geometry import Cell, Place, Rectangle, WallLine, fewest_runs
 from blast_env.units import MODULE_SIDE_M
 
 Ring = tuple[Place, ...]
@@ -86,8 +86,6 @@ class Footprint:
     @cached_property
     def boxes_m(self) -> tuple[Rectangle, ...]:
         """Few rectangles that together are its modules."""
-        by_rows, by_columns = stacked_runs(self.grid[1]), stacked_runs(self.grid[1].T)
-        fewer = by_rows if len(by_rows) <= len(by_columns) else by_columns[:, [1, 0, 3, 2]]
         left, bottom = self.corner_m
         return tuple(
             Rectangle(
@@ -96,7 +94,7 @@ class Footprint:
                 left + (column + columns) * MODULE_SIDE_M,
                 bottom + (row + rows) * MODULE_SIDE_M,
             )
-            for row, column, rows, columns in fewer.tolist()
+            for row, column, rows, columns in fewest_runs(self.grid[1]).tolist()
         )
 
     @cached_property

@@ -244,10 +244,15 @@ class _Found:
 
 def _ordered(area: BaseGeometry) -> BaseGeometry:
     """Return an area with its rings from the left, outer ones counterclockwise."""
+
+    def start(ring: Any) -> tuple[float, float]:
+        x, y = ring.coords[0]
+        return x, y
+
     parts = shapely.get_parts(shapely.reverse(shapely.normalize(area)))
     polygons = [
-        Polygon(each.exterior, sorted(each.interiors, key=lambda ring: ring.coords[0]))
-        for each in sorted(parts, key=lambda each: each.exterior.coords[0])
+        Polygon(each.exterior, sorted(each.interiors, key=start))
+        for each in sorted(parts, key=lambda each: start(each.exterior))
     ]
     return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 

@@ -7,19 +7,14 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.io.importing.cells import (
-    CellRectangle,
-    check_outlines,
-    covered_shares,
-    in_blocks,
-    mended,
-    rectangles_of,
-)
+from blast_env.geometry import fewest_runs
+from blast_env.io.importing.cells import check_outlines, covered_shares, in_blocks, mended
 from blast_env.io.importing.fitting import FittedBuilding
 from blast_env.io.importing.ledger import Deed, Ledger
 from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite
 from blast_env.io.importing.things import Role, Thing
+from blast_env.units import MODULE_SIDE_M
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -196,15 +191,14 @@ def _areas(
     # Whole cells only, so that the blocks keep as clear as the area does.
     cells[rows, columns] = shares > 1.0 - 1e-6
     blocks = in_blocks(cells, 1 + int(_AREA_BLOCK * tolerance_m)) & cells
-    for each in CellRectangle.each(rectangles_of(blocks)):
-        left, bottom, far, high = each.rectangle_m
-        size = [far - left, high - bottom]
+    for row, column, *count in fewest_runs(blocks).tolist():
+        height_m, width_m = (MODULE_SIDE_M * each for each in count)
         yield {
             "kind": "rectangle",
-            "corner_m": [left, bottom],
-            "size_m": size,
+            "corner_m": [MODULE_SIDE_M * column, MODULE_SIDE_M * row],
+            "size_m": [width_m, height_m],
             "tnt_kg": tnt_kg,
-            "weight": size[0] * size[1],
+            "weight": width_m * height_m,
         }
 
 

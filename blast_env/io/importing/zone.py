@@ -1,24 +1,20 @@
 """The build zone of an imported site."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from math import lcm
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError, import_extra
-from blast_env.geometry import Rectangle
+from blast_env.geometry import Rectangle, fewest_runs
 from blast_env.io.importing.cells import (
     COARSER,
     LEAST_SHARE,
-    CellRectangle,
     check_outlines,
     covered_shares,
     in_blocks,
     mended,
-    rectangles_of,
 )
 from blast_env.io.importing.fitting import FittedBuilding
 from blast_env.io.importing.options import ImportOptions
@@ -67,7 +63,9 @@ def build_zone(
             )
         return None
     else:
-        inside |= _covered(site, Role.ZONE, LEAST_SHARE)
+        for _, outline in _on_site(site, Role.ZONE):
+            touched, shares = covered_shares(outline, site.shape)
+            inside[touched] |= shares >= LEAST_SHARE
     if not inside.any():
         raise BlastEnvError(f"{site.path}: the build zone is not on the site")
     rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
@@ -88,97 +86,33 @@ def _keep_outs(
     site: PlacedSite, inside: BoolArray, window: tuple[slice, slice]
 ) -> list[dict[str, Any]]:
     """Return the no-build areas, in the finest blocks within the limit of a scenario."""
-    corner = (window[0].start, window[1].start)
-    empty = [_Empty(corner, ~inside[window], _OUTSIDE)]
+    empty = [(_OUTSIDE, window, ~inside[window])]
     for thing, outline in _on_site(site, Role.KEEP_OUT):
         touched, shares = covered_shares(outline, site.shape)
         reason = (thing.name or "no-build area of the map")[:_MOST_REASON]
-        empty += _Empty.within(window, touched, shares > _TOUCHED, reason)
+        empty.append((reason, touched, shares > _TOUCHED))
+    low, left = (each.start for each in window)
     for side in COARSER:
-        tables = [rectangles_of(in_blocks(each.cells, side, _ANY)) for each in empty]
-        count = sum(map(len, tables))
-        if count <= MOST_KEEP_OUTS:
-            return [
-                _area(rectangle, each)
-                for each, table in zip(empty, tables, strict=True)
-                for rectangle in CellRectangle.each(table)
+        found = []
+        for reason, touched, cells in empty:
+            whole = np.zeros(site.shape, dtype=bool)
+            whole[touched] = cells
+            runs = fewest_runs(in_blocks(whole[window], side, _ANY))
+            found += [
+                {
+                    "corner_m": [(left + column) * MODULE_SIDE_M, (low + row) * MODULE_SIDE_M],
+                    "size_m": [columns * MODULE_SIDE_M, rows * MODULE_SIDE_M],
+                    "reason": reason,
+                }
+                for row, column, rows, columns in runs.tolist()
             ]
+        if len(found) <= MOST_KEEP_OUTS:
+            return found
     raise BlastEnvError(
-        f"{site.path}: areas that must stay empty take {count} rectangles even in blocks of "
+        f"{site.path}: areas that must stay empty take {len(found)} rectangles even in blocks of "
         f"{COARSER[-1] * MODULE_SIDE_M:g} m, must take at most {MOST_KEEP_OUTS}: make the zone "
         "smaller or simpler"
     )
-
-
-@dataclass(frozen=True)
-class _Empty:
-    """A window of the site with cells that must stay empty.
-
-    Attributes:
-        corner: Row and column of the window's lower left cell on the site.
-        cells: Whether each cell must stay empty (rows, columns).
-        reason: The reason.
-    """
-
-    corner: tuple[int, int]
-    cells: BoolArray
-    reason: str
-
-    @classmethod
-    def within(
-        cls,
-        window: tuple[slice, slice],
-        touched: tuple[slice, slice],
-        cells: BoolArray,
-        reason: str,
-    ) -> "Iterator[_Empty]":
-        """Yield the part of some cells of a site in the window of the zone, unless it is empty.
-
-        Its bounds lie on multiples of all sizes of blocks.
-        """
-        cut = tuple(map(_in_whole_blocks, window, touched))
-        if any(each.start >= each.stop for each in cut):
-            return
-        found = np.zeros([each.stop - each.start for each in cut], dtype=bool)
-        both = [
-            slice(max(own.start, other.start), min(own.stop, other.stop))
-            for own, other in zip(cut, touched, strict=True)
-        ]
-        into, out_of = (
-            tuple(
-                slice(own.start - base.start, own.stop - base.start)
-                for own, base in zip(both, bases, strict=True)
-            )
-            for bases in (cut, touched)
-        )
-        found[into] = cells[out_of]
-        yield cls((cut[0].start, cut[1].start), found, reason)
-
-
-def _in_whole_blocks(window: slice, touched: slice) -> slice:
-    """Return the touched part of a window, in whole blocks of every size from its start."""
-    block = lcm(*COARSER)
-    first = max(touched.start - window.start, 0) // block * block
-    after = -(-(touched.stop - window.start) // block) * block
-    return slice(window.start + first, min(window.start + after, window.stop))
-
-
-def _area(each: CellRectangle, empty: _Empty) -> dict[str, Any]:
-    row, column = empty.corner[0] + each.row, empty.corner[1] + each.column
-    return {
-        "corner_m": [column * MODULE_SIDE_M, row * MODULE_SIDE_M],
-        "size_m": [each.columns * MODULE_SIDE_M, each.rows * MODULE_SIDE_M],
-        "reason": empty.reason,
-    }
-
-
-def _covered(site: PlacedSite, role: Role, least: float) -> BoolArray:
-    """Return the cells of which an outline of a role covers at least a share (rows, columns)."""
-    cells = np.zeros(site.shape, dtype=bool)
-    for _, outline in _on_site(site, role):
-        window, shares = covered_shares(outline, site.shape)
-        cells[window] |= shares >= least
-    return cells
 
 
 def _on_site(site: PlacedSite, role: Role) -> list[tuple[Thing, BaseGeometry]]:
@@ -226,17 +160,7 @@ def _window_around(
 ) -> tuple[slice, slice]:
     """Return the rows and columns around the protected buildings, within the site."""
     chosen = [each for own in buildings if own.protected for each in own.boxes_m]
-    around = Rectangle(
-        min(each.left for each in chosen),
-        min(each.bottom for each in chosen),
-        max(each.right for each in chosen),
-        max(each.top for each in chosen),
-    ).grown(reach_m)
+    left, bottom, right, top = Rectangle.around(chosen).grown(reach_m)
     width_m, height_m = site.size_m
-    cut = Rectangle(
-        max(around.left, 0.0),
-        max(around.bottom, 0.0),
-        min(around.right, width_m),
-        min(around.top, height_m),
-    )
+    cut = Rectangle(max(left, 0.0), max(bottom, 0.0), min(right, width_m), min(top, height_m))
     return _window(site, cut, "--zone-around")
