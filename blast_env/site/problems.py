@@ -62,19 +62,20 @@ class ScenarioError(BlastEnvError):
 
     Attributes:
         source: As given.
+        found: All of them.
         problems: The first `MAX_PROBLEMS` of them, and one with the number of the others.
     """
 
     def __init__(self, source: str, problems: Iterable[Problem]) -> None:
         self.source = source
-        found = tuple(dict.fromkeys(problems))
-        more = len(found) - MAX_PROBLEMS
+        self.found = tuple(dict.fromkeys(problems))
+        more = len(self.found) - MAX_PROBLEMS
         rest = (Problem("", f"{more} more problem{'s' if more > 1 else ''}"),) if more > 0 else ()
-        self.problems = found[:MAX_PROBLEMS] + rest
+        self.problems = self.found[:MAX_PROBLEMS] + rest
         super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
 
     def __reduce__(self) -> tuple[type["ScenarioError"], tuple[str, tuple[Problem, ...]]]:
-        return type(self), (self.source, self.problems)
+        return type(self), (self.source, self.found)
 
 
 def unknown_key(parts: KeyParts, known: Iterable[str]) -> Problem:
@@ -131,7 +132,7 @@ def _translated(detail: ErrorDetails, model: type[BaseModel]) -> Iterator[Proble
                 yield unknown_key((*parts, misspelt), [key])
         yield Problem(key_path((*parts, key)), words)
     elif kind == "value_error" and isinstance(cause := context["error"], ScenarioError):
-        yield from (problem.below(parts) for problem in cause.problems)
+        yield from (problem.below(parts) for problem in cause.found)
     elif kind == "value_error":
         yield Problem(key_path(parts), f"is {value_text(value)}, {context['error']}")
     elif kind == "missing":
