@@ -2,22 +2,16 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    AfterValidator,
-    Field,
-    SerializerFunctionWrapHandler,
-    StrictFloat,
-    model_serializer,
-)
+from pydantic import AfterValidator, Field, StrictFloat
 
 from blast_env.arrays import BoolArray
 from blast_env.site.catalogue import Variant
 from blast_env.site.crash_rating import CrashRating
-from blast_env.site.sections import Ground, Section
+from blast_env.site.sections import Ground, Section, SparseSection
 from blast_env.units import MODULE_SIDE_M
 
 
@@ -32,19 +26,16 @@ WholeModules: Final = AfterValidator(_check_whole_modules)
 """Annotation of a length of whole modules."""
 
 
-class Gate(Ground):
+class Gate(Ground, SparseSection):
     """The rectangle of a gate.
 
     Attributes:
         crash_rating: Its crash rating; without one, it stops every vehicle.
     """
 
-    crash_rating: CrashRating | None = None
+    sparse: ClassVar = frozenset({"crash_rating"})
 
-    @model_serializer(mode="wrap")
-    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit a missing rating."""
-        return {key: value for key, value in handler(self).items() if value is not None}
+    crash_rating: CrashRating | None = None
 
 
 class AccessWay(Section):

@@ -11,18 +11,10 @@ from functools import cache, cached_property
 from importlib.resources import files
 from operator import index
 from types import MappingProxyType
-from typing import Annotated, Any, Final, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Final, NamedTuple, Self
 
 import numpy as np
-from pydantic import (
-    Field,
-    SerializerFunctionWrapHandler,
-    StrictBool,
-    StrictFloat,
-    StrictInt,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Field, StrictBool, StrictFloat, StrictInt, model_validator
 
 from blast_env.errors import LayoutError, suggestion, type_word, value_text
 from blast_env.geometry import Cell, Element, Measure, Piece, Removal
@@ -30,8 +22,15 @@ from blast_env.response.barriers import RigidPiece
 from blast_env.response.facade import Bay
 from blast_env.site.crash_rating import CrashRating
 from blast_env.site.problems import Problem, ScenarioError, unknown_name
-from blast_env.site.scene import WALLS
-from blast_env.site.sections import FOR_PEOPLE, Count, Height, Name, Section, Storeys, Walls
+from blast_env.site.sections import (
+    FOR_PEOPLE,
+    Count,
+    FacadePart,
+    Height,
+    Name,
+    Section,
+    SparseSection,
+)
 from blast_env.units import MODULE_SIDE_M
 
 Cost = Annotated[StrictFloat, Field(ge=1e-6, le=1e9)]
@@ -42,33 +41,48 @@ Anchorage = Annotated[StrictFloat, Field(ge=0.0, le=1e9)]
 _FILE: Final = "barriers.toml"
 
 
-class StockBarrier(Section):
-    """A barrier of the stock list: an item of a catalogue without its number of pieces.
+RIGID_KEYS: Final = ("mass_kg", "base_width_m", "friction", "anchorage_n")
+"""Keys of an item that decide its stability under a blast; no load depends on them."""
+
+
+class Barrier(SparseSection):
+    """A rectangle of modules that are placed together.
 
     Attributes:
-        description: Short description.
-        length_modules: Modules along its length.
+        description: Description for readers.
+        length_modules: Modules along its length: to the right, or upwards if it is turned.
         thickness_modules: Modules across its length.
         height_m: Height above the ground.
-        cost: Relative cost of a piece: 1 is about a metre of concrete road barrier.
+        cost: Cost of a piece outside all cost areas; in the stock list, 1 is about a metre of
+            concrete road barrier.
         rotatable: Whether it may be turned by a right angle.
         stops_vehicles: Whether it stops vehicles.
-        mass_kg: Mass of a piece; that of a solid block of concrete if unknown.
-        base_width_m: Width of its base; its thickness if unknown.
-        anchorage_n: Horizontal capacity of the anchors of a piece, N.
-        source: Source of the dimensions.
+        mass_kg: Mass of a piece; that of a solid block of concrete unless given.
+        base_width_m: Width of its base; its thickness unless given.
+        anchorage_n: Horizontal capacity of the anchors of a piece, N; none unless given.
     """
 
-    description: Annotated[str, Field(max_length=200)]
+    sparse: ClassVar = frozenset({*RIGID_KEYS, "crash_rating"})
+
+    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
     length_modules: Count
-    thickness_modules: Count
+    thickness_modules: Count = 1
     height_m: Height
-    cost: Annotated[StrictFloat, Field(gt=0.0)]
-    rotatable: StrictBool
-    stops_vehicles: StrictBool
+    cost: Cost
+    rotatable: StrictBool = True
+    stops_vehicles: StrictBool = True
     mass_kg: Mass | None = None
     base_width_m: BaseWidth | None = None
     anchorage_n: Anchorage | None = None
+
+
+class StockBarrier(Barrier):
+    """A barrier of the stock list: an item of a catalogue without its number of pieces.
+
+    Attributes:
+        source: Source of the dimensions.
+    """
+
     source: str
 
 
@@ -86,48 +100,25 @@ MOST_ITEMS: Final = 20
 
 _SIZE_KEYS: Final = ("length_modules", "thickness_modules", "height_m")
 
-RIGID_KEYS: Final = ("mass_kg", "base_width_m", "friction", "anchorage_n")
-"""Keys of an item that decide its stability under a blast; no load depends on them."""
 
-
-class Item(Section):
-    """A barrier of several modules that are placed together.
+class Item(Barrier):
+    """A barrier of a catalogue.
 
     In a file `from_catalogue` names a barrier of the stock list (`stock_barriers`) with the
     defaults of all other keys but the stock; its size cannot be changed. The item has all values.
 
     Attributes:
         name: Name in layouts, tables and drawings.
-        description: Description for readers.
-        length_modules: Modules along its length: to the right, or upwards if it is turned.
-        thickness_modules: Modules across its length.
-        height_m: Height above the ground.
-        cost: Cost of a piece outside all cost areas.
         stock: Number of pieces.
-        rotatable: Whether it may be turned by a right angle.
-        stops_vehicles: Whether it stops vehicles.
-        mass_kg: Mass of a piece; that of a solid block of concrete unless given.
-        base_width_m: Width of its base; its thickness unless given.
         friction: Coefficient of friction with the ground; 0.5 unless given.
-        anchorage_n: Horizontal capacity of the anchors of a piece, N; none unless given.
         crash_rating: Its crash rating; without one, it stops every vehicle. Vehicles without a
             motion ignore it.
         from_catalogue: Always `None`; its values are in the other attributes.
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
-    length_modules: Count
-    thickness_modules: Count = 1
-    height_m: Height
-    cost: Cost
     stock: Annotated[StrictInt, Field(ge=0, le=10_000)]
-    rotatable: StrictBool = True
-    stops_vehicles: StrictBool = True
-    mass_kg: Mass | None = None
-    base_width_m: BaseWidth | None = None
     friction: Friction | None = None
-    anchorage_n: Anchorage | None = None
     crash_rating: CrashRating | None = None
     from_catalogue: Annotated[str | None, Field(exclude=True)] = None
 
@@ -154,13 +145,6 @@ class Item(Section):
                 [Problem(key, f"must be left out: {name!r} has {barrier[key]:g}") for key in fixed],
             )
         return {"name": name, **barrier, **own}
-
-    @model_serializer(mode="wrap")
-    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit missing values of mass, base, friction, anchors and crash rating."""
-        dump: dict[str, Any] = handler(self)
-        optional = {*RIGID_KEYS, "crash_rating"}
-        return {key: dump[key] for key in dump if key not in optional or dump[key] is not None}
 
     @property
     def rigid_piece(self) -> RigidPiece:
@@ -195,29 +179,22 @@ class Item(Section):
         return size[::-1] if turned else size
 
 
-class Hardening(Section):
+class Hardening(FacadePart):
     """A measure of a layout that puts stronger components in some bays of facades.
 
-    It can be taken once, covers no cell, and changes no load.
+    It can be taken once, covers no cell, and changes no load. `glazing` is the component with the
+    new glass of the windows there, whose sizes and sills stay.
 
     Attributes:
         name: Name in layouts and tables.
         description: Description for readers.
         structures: Names of its structures; all with a facade unless given.
-        walls: Its walls; all unless given.
-        storeys: Its storeys, from 1; all unless given.
-        glazing: Component with the new glass of the windows there; sizes and sills stay.
-        wall: Component of the new wall panels there.
         cost: Cost of the measure.
     """
 
     name: Name
     description: Annotated[str, Field(max_length=200), FOR_PEOPLE] = ""
     structures: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)] | None = None
-    walls: Walls = WALLS
-    storeys: Storeys | None = None
-    glazing: Name | None = None
-    wall: Name | None = None
     cost: Cost
 
     @model_validator(mode="after")
@@ -230,11 +207,8 @@ class Hardening(Section):
 
     def covers(self, bay: Bay) -> bool:
         """Return whether it applies to a bay."""
-        return (
-            (self.structures is None or bay.structure in self.structures)
-            and bay.wall in self.walls
-            and (self.storeys is None or bay.storey in self.storeys)
-        )
+        is_own = self.structures is None or bay.structure in self.structures
+        return is_own and super().covers(bay)
 
 
 class Demolition(Section):

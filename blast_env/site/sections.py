@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -92,6 +92,18 @@ class Section(BaseModel):
         for name in copied.__dict__.keys() - type(self).model_fields.keys():
             del copied.__dict__[name]
         return copied
+
+
+class SparseSection(Section):
+    """Base of sections that are saved without the missing values of some keys."""
+
+    sparse: ClassVar[frozenset[str]]
+    """The keys."""
+
+    @model_serializer(mode="wrap")
+    def _without_missing(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        dump: dict[str, Any] = handler(self)
+        return {key: dump[key] for key in dump if dump[key] is not None or key not in self.sparse}
 
 
 class Site(Section):
@@ -323,7 +335,7 @@ class Motion(Section):
         return min(entry, self.max_speed_km_h)
 
 
-class VehicleSource(ChargeSource):
+class VehicleSource(ChargeSource, SparseSection):
     """A charge in a vehicle, which goes off at one of the worst places within its reach.
 
     The reach depends on the layout: see `blast_env.site.vehicles`.
@@ -338,6 +350,8 @@ class VehicleSource(ChargeSource):
         motion: Its motion; without one, barriers that stop vehicles stop it at any speed.
     """
 
+    sparse: ClassVar = frozenset({"motion"})
+
     kind: Literal["vehicle"]
     entries: Annotated[tuple[Entry, ...], Field(min_length=1, max_length=100)]
     width_m: Annotated[StrictFloat, Field(ge=MODULE_SIDE_M, le=100.0)]
@@ -346,12 +360,6 @@ class VehicleSource(ChargeSource):
     places: Annotated[StrictInt, Field(ge=1, le=100)] = 4
     apart_m: Length | None = None
     motion: Motion | None = None
-
-    @model_serializer(mode="wrap")
-    def _without_motion(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit a missing motion."""
-        dump: dict[str, Any] = handler(self)
-        return {key: dump[key] for key in dump if key != "motion" or dump[key] is not None}
 
     @property
     def lines_m(self) -> tuple[tuple[PointM, PointM], ...]:

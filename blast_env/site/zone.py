@@ -4,16 +4,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     Field,
-    SerializerFunctionWrapHandler,
     StrictFloat,
     StrictInt,
-    model_serializer,
     model_validator,
 )
 
@@ -51,6 +49,7 @@ from blast_env.site.sections import (
     RectangleSource,
     Section,
     Site,
+    SparseSection,
     VehicleSource,
 )
 from blast_env.site.terraces import ground_m, lie_wholly_on
@@ -67,7 +66,7 @@ class KeepOut(Area):
     """A part of the build zone that must stay empty, with the reason."""
 
 
-class CostArea(Area):
+class CostArea(Area, SparseSection):
     """A part of the build zone with another cost, with the reason.
 
     Attributes:
@@ -77,13 +76,10 @@ class CostArea(Area):
             a catalogue.
     """
 
+    sparse: ClassVar = frozenset({"module_cost", "cost_factor"})
+
     module_cost: Cost | None = None
     cost_factor: Cost | None = None
-
-    @model_serializer(mode="wrap")
-    def _without_none(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit the missing one of the two costs."""
-        return {key: value for key, value in handler(self).items() if value is not None}
 
 
 class BuildZone(Section):
