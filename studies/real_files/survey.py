@@ -12,8 +12,9 @@ from blast_env.errors import BlastEnvError
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.io.importing.convert import read_map, selectors_of
 from blast_env.io.importing.ledger import Deed, Ledger
+from blast_env.io.importing.plane import DrawingPlane
 from blast_env.io.importing.roles import things_of
-from blast_env.io.importing.site_map import DrawingCoordinates, SiteMap
+from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role, Thing
 from blast_env.reading import ReadingError, ReadingLimits, read_apart
 
@@ -97,7 +98,7 @@ def _read(path: Path) -> tuple[SiteMap, ImportOptions]:
 
 def _unit_m(site_map: SiteMap) -> float:
     """Return the length of a unit of coordinates, m; degrees are as long as on the equator."""
-    if isinstance(site_map.coordinates, DrawingCoordinates):
+    if isinstance(site_map.coordinates, DrawingPlane):
         return site_map.coordinates.metres_per_unit
     return _DEGREE_M if site_map.coordinates.crs == "EPSG:4326" else 1.0
 

@@ -49,7 +49,7 @@ def check_outlines(outlines: Sequence[BaseGeometry], what: str) -> None:
     Raises:
         BlastEnvError: If they are too long, or their bounding boxes have too many cells.
     """
-    starts, ends = _edges(outlines)
+    starts, ends = edges_of(outlines)
     crossed = float(np.abs(ends - starts).sum()) / MODULE_SIDE_M
     if crossed > MOST_CROSSED:
         raise BlastEnvError(
@@ -102,10 +102,10 @@ def _crosses_often(outline: BaseGeometry) -> bool:
 
 def _walls(outline: BaseGeometry) -> NDArray[np.object_]:
     """Return the edges of an outline as lines."""
-    return np.asarray(shapely.linestrings(np.stack(_edges([outline]), axis=1)))
+    return np.asarray(shapely.linestrings(np.stack(edges_of([outline]), axis=1)))
 
 
-def _edges(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
+def edges_of(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
     """Return both ends of all edges of outlines (n, 2)."""
     rings = shapely.get_rings(shapely.get_parts(list(outlines)))
     places, ring = shapely.get_coordinates(rings, return_index=True)

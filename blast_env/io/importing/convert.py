@@ -19,9 +19,10 @@ from blast_env.io.importing.options import CALIBRATIONS, ImportOptions
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite, place_site
+from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.protection import protected_as_asked
 from blast_env.io.importing.roles import Selector, Selectors, things_of
-from blast_env.io.importing.site_map import DrawingCoordinates, MapCoordinates, SiteMap
+from blast_env.io.importing.site_map import SiteMap
 from blast_env.io.importing.things import Role
 from blast_env.io.importing.threats import charge_sources
 from blast_env.io.importing.zone import build_zone
@@ -201,7 +202,7 @@ def _read_as_dxf(path: Path, options: ImportOptions) -> SiteMap:
     if options.crs is None:
         return site_map
     coordinates = site_map.coordinates
-    if isinstance(coordinates, DrawingCoordinates) and coordinates.metres_per_unit != 1.0:
+    if isinstance(coordinates, DrawingPlane) and coordinates.metres_per_unit != 1.0:
         raise BlastEnvError(f"{path}: --crs needs a drawing in metres: say --units m if it is")
     return replace(site_map, coordinates=MapCoordinates(options.crs))
 

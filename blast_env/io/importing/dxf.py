@@ -11,11 +11,11 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
+from blast_env.io.importing.plane import DrawingPlane
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_FEATURES,
     MOST_POINTS,
-    DrawingCoordinates,
     LostFeature,
     MapFeature,
     Remark,
@@ -112,7 +112,7 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
         raise too_many(path)
     lost = tuple(each for each in found if isinstance(each, LostFeature))
     features = tuple(each for each in found if not isinstance(each, LostFeature))
-    return SiteMap(path, DrawingCoordinates(metres), features, lost, tuple(remarks))
+    return SiteMap(path, DrawingPlane(metres), features, lost, tuple(remarks))
 
 
 def _document(path: Path, remarks: list[Remark]) -> Drawing:

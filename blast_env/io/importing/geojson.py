@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
+from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_FEATURES,
-    DrawingCoordinates,
     LostFeature,
-    MapCoordinates,
     MapFeature,
     SiteMap,
-    SourceCoordinates,
     Tags,
     checked_file,
     too_many,
@@ -164,13 +162,15 @@ def _tags(item: Mapping[str, Any]) -> Tags:
     return {str(key): value for key, value in tags.items() if isinstance(value, str | int | float)}
 
 
-def _coordinates(path: Path, document: Mapping[str, Any], crs: str | None) -> SourceCoordinates:
+def _coordinates(
+    path: Path, document: Mapping[str, Any], crs: str | None
+) -> MapCoordinates | DrawingPlane:
     """Return the coordinates' system: the one given, or that of the file."""
     if crs is None:
         if _LOCAL_WORDS in str(document.get("coordinate_system", "")):
-            return DrawingCoordinates(1.0)
+            return DrawingPlane(1.0)
         crs = _named_crs(path, document.get("crs"))
-    return DrawingCoordinates(1.0) if crs == LOCAL else MapCoordinates(crs)
+    return DrawingPlane(1.0) if crs == LOCAL else MapCoordinates(crs)
 
 
 def _named_crs(path: Path, member: Any) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.io.importing.plane import DrawingPlane
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
-    DrawingCoordinates,
     LostFeature,
     MapFeature,
     Remark,
@@ -102,9 +102,7 @@ def read_ifc(path: Path) -> SiteMap:
         LostFeature(_NOWHERE, {each.is_a(): True, "building": "part"}, _place(each), _reason(each))
         for each in others
     )
-    return SiteMap(
-        path, DrawingCoordinates(1.0), tuple(features), lost, tuple(remarks), tuple(merged)
-    )
+    return SiteMap(path, DrawingPlane(1.0), tuple(features), lost, tuple(remarks), tuple(merged))
 
 
 def _reason(element: Any) -> str:

@@ -13,11 +13,11 @@ from xml.parsers import expat
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
+from blast_env.io.importing.plane import MapCoordinates
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
     MOST_POINTS,
     LostFeature,
-    MapCoordinates,
     MapFeature,
     Remark,
     SiteMap,

@@ -1,4 +1,4 @@
-"""LayoutState of the site on a map: its rectangle, its direction and its objects.
+"""Placing of the site on a map: its rectangle, its direction and its objects.
 
 The site has the direction of most walls; the grid is aligned with as many walls as possible.
 """
@@ -14,6 +14,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.io.importing.cells import edges_of
 from blast_env.io.importing.joining import closed, with_courtyards
 from blast_env.io.importing.ledger import Deed, Ledger
 from blast_env.io.importing.options import (
@@ -72,10 +73,7 @@ def grid_offset_m(outlines: Sequence[BaseGeometry]) -> tuple[float, float]:
 
 def _walls(outlines: Sequence[BaseGeometry]) -> tuple[FloatArray, FloatArray]:
     """Return both ends of every wall of every outline (n, 2)."""
-    rings = shapely.get_rings(shapely.get_parts(list(outlines)))
-    places, ring = shapely.get_coordinates(rings, return_index=True)
-    same = ring[1:] == ring[:-1]
-    starts, ends = places[:-1][same], places[1:][same]
+    starts, ends = edges_of(outlines)
     long = np.hypot(*(ends - starts).T) > _SHORTEST_M
     return starts[long], ends[long]
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
-from blast_env.io.importing.site_map import MapCoordinates, SourceCoordinates
 from blast_env.site.sections import AnyGeoreference, DrawingGeoreference, MapGeoreference
 
 with import_extra("maps", "maps and drawings"):
@@ -114,7 +113,7 @@ class LocalPlane:
 
 @dataclass(frozen=True)
 class DrawingPlane:
-    """The plane of a drawing.
+    """The plane of a drawing, whose place on the Earth is unknown.
 
     Attributes:
         metres_per_unit: Length of the drawing's unit.
@@ -142,10 +141,21 @@ class DrawingPlane:
         )
 
 
+@dataclass(frozen=True)
+class MapCoordinates:
+    """Coordinates on the Earth.
+
+    Attributes:
+        crs: Their reference system as pyproj reads it; x is easting or longitude.
+    """
+
+    crs: str
+
+
 Plane = LocalPlane | DrawingPlane
 
 
-def plane_around(coordinates: SourceCoordinates, place: tuple[float, float]) -> Plane:
+def plane_around(coordinates: MapCoordinates | DrawingPlane, place: tuple[float, float]) -> Plane:
     """Return the plane in which a map is measured, around a place of it.
 
     Raises:
@@ -153,7 +163,7 @@ def plane_around(coordinates: SourceCoordinates, place: tuple[float, float]) -> 
     """
     if isinstance(coordinates, MapCoordinates):
         return LocalPlane.around(coordinates.crs, place)
-    return DrawingPlane(coordinates.metres_per_unit)
+    return coordinates
 
 
 def rotated(places: FloatArray, angle_deg: float) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.errors import BlastEnvError, import_extra, shortened
+from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 
 with import_extra("maps", "maps and drawings"):
     import shapely
@@ -29,31 +30,6 @@ MOST_COORDINATE: Final = 1e12
 
 Tags = Mapping[str, str | float | bool]
 Remark = tuple[str, str, str]
-
-
-@dataclass(frozen=True)
-class MapCoordinates:
-    """Coordinates on the Earth.
-
-    Attributes:
-        crs: Their reference system as pyproj reads it; x is easting or longitude.
-    """
-
-    crs: str
-
-
-@dataclass(frozen=True)
-class DrawingCoordinates:
-    """Coordinates in a plane whose place on the Earth is unknown.
-
-    Attributes:
-        metres_per_unit: Length of a unit.
-    """
-
-    metres_per_unit: float
-
-
-SourceCoordinates = MapCoordinates | DrawingCoordinates
 
 
 @dataclass(frozen=True)
@@ -96,7 +72,7 @@ class SiteMap:
     """
 
     path: Path
-    coordinates: SourceCoordinates
+    coordinates: MapCoordinates | DrawingPlane
     features: tuple[MapFeature, ...]
     lost: tuple[LostFeature, ...] = ()
     remarks: tuple[Remark, ...] = ()

@@ -10,8 +10,8 @@ from blast_env.geometry import Rectangle
 from blast_env.io.importing.convert import read_map, selectors_of
 from blast_env.io.importing.ledger import Ledger
 from blast_env.io.importing.options import ImportOptions, PlaceXY
+from blast_env.io.importing.plane import MapCoordinates
 from blast_env.io.importing.roles import things_of
-from blast_env.io.importing.site_map import MapCoordinates
 from blast_env.io.importing.things import Role
 
 with import_extra("maps", "maps and drawings"):
