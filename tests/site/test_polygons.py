@@ -178,10 +178,7 @@ def test_drawings_have_the_clearance_around_its_modules_and_in_courtyards() -> N
     document = with_polygon(courtyards_m=[[(7.0, 3.6), (8.6, 3.6), (8.6, 4.9), (7.0, 4.9)]])
     document["build_zone"]["clearance_m"] = 0.3
     scenario = Scenario.from_document(document, "clear")
-    rings = [
-        shapely.LinearRing([(x, y) for x, y, _ in ring])
-        for ring in clearance_outlines(LayoutPlan(scenario, ()))
-    ]
+    rings = [shapely.LinearRing(ring) for ring in clearance_outlines(LayoutPlan(scenario, ()))]
     modules = shapely.union_all([shapely.box(*box) for box in scenario.structures[0].boxes_m])
     assert len(rings) == 2
     for ring in rings:

@@ -2,9 +2,9 @@
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import floor, inf, pi, tan
+from math import floor, inf
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -20,12 +20,6 @@ from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 
 _DIGITS: Final = 9  # decimals of a metre: the rest is rounding error
-
-BULGE_OF_A_QUARTER: Final = tan(pi / 8.0)
-"""Bulge of an arc over a right angle: the tangent of a quarter of it, counterclockwise."""
-
-CornerM = tuple[float, float, float]
-"""x, y, and the bulge of the way to the next corner: 0 is straight."""
 
 
 def note_lines(plan: LayoutPlan) -> tuple[str, ...]:
@@ -88,52 +82,24 @@ def _number(value: float) -> str:
     return f"{value:.10g}"
 
 
-def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[CornerM, ...], ...]:
-    """Return the outline of the clearance around each structure; none if modules may touch it.
+def clearance_outlines(plan: LayoutPlan) -> tuple[tuple[PointM, ...], ...]:
+    """Return the outlines of the clearance around structures; none if modules may touch them.
 
-    The clearance is the least distance of any two points of module and structure. So the outline
-    is a rectangle whose corners are rounded by the clearance: four sides and four arcs,
-    counterclockwise from the left end of the lower side. Around the modules of a polygon it is a
-    line with short sides in the place of arcs, and further lines in its courtyards.
+    The clearance is the least distance of any two points of module and structure. So the corners of
+    the outlines are rounded by it, in short straight lines.
     """
+    import shapely  # a tenth of a second
+
     zone = plan.scenario.build_zone
     if zone is None or zone.clearance_m == 0.0:
         return ()
+    plans = [
+        shapely.union_all([shapely.box(*box) for box in each.boxes_m])
+        for each in plan.scenario.structures
+    ]
     return tuple(
-        outline
-        for structure in plan.scenario.structures
-        for outline in (
-            (_rounded_outline(structure.rectangle_m, zone.clearance_m),)
-            if structure.footprint is None
-            else _lines_around(structure.boxes_m, zone.clearance_m)
-        )
-    )
-
-
-def _lines_around(boxes_m: Sequence[Rectangle], distance_m: float) -> Iterator[tuple[CornerM, ...]]:
-    """Yield the lines at a distance around rectangles that touch."""
-    import shapely  # a tenth of a second, for polygons alone
-
-    around = shapely.union_all([shapely.box(*each) for each in boxes_m]).buffer(distance_m)
-    for ring in shapely.get_rings(around):
-        places = shapely.get_coordinates(ring)[:-1].tolist()
-        yield tuple((round(x, _DIGITS), round(y, _DIGITS), 0.0) for x, y in places)
-
-
-def _rounded_outline(rectangle: Rectangle, radius: float) -> tuple[CornerM, ...]:
-    """Return the line at a distance around a rectangle."""
-    left, bottom, right, top = rectangle
-    far_left, far_bottom, far_right, far_top = rectangle.grown(radius)
-    ends = (
-        ((left, far_bottom), (right, far_bottom)),
-        ((far_right, bottom), (far_right, top)),
-        ((right, far_top), (left, far_top)),
-        ((far_left, top), (far_left, bottom)),
-    )
-    return tuple(
-        (round(x, _DIGITS), round(y, _DIGITS), bulge)
-        for side in ends
-        for (x, y), bulge in zip(side, (0.0, BULGE_OF_A_QUARTER), strict=True)
+        tuple((round(x, _DIGITS), round(y, _DIGITS)) for x, y in ring.coords[:-1])
+        for ring in shapely.get_rings(shapely.buffer(plans, zone.clearance_m, quad_segs=16))
     )
 
 
@@ -379,7 +345,7 @@ def _write(space: Modelspace, text: Text) -> None:
 def _draw_clearance(space: Modelspace, plan: LayoutPlan) -> None:
     for outline in clearance_outlines(plan):
         attributes = {"layer": CLEARANCE_LAYER}
-        space.add_lwpolyline(outline, format="xyb", close=True, dxfattribs=attributes)
+        space.add_lwpolyline(outline, close=True, dxfattribs=attributes)
 
 
 def text_height_m(plan: LayoutPlan) -> float:
@@ -397,7 +363,7 @@ def _write_notes(space: Modelspace, plan: LayoutPlan, height_m: float) -> Rectan
     site, width_m = plan.scenario.site.rectangle_m, plan.scenario.site.width_m
     key = [f"{letter}: {name}" for name, letter in key_of(plan).items()]
     lines = wrapped([*note_lines(plan), *key], floor(width_m / height_m + _ROUNDING))
-    ends_m = [y for outline in clearance_outlines(plan) for _, y, _ in outline]
+    ends_m = [y for outline in clearance_outlines(plan) for _, y in outline]
     bottom_m = max([site.top, *ends_m]) + 2.0 * height_m
     notes = space.add_mtext(
         "\\P".join(map(_escaped, lines)),
