@@ -42,6 +42,7 @@ _DRAWN: Final = {
     Tool.GAUGE: ThingKind.GAUGE,
 }
 
+_ON_ROAD: Final = "the zone lies over a road: draw a no-build area to keep it free"
 _HANDLE_M: Final = 0.6  # reach of the handle for the size, at the upper right corner
 
 
@@ -87,8 +88,6 @@ class Editor:
         cursor: The cell of the keyboard; `None` before its first use.
         ghost: The preview at the mouse.
         pending: The layout under an unfinished stroke; `None` without one.
-        asks_about_roads: Whether a build zone was drawn over a road, and the user has not said yet
-            whether barriers may stand there.
         message: A message not yet shown.
     """
 
@@ -102,7 +101,6 @@ class Editor:
     ghost: Ghost | None = None
     pending: Layout | None = None
     message: str = ""
-    asks_about_roads: bool = False
     _stroke: _Stroke | None = field(default=None, init=False)
     _last: Cell | PointM | None = field(default=None, init=False)
 
@@ -127,12 +125,6 @@ class Editor:
         """Take another tool."""
         self.message = ""
         self.tool, self.ghost, self._stroke, self.pending = tool, None, None, None
-
-    def answer_about_roads(self, free: bool) -> None:
-        """Keep the roads in the build zone free, or let barriers stand on them."""
-        self.asks_about_roads = False
-        if free:
-            self.attempt("keep roads free", edits.with_roads_free)
 
     def named_at(self, x_m: float, y_m: float) -> str:
         """Return the label of the thing at a place; empty without one."""
@@ -185,8 +177,8 @@ class Editor:
             verb = "size" if stroke.sizes else "move" if stroke.moves else "draw"
             kind = stroke.thing.kind if stroke.thing is not None else "site"
             self._keep(f"{verb} {kind}", stroke.made)
-            is_zone = kind is ThingKind.ZONE
-            self.asks_about_roads = is_zone and bool(edits.roads_in_zone(stroke.made))
+            if kind is ThingKind.ZONE and edits.has_road_in_zone(stroke.made):
+                self.message = self.message or _ON_ROAD
             self.selected = stroke.thing
         elif pending is not None and pending != self.session.design.layout:
             count = abs(len(pending) - len(self.session.design.layout))

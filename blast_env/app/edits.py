@@ -6,14 +6,11 @@ scenario goes through `Scenario.from_document`, which reports all its faults.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
+from math import hypot
 from typing import Any, Final, NamedTuple
-
-import numpy as np
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.layout import LayoutState
-from blast_env.plots.plan import rectangles_of
 from blast_env.response.facade import STOREY_M
 from blast_env.site import (
     SCHEMA_VERSION,
@@ -76,7 +73,6 @@ _DRAWN: Final = (
 )
 """The other kinds, topmost first."""
 
-_HALF_ROAD_M: Final = 1.5
 _OF_BUILDINGS: Final = ("facade", "protected")
 """Values that all structures of a building share."""
 
@@ -207,16 +203,16 @@ def _beside(source: AnySource, x_m: float, y_m: float) -> float:
     if isinstance(source, RectangleSource):
         return 0.0
     lines_m = source.lines_m if isinstance(source, VehicleSource) else (source.segment_m,)
-    return float(min(_from_line_m(line_m, x_m, y_m) for line_m in lines_m))
+    return min(_from_line_m(line_m, x_m, y_m) for line_m in lines_m)
 
 
-def _from_line_m(line_m: tuple[PointM, PointM], x_m: Any, y_m: Any) -> Any:
-    """Return the distance of a place, or of an array of places, from a line, m."""
+def _from_line_m(line_m: tuple[PointM, PointM], x_m: float, y_m: float) -> float:
+    """Return the distance of a place from a line, m."""
     (x0, y0), (x1, y1) = line_m
     square = (x1 - x0) ** 2 + (y1 - y0) ** 2
     along = ((x_m - x0) * (x1 - x0) + (y_m - y0) * (y1 - y0)) / (square or 1.0)
-    share = np.clip(along, 0.0, 1.0)
-    return np.hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
+    share = min(max(along, 0.0), 1.0)
+    return hypot(x_m - x0 - share * (x1 - x0), y_m - y0 - share * (y1 - y0))
 
 
 def moved(scenario: Scenario, thing: SiteThing, by_m: PointM) -> Scenario:
@@ -393,37 +389,11 @@ def added(
     return after, SiteThing(kind, last)
 
 
-def roads_in_zone(scenario: Scenario) -> tuple[Rectangle, ...]:
-    """Return the usable ground of the build zone that is a road on which a charge may be."""
+def has_road_in_zone(scenario: Scenario) -> bool:
+    """Return whether a line on which a charge may be crosses the build zone."""
     zone = scenario.build_zone
-    if zone is None:
-        return ()
-    rows, columns = np.indices((zone.rows, zone.columns))
-    left, bottom = zone.corner_m
-    x_m, y_m = (
-        left + MODULE_SIDE_M * (columns + 0.5),
-        bottom + MODULE_SIDE_M * (rows + 0.5),
-    )
-    road = np.zeros(x_m.shape, dtype=bool)
-    for source in scenario.charge:
-        if isinstance(source, SegmentSource):
-            road |= _from_line_m(source.segment_m, x_m, y_m) <= _HALF_ROAD_M
-    return tuple(rectangles_of(road & LayoutState.empty(scenario).usable, zone.corner_m))
-
-
-def with_roads_free(scenario: Scenario) -> Scenario:
-    """Return the scenario with the roads in its build zone kept free.
-
-    Raises:
-        ScenarioError: If that takes too many no-build areas.
-    """
-    areas = [{**_sized(each), "reason": "road"} for each in roads_in_zone(scenario)]
-
-    def edit(document: Document) -> None:
-        zone = document["build_zone"]
-        zone["keep_outs"] = [*zone.get("keep_outs", []), *areas]
-
-    return changed(scenario, edit)
+    roads = (each for each in scenario.charge if isinstance(each, SegmentSource))
+    return zone is not None and any(zone.rectangle_m.meets_segment(*x.segment_m) for x in roads)
 
 
 def _fit_catalogue(document: Document, whole: int | None) -> None:

@@ -120,21 +120,14 @@ class Entrance:
     def authorities(self) -> frozenset[str]:
         """The values allowed in the header `Host`, and after the scheme in `Origin`."""
         own = _OWN_NAMES if self.host in _EVERYWHERE else (*_OWN_NAMES, _bracketed(self.host))
+        # As they are, too: behind a reverse proxy on its scheme's default port.
         named = [each.lower() for each in self.more_names]
-        with_port = {each for each in named if _has_port(each)}
-        without = {*own, *named} - with_port
-        found = with_port | {f"{name}:{self.port}" for name in without}
-        # Behind a reverse proxy on its scheme's default port.
-        found |= {name for name in named if not _has_port(name)}
-        return frozenset(found | (without if self.port == 80 else set()))
+        bare = (*own, *named) if self.port == 80 else named
+        return frozenset((*bare, *(f"{name}:{self.port}" for name in (*own, *named))))
 
 
 def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host.lower()
-
-
-def _has_port(name: str) -> bool:
-    return re.search(r":[0-9]+$", name.rpartition("]")[2]) is not None
 
 
 class Guard:

@@ -404,7 +404,6 @@ def _ghost(view: PixelView, ghost: Ghost) -> list[str]:
             f'<path d="M{middle - 6} {y - 16}l12 12m0 -12l-12 12" stroke="{_REFUSED}"'
             ' stroke-width="3"></path>'
         )
-        parts += _wrapped(view, middle, y - 22.0, ghost.reason)
     elif ghost.line_m is None:
         width_m, height_m = (
             ghost.rectangle_m.right - ghost.rectangle_m.left,
@@ -414,27 +413,6 @@ def _ghost(view: PixelView, ghost: Ghost) -> list[str]:
             text = f"{width_m:g} x {height_m:g} m"
             parts.append(_text(x + across / 2.0, y - 6.0, text, colour, 12))
     return parts
-
-
-_LINE: Final = 48  # characters of a reason on a line
-
-
-def _wrapped(view: PixelView, x_px: float, y_px: float, text: str) -> list[str]:
-    """Return a reason in lines that stay in the picture."""
-    lines: list[str] = []
-    for word in text.split():
-        if lines and len(lines[-1]) + len(word) < _LINE:
-            lines[-1] += f" {word}"
-        else:
-            lines.append(word)
-    half = 3.6 * max(map(len, lines))
-    x = min(max(x_px, half + 4.0), max(view.width_px - half - 4.0, half + 4.0))
-    first = y_px - _LINE_PX * (len(lines) - 1)
-    if first < _LINE_PX:
-        first = y_px + 60.0
-    return [
-        _text(x, first + _LINE_PX * number, line, _REFUSED, 13) for number, line in enumerate(lines)
-    ]
 
 
 _SKETCH_PX: Final = 500

@@ -4,7 +4,6 @@ import socket
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from threading import Lock
 from typing import Final
 
 from blast_env.app.folder import WorkFolder
@@ -76,20 +75,6 @@ def add_pages(sessions: Sessions) -> None:
         if not (folder / name).is_file():
             raise HTTPException(404, f"there is no {name}")
         return FileResponse(folder / name, headers=_KEPT_BY_BROWSER)
-
-    drawing = Lock()
-
-    @app.get("/damage/{design_id}/{key}/{name}")
-    def damage(design_id: str, key: str, name: str) -> FileResponse:
-        try:
-            check_key(name.replace(".", "", 1))
-            with drawing:  # requests come in threads
-                path = sessions.of(design_id).damage_file(key, name)
-        except BlastEnvError as error:
-            raise HTTPException(404, str(error)) from error
-        finally:
-            sessions.leave(design_id)  # unless a page shows it
-        return FileResponse(path, headers=_KEPT_BY_BROWSER)
 
     app.add_exception_handler(503, _say)
     app.add_exception_handler(404, _say)  # NiceGUI's would open a page

@@ -28,9 +28,7 @@ from blast_env.app.tasks import AnswerTask, ReportTask, SearchTask
 from blast_env.app.threats import threats_of, usual_threats
 from blast_env.app.verdicts import (
     Judged,
-    draw_damage,
-    facades_digest,
-    picture_name,
+    damage_png,
     stored_consequences,
     verdict_table,
 )
@@ -492,7 +490,7 @@ class Session:
         """Return the response of the buildings with their current facades to a blast."""
         if not any(each.facade for each in self.scenario.structures):
             return ()
-        known = shown.key, facades_digest(self.scenario, shown.layout)
+        known = shown.key, repr(self.scenario.bays_with(shown.layout))
         if known not in self._judged:
             read = self._facades(shown, threat)
             if read is None:
@@ -500,27 +498,11 @@ class Session:
             self._judged[known] = tuple(map(Judged.of, read.responses))
         return self._judged[known]
 
-    def damage_picture(self, shown: Shown, number: int) -> str:
-        """Return the name of the picture of a building's damage; see `damage_file`."""
-        return picture_name(number, facades_digest(self.scenario, shown.layout))
-
-    def damage_file(self, key: str, name: str) -> Path:
-        """Return the picture of a building's damage, drawn at the first request.
-
-        Raises:
-            BlastEnvError: If the current design has no such picture.
-        """
-        path = self.folder.blast_of(key) / name
-        if path.is_file():
-            return path
-        for threat in self.chosen_threats():
-            for each in self.shown(threat):
-                read = self._facades(each, threat) if each.key == key else None
-                for number, building in enumerate(() if read is None else read.responses):
-                    if self.damage_picture(each, number) == name:
-                        draw_damage(building, path)
-                        return path
-        raise BlastEnvError(f"there is no {name}")
+    def damage_png(self, shown: Shown, threat: LoadCase, building: str) -> bytes | None:
+        """Return the picture of a building's damage; `None` without the histories on its bays."""
+        read = self._facades(shown, threat)
+        own = () if read is None else (x for x in read.responses if x.building == building)
+        return next(map(damage_png, own), None)
 
     def _facades(self, shown: Shown, threat: LoadCase) -> Consequences | None:
         folder = self.folder.blast_of(shown.key)

@@ -4,7 +4,6 @@ Other windows and hardening measures need no new blast: the loads stay the same.
 """
 
 from collections.abc import Iterable, Sequence
-from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -35,9 +34,8 @@ _HEADERS: Final = (
     *("worst pane (GSA, ISO)", "worst wall panel", "standing of the load", "flags"),
 )
 _DASH: Final = "\N{EN DASH}"
-_NAME: Final = "damage_{}_{}.png"
+_DPI: Final = 100
 _DRAWS: Final = 200  # of the uncertain quantities: the table must come at once
-_HASH_DIGITS: Final = 16
 
 
 def keep_histories(result: Any, folder: Path) -> None:
@@ -127,34 +125,15 @@ class Judged(NamedTuple):
         )
 
 
-def draw_damage(building: BuildingResponse, path: Path) -> None:
-    """Draw the facade of one building in the colours of its damage.
-
-    Raises:
-        BlastEnvError: If it cannot be written.
-    """
+def damage_png(building: BuildingResponse) -> bytes:
+    """Return the facade of one building in the colours of its damage, as PNG."""
     # Here, because pictures take half a second to import, and tables need none.
     from blast_env.plots.facade import facade_picture
-    from blast_env.plots.figures import save_figure
+    from blast_env.plots.figures import png_of
 
     (x_m, y_m), tnt_kg = building.charge.position_m, building.charge.tnt_kg
     words = f"{tnt_kg:g} kg at ({x_m:g}, {y_m:g}) m"
-    save_figure(facade_picture([(words, building)], building.building), path)
-
-
-def facades_digest(scenario: Scenario, layout: Layout) -> str:
-    """Return the digest of the contents of all bays, which identifies a verdict on a blast."""
-    return sha256(repr(scenario.bays_with(layout)).encode()).hexdigest()[:_HASH_DIGITS]
-
-
-def picture_name(number: int, digest: str) -> str:
-    """Return the name of the picture of a building's damage.
-
-    Args:
-        number: Number of the building.
-        digest: Digest of the contents of the bays, see `facades_digest`.
-    """
-    return _NAME.format(number, digest)
+    return png_of(facade_picture([(words, building)], building.building), _DPI)
 
 
 def verdict_table(

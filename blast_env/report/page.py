@@ -4,10 +4,10 @@ from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from hashlib import sha256
 from math import isfinite, isnan
 from pathlib import Path
-from types import CodeType
 from typing import Any, Final, NamedTuple
 from warnings import catch_warnings, filterwarnings
 
@@ -38,11 +38,10 @@ from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with import_extra("report", "reports"):
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined, Template, pass_context
     from markupsafe import Markup
 
 HTML_SUFFIXES: Final = (".html", ".htm")
-_TEMPLATE: Final = "report.html.j2"
 _NONE: Final = "\N{EN DASH}"
 _MINUS: Final = "\N{MINUS SIGN}"
 _PLUS_MINUS: Final = "\N{PLUS-MINUS SIGN}"
@@ -102,6 +101,12 @@ def _weasyprint() -> Any:
 
 def report_html(study: Study, commands: list[str]) -> str:
     """Return the report as one HTML page."""
+    return _template().render(_context(study, commands))
+
+
+@cache
+def _template() -> Template:
+    """Return the template, which takes longer to compile than to fill in."""
     environment = Environment(
         loader=PackageLoader("blast_env.report"),
         autoescape=True,
@@ -112,7 +117,7 @@ def report_html(study: Study, commands: list[str]) -> str:
     environment.filters |= {
         "impulse": _number,
         "pressure": lambda pa: _number(pa / PA_PER_KPA),
-        "titled": study.scenario.title_of,
+        "titled": pass_context(lambda context, name: context["scenario"].title_of(name)),
         "counted": _counted,
         "word": lambda passes, flagged: Verdict.of(passes).word(flagged).lower(),
         "percent": _percent,
@@ -124,15 +129,13 @@ def report_html(study: Study, commands: list[str]) -> str:
         "share_error": lambda share: _error(100.0 * share, 1),
         "points": _points,
         "ms": lambda time_s: _number(MS_PER_S * time_s),
-        "money": study.scenario.zone.priced,
+        "money": pass_context(lambda context, cost: context["scenario"].zone.priced(cost)),
         "sum": "{:,.10g}".format,
         "wide_first": lambda pictures: sorted(pictures, key=lambda each: _steepness(each[1])),
         "picture": lambda png: f"data:image/png;base64,{b64encode(png).decode()}",
     }
     environment.tests["narrow"] = lambda png: _steepness(png) > _NARROW
-    code = _template_code(environment)
-    template = environment.template_class.from_code(environment, code, environment.globals)
-    return template.render(_context(study, commands))
+    return environment.get_template("report.html.j2")
 
 
 _NARROW: Final = 0.7
@@ -143,18 +146,6 @@ def _steepness(png: bytes) -> float:
     """Return the height of a picture as a share of its width."""
     width, height = (int.from_bytes(png[start : start + 4]) for start in (16, 20))
     return height / max(width, 1)
-
-
-_COMPILED: Final[dict[str, CodeType]] = {}
-
-
-def _template_code(environment: Environment) -> CodeType:
-    """Return the compiled template, which takes longer to compile than to fill in."""
-    if _TEMPLATE not in _COMPILED:
-        assert environment.loader is not None
-        source, path, _ = environment.loader.get_source(environment, _TEMPLATE)
-        _COMPILED[_TEMPLATE] = environment.compile(source, _TEMPLATE, path)
-    return _COMPILED[_TEMPLATE]
 
 
 def _context(study: Study, commands: list[str]) -> dict[str, Any]:

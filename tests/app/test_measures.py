@@ -7,11 +7,11 @@ import pytest
 from nicegui import ui
 from nicegui.testing import User
 
-from blast_env.app import edits, placing
+from blast_env.app import edits, placing, session
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.app.folder import WorkFolder
 from blast_env.app.session import Session, Sessions
-from blast_env.errors import BlastEnvError, LayoutError
+from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout, Measure, Piece
@@ -107,18 +107,27 @@ def test_other_windows_need_no_blast_and_other_bays_do(blasted: Session) -> None
     blasted.undo()
 
 
-def test_the_picture_of_the_damage_is_of_what_stands_there_now(blasted: Session) -> None:
+def test_the_picture_of_the_damage_is_of_what_stands_there_now(
+    blasted: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     blasted.put("wall", blasted.design.with_layout(WALL))
     (threat,) = blasted.chosen_threats()
-    own = blasted.shown(threat)[1]
-    plain = blasted.damage_picture(own, 0)
-    assert blasted.damage_file(own.key, plain).read_bytes().startswith(b"\x89PNG")
+
+    def picture(building: str = "hut") -> bytes | None:
+        return blasted.damage_png(blasted.shown(threat)[1], threat, building)
+
+    assert (picture() or b"").startswith(b"\x89PNG")
+    assert picture("shed") is None
+    drawn: list[str] = []
+    monkeypatch.setattr(
+        session,
+        "damage_png",
+        lambda each: drawn.append(each.facade.level_of_protection.label) or b"",
+    )
+    picture()
     blasted.harden("glass", taken=True)
-    harder = blasted.damage_picture(blasted.shown(threat)[1], 0)
-    assert harder != plain
-    assert blasted.damage_file(own.key, harder).stat().st_size > 1000
-    with pytest.raises(BlastEnvError, match=r"there is no damage_0_0\.png"):
-        blasted.damage_file(own.key, "damage_0_0.png")
+    picture()
+    assert drawn[0] != drawn[1]
     blasted.undo()
 
 

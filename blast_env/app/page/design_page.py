@@ -81,21 +81,6 @@ class DesignPage:
         self._redo.set_enabled(bool(history.future))
         self._last.text = f"last: {history.present.label}"
         self._title.text = history.design.scenario.name
-        if self.editor.asks_about_roads:
-            self._ask_about_roads()
-
-    def _ask_about_roads(self) -> None:
-        def answer(free: bool) -> None:
-            dialog.close()
-            self.editor.answer_about_roads(free)
-            self.refresh()
-
-        self.editor.asks_about_roads = False
-        with ui.dialog(value=True) as dialog, ui.card():
-            ui.label("The build zone lies over a road. May barriers stand on it?")
-            with ui.row():
-                ui.button("no, keep it free", on_click=lambda: answer(True)).props("no-caps")
-                ui.button("yes", on_click=lambda: answer(False)).props("flat no-caps")
 
     def _follow(self) -> None:
         self._work.follow()

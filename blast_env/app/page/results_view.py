@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from nicegui import ui
+from nicegui import background_tasks, run, ui
 
-from blast_env.app.page.tables import cells, columns_of, text_table
+from blast_env.app.page.tables import address_of, cells, columns_of, text_table
 from blast_env.app.records import TOGETHER, BlastRecord
 from blast_env.app.session import BARE, Session, Shown
 from blast_env.evaluation import LoadCase
@@ -25,11 +25,13 @@ class _Found:
         shown: The layout.
         record: Its record.
         pictures: Addresses of its pictures, by their labels.
+        damage: Names of the buildings whose damage can be drawn, by the labels of these pictures.
     """
 
     shown: Shown
     record: BlastRecord
     pictures: Mapping[str, str]
+    damage: Mapping[str, str]
 
 
 class ResultsView:
@@ -111,7 +113,8 @@ class ResultsView:
             if row[2] == TOGETHER
         }
         self._offer(found)
-        self._show_cards([each for each in found if self._with_bare or each.shown.name != BARE])
+        chosen = [each for each in found if self._with_bare or each.shown.name != BARE]
+        self._show_cards(chosen, threat)
         self._sharp.visible = any("on the cells" in row[3] for row in verdicts.rows)
         self._unglazed.visible = bool(found) and not verdicts.rows
         for element, table, after in ((self._verdicts, verdicts, 0), (self._table, compared, 2)):
@@ -130,31 +133,29 @@ class ResultsView:
             record = session.folder.record_of(each.key)
             if record is None:
                 continue
-            where = f"{session.folder.design_id}/{each.key}"
-            damage = {
-                f"{_DAMAGE}{session.scenario.title_of(verdict.building)}": f"/damage/{where}/"
-                + session.damage_picture(each, number)
-                for number, verdict in enumerate(session.judged(each, threat))
-            }
-            others = {own.label: f"/blasts/{where}/{own.file}" for own in record.pictures}
-            yield _Found(each, record, others | damage)
+            where = f"/blasts/{session.folder.design_id}/{each.key}"
+            pictures = {own.label: f"{where}/{own.file}" for own in record.pictures}
+            judged = (own.building for own in session.judged(each, threat))
+            damage = {f"{_DAMAGE}{session.scenario.title_of(own)}": own for own in judged}
+            yield _Found(each, record, pictures, damage)
 
     def _offer(self, found: Sequence[_Found]) -> None:
-        options = [*dict.fromkeys(label for each in found for label in each.pictures)] or [_FILM]
+        labels = (label for each in found for label in (*each.pictures, *each.damage))
+        options = [*dict.fromkeys(labels)] or [_FILM]
         if self._what not in options:
             self._what = options[0]
         self._pictures.set_options(options, value=self._what)
 
-    def _show_cards(self, found: Sequence[_Found]) -> None:
+    def _show_cards(self, found: Sequence[_Found], threat: LoadCase) -> None:
         self._cards.clear()
         wide = self._what.startswith(_DAMAGE) or " on the walls of " in self._what
         columns = 1 if wide or self._large or len(found) == 1 else 2
         self._cards.style(f"grid-template-columns: repeat({columns}, minmax(0, 1fr))")
         with self._cards:
             for each in found:
-                self._card(each)
+                self._card(each, threat)
 
-    def _card(self, found: _Found) -> None:
+    def _card(self, found: _Found, threat: LoadCase) -> None:
         name = found.shown.name
         with ui.element("figure").classes("be-card m-0"):
             with ui.row().classes("w-full items-center no-wrap"):
@@ -162,11 +163,17 @@ class ResultsView:
                 ui.label(title).style("font-weight: 600; white-space: nowrap")
                 ui.space()
                 ui.label(self._summary(name, found.record)).classes("be-quiet")
-            address = found.pictures.get(self._what)
-            if address is None:
-                ui.label("not drawn yet").classes("be-quiet")
-            else:
-                ui.element("img").props(f'src="{address}" alt="{self._what}, {title}"')
+            image = ui.element("img").props(f'alt="{self._what}, {title}"')
+            if self._what in found.pictures:
+                image.props(f'src="{found.pictures[self._what]}"')
+            elif self._what in found.damage:
+                building = found.damage[self._what]
+                background_tasks.create(self._draw(image, found.shown, threat, building))
+
+    async def _draw(self, image: ui.element, shown: Shown, threat: LoadCase, building: str) -> None:
+        png = await run.io_bound(self._session.damage_png, shown, threat, building)
+        if png is not None and not image.is_deleted:
+            image.props(f'src="{address_of(png)}"')
 
     def _summary(self, name: str, record: BlastRecord) -> str:
         noun = self._session.scenario.objective.noun

@@ -1,12 +1,10 @@
 """Screening: the site's answer by Kingery and Bulmash, before any blast."""
 
-from base64 import b64encode
-from io import BytesIO
 from typing import Final
 
 from nicegui import background_tasks, run, ui
 
-from blast_env.app.page.tables import cells, text_table
+from blast_env.app.page.tables import address_of, cells, text_table
 from blast_env.app.session import NO_FACADE, Session
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.screening import (
@@ -118,11 +116,10 @@ def _answer(
 ) -> tuple[Screening, str]:
     """Return a screening and its picture as an address of data."""
     # Here, because pictures take half a second to import.
+    from blast_env.plots.figures import png_of
     from blast_env.plots.screening import screening_picture
 
     found = screen(scenario, layout, masses)
     for each in found.threats:
         found.threat_row(each, [required])
-    image = BytesIO()
-    screening_picture(scenario, layout, found).savefig(image, format="png", dpi=_DPI)
-    return found, f"data:image/png;base64,{b64encode(image.getvalue()).decode()}"
+    return found, address_of(png_of(screening_picture(scenario, layout, found), _DPI))

@@ -10,7 +10,6 @@ from blast_env.app.session import Sessions
 from blast_env.app.sources import blank_site
 from blast_env.errors import BlastEnvError
 from blast_env.site import Scenario, bundled_scenarios, load_scenario
-from blast_env.sites import generate_site
 from blast_env.units import MODULE_SIDE_M
 
 _MOST_SHOWN = 30
@@ -48,12 +47,6 @@ class StartPage:
                 ui.label(load_scenario(name).description).classes("be-quiet be-what")
         ui.separator()
         with ui.row().classes("items-center gap-2"):
-            self._seed = NumberField("seed", 0, whole=True, least=0)
-            self._seed.classes("w-28")
-            ui.button("generated site", icon="casino", on_click=self._generated).props(
-                "no-caps dense outline"
-            )
-        with ui.row().classes("items-center gap-2"):
             self._sides = [
                 NumberField(words, 40.0, least=MODULE_SIDE_M)
                 for words in ("width (m)", "depth (m)")
@@ -82,12 +75,6 @@ class StartPage:
 
     def _bundled(self, name: str) -> None:
         self._create(load_scenario(name), name)
-
-    def _generated(self) -> None:
-        try:
-            self._create(generate_site(int(self._seed.filled)), "generated")
-        except BlastEnvError as error:
-            complain(error)
 
     def _blank(self) -> None:
         try:

@@ -1,5 +1,6 @@
-"""Tables of texts on the page."""
+"""Tables of texts and pictures on the page."""
 
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
 
 from nicegui import ui
@@ -39,3 +40,8 @@ def cells(rows: Iterable[Sequence[str]]) -> list[dict[str, str | int]]:
         {"id": number} | {str(column): cell for column, cell in enumerate(row)}
         for number, row in enumerate(rows)
     ]
+
+
+def address_of(png: bytes) -> str:
+    """Return a picture as an address that holds it."""
+    return f"data:image/png;base64,{b64encode(png).decode()}"

@@ -42,38 +42,19 @@ _STATES: Final = {
 
 @dataclass
 class _Card:
-    """The elements that show some work; they stay in place while its numbers change.
+    """Work on the page; its elements are bound to its status, and stay while that changes.
 
     Attributes:
         folder: The folder of the work.
-        status: The status shown.
-        words: The state in a word, and the time left.
-        bar: The completed share as a bar, until the work has ended.
-        text: The text of the status.
+        status: Its status.
     """
 
     folder: Path
     status: Status
-    words: ui.label | None = None
-    bar: ui.linear_progress | None = None
-    text: ui.label | None = None
 
     def can_show(self, folder: Path, status: Status) -> bool:
         """Return whether the same elements can show a status of some work."""
         return self.folder == folder and _elements_of(self.status) == _elements_of(status)
-
-    def show(self, status: Status) -> None:
-        """Show a status."""
-        self.status = status
-        if self.words is not None:
-            left_s = status.left_s(time())
-            left = "" if left_s is None else f", {time_words(left_s)} left"
-            self.words.text = _STATES[status.state][1] + left
-        if self.bar is not None:
-            self.bar.value = status.share
-            self.bar.props(f'aria-label="{status.share:.0%} of {status.title}"')
-        if self.text is not None:
-            self.text.text = status.text
 
 
 def _elements_of(status: Status) -> tuple[object, ...]:
@@ -84,6 +65,12 @@ def _elements_of(status: Status) -> tuple[object, ...]:
 def _says(status: Status) -> bool:
     """Return whether the text of a status adds to its state."""
     return status.text not in ("", _STATES[status.state][1])
+
+
+def _state_of(status: Status) -> str:
+    """Return the state of work in a word, and the time left."""
+    left_s = status.left_s(time())
+    return _STATES[status.state][1] + ("" if left_s is None else f", {time_words(left_s)} left")
 
 
 class WorkPanel:
@@ -366,8 +353,7 @@ class WorkPanel:
             pairs = [*zip(cards, jobs, strict=True)]
             if all(card.can_show(*job) for card, job in pairs):
                 for card, (_, status) in pairs:
-                    if card.status != status:
-                        card.show(status)
+                    card.status = status
                 return
         self._jobs.clear()
         with self._jobs:
@@ -376,20 +362,21 @@ class WorkPanel:
             self._cards = [self._card(folder, status) for folder, status in jobs]
 
     def _card(self, folder: Path, status: Status) -> _Card:
-        card = _Card(folder, status)
-        icon, words = _STATES[status.state]
+        card, icon = _Card(folder, status), _STATES[status.state][0]
         with ui.column().classes("be-job"):
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 ui.icon(icon, size="18px", color="red-9" if status.state == "failed" else "blue-9")
                 ui.label(status.title).style("font-weight: 600; font-size: 13px")
                 ui.space()
-                card.words = ui.label(words).classes("be-quiet")
+                ui.label().classes("be-quiet").bind_text_from(card, "status", _state_of)
             if not status.is_over:
-                card.bar = ui.linear_progress(status.share, show_value=False, size="8px")
+                bar = ui.linear_progress(show_value=False, size="8px")
+                bar.props(f'aria-label="share of {status.title}"')
+                bar.bind_value_from(card, "status", lambda each: each.share)
             if _says(status):
                 refused = "be-refused" if status.state == "failed" else "be-quiet"
-                card.text = ui.label(status.text).classes(refused)
-            card.show(status)
+                text = ui.label().classes(refused)
+                text.bind_text_from(card, "status", lambda each: each.text)
             with ui.row().classes("gap-1"):
                 if not status.is_over:
                     stop = ui.button("stop", icon="stop", on_click=partial(self._stop, folder))
