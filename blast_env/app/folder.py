@@ -5,16 +5,13 @@ or the server stopped.
 """
 
 import json
-import os
 import secrets
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from time import time
-from typing import Annotated, Any, Final
-
-from pydantic import Field
+from typing import Any, Final
 
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.records import (
@@ -24,21 +21,21 @@ from blast_env.app.records import (
     BlastRecord,
     CoarseLoads,
     DesignSettings,
-    Kept,
     check_key,
     read_kept,
     read_record,
     write_kept,
 )
 from blast_env.app.work import ANSWER
-from blast_env.documents import DocumentError, checked_as, parse_json, read_text
+from blast_env.documents import DocumentError, parse_json, read_text
 from blast_env.errors import BlastEnvError
-from blast_env.files import make_folder, write_atomically
+from blast_env.files import make_folder, write_atomically, write_text
 from blast_env.site import Scenario
 
 _DESIGN: Final = "design.json"
 _SETTINGS: Final = "settings.json"
-_OPEN: Final = "open.json"
+_OPEN: Final = "open.txt"
+_LOCK: Final = "open.sqlite"
 
 
 @dataclass(frozen=True)
@@ -228,46 +225,23 @@ class WorkFolder:
             url: Address of this server, for the message of others.
 
         Raises:
-            BlastEnvError: If another process holds it.
+            BlastEnvError: If another server holds it, or it cannot be held.
         """
         mark = self.path / _OPEN
-        other = _holder(mark)
-        if other is not None:
-            raise BlastEnvError(
-                f"{self.path} is open already at {other}: go there, or name another folder"
-                " (--folder)"
-            )
-        write_kept(_Holder(process=os.getpid(), url=url, since_s=time()), mark)
-        try:
+        # The system frees the lock of a killed process, too.
+        with closing(sqlite3.connect(self.path / _LOCK, timeout=0.0)) as lock:
+            try:
+                lock.execute("BEGIN EXCLUSIVE")
+                write_text(mark, url)
+            except sqlite3.OperationalError as error:
+                if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+                    raise BlastEnvError(f"{self.path}: cannot be held: {error}") from error
+                raise BlastEnvError(
+                    f"{self.path} is open already at {read_text(mark)}: go there, or name another"
+                    " folder (--folder)"
+                ) from error
             yield
-        finally:
-            mark.unlink(missing_ok=True)
 
     @property
     def _designs(self) -> Path:
         return self.path / "designs"
-
-
-class _Holder(Kept):
-    """The server that holds a folder."""
-
-    process: Annotated[int, Field(ge=1, lt=2**31)]
-    url: str
-    since_s: float
-
-
-def _holder(mark: Path) -> str | None:
-    """Return the address of the server that holds a folder, or `None` if none does."""
-    try:
-        holder = checked_as(_Holder, parse_json(read_text(mark)))
-    except DocumentError:
-        return None
-    if holder.process == os.getpid():
-        return holder.url
-    try:
-        os.kill(holder.process, 0)
-    except ProcessLookupError:
-        return None
-    except OSError:  # the process runs, but belongs to another user
-        return holder.url
-    return holder.url

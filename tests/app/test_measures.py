@@ -13,6 +13,7 @@ from blast_env.app.folder import WorkFolder
 from blast_env.app.session import Session, Sessions
 from blast_env.errors import LayoutError
 from blast_env.evaluation import BlastEvaluator
+from blast_env.evaluation.consequences import BuildingResponse
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout, Measure, Piece
 from blast_env.site import Scenario, ScenarioError
@@ -119,11 +120,12 @@ def test_the_picture_of_the_damage_is_of_what_stands_there_now(
     assert (picture() or b"").startswith(b"\x89PNG")
     assert picture("shed") is None
     drawn: list[str] = []
-    monkeypatch.setattr(
-        session,
-        "damage_png",
-        lambda each: drawn.append(each.facade.level_of_protection.label) or b"",
-    )
+
+    def draw(each: BuildingResponse) -> bytes:
+        drawn.append(each.facade.level_of_protection.label)
+        return b""
+
+    monkeypatch.setattr(session, "damage_png", draw)
     picture()
     blasted.harden("glass", taken=True)
     picture()
