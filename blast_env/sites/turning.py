@@ -1,34 +1,12 @@
 """Rotation of sites by right angles."""
 
 from collections.abc import Mapping
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
-from blast_env.geometry import Rectangle
-from blast_env.site import (
-    AccessWay,
-    AnyScenario,
-    AnySource,
-    AnyStructure,
-    BuildZone,
-    GaugeSection,
-    PointSource,
-    Scenario,
-    SegmentSource,
-    VehicleSource,
-    find_scenario,
-)
-from blast_env.site.catalogue import Hardening
+from blast_env.site import AnyScenario, Scenario, find_scenario
 from blast_env.site.scene import WallName
-from blast_env.site.sections import (
-    Entry,
-    FacadePart,
-    Ground,
-    ModularObstacleSection,
-    PointM,
-    PolygonSection,
-)
-
-_Covering = TypeVar("_Covering", FacadePart, Hardening)
+from blast_env.site.sections import PointM
+from blast_env.units import MODULE_SIDE_M
 
 _DIGITS: Final = 9
 
@@ -38,6 +16,8 @@ _TURNED_WALL: Final[Mapping[WallName, WallName]] = {
     "east": "north",
     "north": "west",
 }
+
+_ACROSS: Final = {"left_right": "bottom_top", "bottom_top": "left_right"}
 
 
 def turned(scenario: AnyScenario, quarter_turns: int) -> Scenario:
@@ -50,23 +30,46 @@ def turned(scenario: AnyScenario, quarter_turns: int) -> Scenario:
         quarter_turns: Number of right angles.
     """
     scenario = find_scenario(scenario)
+    document = scenario.model_dump()
     for _ in range(quarter_turns % 4):
-        scenario = _turned_once(scenario)
-    return Scenario.from_document(scenario.model_dump(), scenario.name)
+        site = document["site"]
+        document = _table(document, site["height_m"])
+        document["site"] |= {"width_m": site["height_m"], "height_m": site["width_m"]}
+        document["georeference"] = None  # the turned site has no place on the map
+    return Scenario.from_document(document, scenario.name)
 
 
-def _turned_once(scenario: Scenario) -> Scenario:
-    """Return a scenario turned by one right angle, without checking its sections again."""
-    site, zone = scenario.site, scenario.build_zone
-    changes: dict[str, Any] = {
-        "site": site.model_copy(update={"width_m": site.height_m, "height_m": site.width_m}),
-        "charge": tuple(_source(each, site.height_m) for each in scenario.charge),
-        "structures": tuple(_structure(each, site.height_m) for each in scenario.structures),
-        "gauges": tuple(_gauge(each, site.height_m) for each in scenario.gauges),
-        "build_zone": None if zone is None else _zone(zone, site.height_m),
-        "georeference": None,  # the turned site has no place on the map
-    }
-    return scenario.model_copy(update=changes)
+def _table(table: Mapping[str, Any], height_m: float) -> dict[str, Any]:
+    """Return a section, with all below it, after one turn of a site of some height."""
+    found = {key: _value(key, value, height_m) for key, value in table.items()}
+    if "rows" in table:
+        found |= {"rows": table["columns"], "columns": table["rows"]}
+    if "corner_m" in table:  # the lower left corner is the upper left one before the turn
+        x_m, y_m = table["corner_m"]
+        rows = table.get("rows", table.get("side_modules", 0))
+        _, up_m = table.get("size_m", (0.0, rows * MODULE_SIDE_M))
+        found["corner_m"] = _point((x_m, y_m + up_m), height_m)
+    return found
+
+
+def _value(key: str, value: Any, height_m: float) -> Any:
+    if isinstance(value, Mapping):
+        return _table(value, height_m)
+    if key in ("position_m", "start_m", "end_m"):
+        return (*_point(value[:2], height_m), *value[2:])
+    if key == "size_m":
+        return value[::-1]
+    if key == "outline_m":
+        return tuple(_vertex(each, height_m) for each in value)
+    if key == "courtyards_m":
+        return tuple(_value("outline_m", each, height_m) for each in value)
+    if key in ("faces", "walls"):
+        return tuple(_TURNED_WALL[wall] for wall in value)
+    if key == "between":
+        return _ACROSS[value]
+    if isinstance(value, list | tuple):
+        return tuple(_value("", each, height_m) for each in value)
+    return value
 
 
 def _point(point_m: PointM, height_m: float) -> PointM:
@@ -77,80 +80,3 @@ def _vertex(corner_m: PointM, height_m: float) -> PointM:
     """Return the corner of an outline after the turn, without the rounding of the difference."""
     x_m, y_m = _point(corner_m, height_m)
     return round(x_m, _DIGITS), y_m
-
-
-def _corner(rectangle_m: Rectangle, height_m: float) -> PointM:
-    """Return the lower left corner after the turn: the upper left one before it."""
-    return _point((rectangle_m.left, rectangle_m.top), height_m)
-
-
-def _source(source: AnySource, height_m: float) -> AnySource:
-    if isinstance(source, PointSource):
-        return source.model_copy(update={"position_m": _point(source.position_m, height_m)})
-    if isinstance(source, SegmentSource):
-        start_m, end_m = (_point(each, height_m) for each in source.segment_m)
-        return source.model_copy(update={"start_m": start_m, "end_m": end_m})
-    if isinstance(source, VehicleSource):
-        changes: dict[str, Any] = {
-            "entries": tuple(_entry(each, height_m) for each in source.entries),
-            "drivable": tuple(_ground(each, height_m) for each in source.drivable),
-            "keep_outs": tuple(_ground(each, height_m) for each in source.keep_outs),
-        }
-        return source.model_copy(update=changes)
-    corner_m = _corner(source.rectangle_m, height_m)
-    return source.model_copy(update={"corner_m": corner_m, "size_m": source.size_m[::-1]})
-
-
-def _entry(entry: Entry, height_m: float) -> Entry:
-    ends_m = {"start_m": _point(entry.start_m, height_m), "end_m": _point(entry.end_m, height_m)}
-    return entry.model_copy(update=ends_m)
-
-
-def _structure(structure: AnyStructure, height_m: float) -> AnyStructure:
-    changes: dict[str, Any] = {"faces": tuple(_TURNED_WALL[wall] for wall in structure.faces)}
-    if isinstance(structure, PolygonSection):
-        rings = (structure.outline_m, *structure.courtyards_m)
-        outline, *courtyards = (tuple(_vertex(each, height_m) for each in ring) for ring in rings)
-        changes |= {"outline_m": outline, "courtyards_m": tuple(courtyards)}
-    else:
-        changes["corner_m"] = _corner(structure.rectangle_m, height_m)
-    if isinstance(structure, ModularObstacleSection):
-        changes |= {"rows": structure.columns, "columns": structure.rows}
-    if structure.facade is not None:
-        parts = tuple(map(_with_walls, structure.facade.parts))
-        changes["facade"] = structure.facade.model_copy(update={"parts": parts})
-    return structure.model_copy(update=changes)
-
-
-def _with_walls(part: _Covering) -> _Covering:
-    """Return a part of a facade or a hardening measure on the turned walls."""
-    return part.model_copy(update={"walls": tuple(_TURNED_WALL[wall] for wall in part.walls)})
-
-
-def _gauge(gauge: GaugeSection, height_m: float) -> GaugeSection:
-    x_m, y_m, z_m = gauge.position_m
-    return gauge.model_copy(update={"position_m": (*_point((x_m, y_m), height_m), z_m)})
-
-
-def _zone(zone: BuildZone, height_m: float) -> BuildZone:
-    changes: dict[str, Any] = {
-        "corner_m": _corner(zone.rectangle_m, height_m),
-        "rows": zone.columns,
-        "columns": zone.rows,
-        "keep_outs": tuple(_ground(each, height_m) for each in zone.keep_outs),
-        "cost_areas": tuple(_ground(each, height_m) for each in zone.cost_areas),
-        "hardening": tuple(map(_with_walls, zone.hardening)),
-        "access_way": None if zone.access_way is None else _way(zone.access_way, height_m),
-    }
-    return zone.model_copy(update=changes)
-
-
-def _ground(ground: Ground, height_m: float) -> Ground:
-    corner_m = _corner(ground.rectangle_m, height_m)
-    return ground.model_copy(update={"corner_m": corner_m, "size_m": ground.size_m[::-1]})
-
-
-def _way(way: AccessWay, height_m: float) -> AccessWay:
-    across = "bottom_top" if way.between == "left_right" else "left_right"
-    gate = None if way.gate is None else _ground(way.gate, height_m)
-    return way.model_copy(update={"between": across, "gate": gate})

@@ -2,14 +2,12 @@
 
 import json
 from collections.abc import Mapping
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
 from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
 from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.site_map import (
-    MOST_COORDINATE,
     MOST_FEATURES,
     LostFeature,
     MapFeature,
@@ -124,33 +122,22 @@ def _geometry(path: Path, place: str, document: Any) -> BaseGeometry:
             f"{path}: {place}.geometry: type is {value_text(kind)}, must be one of "
             f"{', '.join(_KINDS)}"
         )
-    _check_numbers(path, place, document)
     try:
         geometry = shapely.force_2d(shape(document))
-    except (ShapelyError, TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+    except (
+        ShapelyError,
+        TypeError,
+        ValueError,
+        ArithmeticError,
+        LookupError,
+        AttributeError,
+    ) as error:
         raise BlastEnvError(
             f"{path}: {place}.geometry: is not usable: {shortened(str(error), 300)}"
         ) from error
     except RecursionError as error:
         raise BlastEnvError(f"{path}: {place}.geometry: is nested too deeply") from error
     return geometry
-
-
-def _check_numbers(path: Path, place: str, geometry: dict[str, Any]) -> None:
-    """Refuse a coordinate that is not finite or is beyond `MOST_COORDINATE`."""
-    left: list[Any] = [geometry]
-    while left:
-        value = left.pop()
-        if isinstance(value, dict):
-            left += [value.get("coordinates"), value.get("geometries")]
-        elif isinstance(value, list):
-            left += value
-        elif isinstance(value, int | float) and not abs(value) <= MOST_COORDINATE:
-            where = f"{path}: {place}.geometry: has"
-            if isinstance(value, float) and not isfinite(value):
-                raise BlastEnvError(f"{where} a coordinate that is no finite number")
-            bound = f"must be within {MOST_COORDINATE:g}"
-            raise BlastEnvError(f"{where} the coordinate {value_text(value)}, {bound}")
 
 
 def _tags(item: Mapping[str, Any]) -> Tags:
