@@ -323,14 +323,7 @@ class LayoutState:
 
     @property
     def _surroundings(self) -> Surroundings:
-        scenario = self.scenario
-        return Surroundings(
-            self._zone,
-            scenario.structures,
-            scenario.charge,
-            scenario.charge_radius_m,
-            scenario.site,
-        )
+        return self.scenario.surroundings(self._zone)
 
     @property
     def _taken(self) -> BoolArray:

@@ -35,7 +35,6 @@ from blast_env.site.vehicles import MOST_PLACES, Obstacles, VehicleGround
 from blast_env.site.zone import (
     BuildZone,
     EmptyZone,
-    Surroundings,
     distance_m,
     empty_zone,
     source_bounds_m,
@@ -326,7 +325,7 @@ def _stopping_problems(
     scenario: Content, key: str, ground: VehicleGround, zone: BuildZone
 ) -> Iterator[Problem]:
     """Check that a barrier can increase the stand-off of a vehicle over the empty site's."""
-    cells = _stopping_cells(empty_zone(_surroundings(scenario, zone)), ground.source)
+    cells = _stopping_cells(empty_zone(scenario.surroundings(zone)), ground.source)
     if not cells.any():
         message = "nothing can stop the vehicle: no item in stock stops vehicles"
         if ground.source.motion is not None:
@@ -367,12 +366,7 @@ def _build_zone_problems(scenario: Content) -> Iterator[Problem]:
     yield from _outside_site(
         scenario, "build_zone", f"the zone ({extent(zone.rectangle_m)})", zone.rectangle_m
     )
-    yield from build_zone_problems(_surroundings(scenario, zone))
-
-
-def _surroundings(scenario: Content, zone: BuildZone) -> Surroundings:
-    structures, sources = tuple(scenario.structures), tuple(scenario.charge)
-    return Surroundings(zone, structures, sources, scenario.charge_radius_m, scenario.site)
+    yield from build_zone_problems(scenario.surroundings(zone))
 
 
 def _height_problems(scenario: Content) -> Iterator[Problem]:

@@ -23,7 +23,7 @@ from blast_env.site.sections import (
     VehicleSource,
 )
 from blast_env.site.vehicles import RatedPiece, VehicleGround
-from blast_env.site.zone import BuildZone
+from blast_env.site.zone import BuildZone, Surroundings
 
 SCHEMA_VERSION: Final = 2
 """The version of the file format."""
@@ -87,6 +87,11 @@ class Content(Section):
         if self.site.air_height_m is not None:
             return self.site.air_height_m
         return default_air_height_m(self.structures, self.build_zone)
+
+    def surroundings(self, zone: BuildZone) -> Surroundings:
+        """Return a build zone with all that decides its usable cells."""
+        radius_m = self.charge_radius_m
+        return Surroundings(zone, self.structures, self.charge, radius_m, self.site)
 
     def structures_with(self, layout: Iterable[Element]) -> tuple[AnyStructure, ...]:
         """Return the structures that remain with a layout."""

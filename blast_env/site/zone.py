@@ -291,10 +291,8 @@ def source_bounds_m(source: AnySource) -> Rectangle:
     """
     if isinstance(source, RectangleSource):
         return source.rectangle_m
-    if isinstance(source, VehicleSource):
-        return Rectangle.around([entry.bounds_m for entry in source.entries])
-    (x0, y0), (x1, y1) = source.segment_m
-    return Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
+    x_m, y_m = zip(*(place for ends in source.lines_m for place in ends), strict=True)
+    return Rectangle(min(x_m), min(y_m), max(x_m), max(y_m))
 
 
 def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
@@ -302,44 +300,18 @@ def distances_m(source: AnySource, boxes: Boxes) -> FloatArray:
 
     For a vehicle it is the distance of its entries on the border.
     """
-    if isinstance(source, VehicleSource):
-        each = [box_distances_m(entry.bounds_m, boxes) for entry in source.entries]
-        nearest: FloatArray = np.minimum.reduce(each)
-        return nearest
     if isinstance(source, PointSource | RectangleSource):
         return box_distances_m(source_bounds_m(source), boxes)
-    return _segment_distances(*source.segment_m, boxes)
+    import shapely  # a tenth of a second
+
+    lines = shapely.MultiLineString(source.lines_m)
+    return np.asarray(shapely.distance(lines, shapely.box(*boxes)))
 
 
 def distance_m(source: AnySource, rectangle: Rectangle) -> float:
     """Return the least distance of the charge's centre from a rectangle, m; see `distances_m`."""
     left, bottom, right, top = (np.array(side) for side in rectangle)
     return float(distances_m(source, (left, bottom, right, top)))
-
-
-def _segment_distances(start: PointM, end: PointM, boxes: Boxes) -> FloatArray:
-    """Return the distances between a segment and rectangles, m.
-
-    Two disjoint convex figures are nearest at a corner of one of them.
-    """
-    (x0, y0), (x1, y1) = start, end
-    step_x, step_y = x1 - x0, y1 - y0
-    square = step_x**2 + step_y**2
-    nearest = np.minimum(
-        box_distances_m(Rectangle(x0, y0, x0, y0), boxes),
-        box_distances_m(Rectangle(x1, y1, x1, y1), boxes),
-    )
-    left, bottom, right, top = boxes
-    sides = []
-    for x, y in ((left, bottom), (left, top), (right, bottom), (right, top)):
-        along = (x - x0) * step_x + (y - y0) * step_y
-        share = np.clip(along / square, 0.0, 1.0) if square > 0.0 else np.zeros_like(along)
-        nearest = np.minimum(nearest, np.hypot(x - x0 - share * step_x, y - y0 - share * step_y))
-        sides.append((x - x0) * step_y - (y - y0) * step_x)
-    both_sides = (np.minimum.reduce(sides) <= 0.0) & (np.maximum.reduce(sides) >= 0.0)
-    bounds = Rectangle(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
-    meets = both_sides & (box_distances_m(bounds, boxes) == 0.0)
-    return np.where(meets, 0.0, nearest)
 
 
 @dataclass(frozen=True)
