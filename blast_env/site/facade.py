@@ -118,15 +118,9 @@ def _bay_count(structure: AnyStructure) -> int:
     rise_m = (structure.height_m or 0.0) - structure.base_m
     if facade is None or rise_m <= 0.0:
         return 0
-    return bays_in(
-        structure.rectangle_m,
-        rise_m,
-        structure.faces,
-        facade.storey_m,
-        facade.bay_m,
-        () if structure.footprint is None else structure.footprint.walls,
-        facade.storeys,
-    )
+    walls = () if structure.footprint is None else structure.footprint.walls
+    plan = structure.rectangle_m, rise_m, structure.faces
+    return bays_in(*plan, facade.storey_m, facade.bay_m, walls, facade.storeys)
 
 
 def named_bays(structure: AnyStructure) -> tuple[NamedBay, ...]:

@@ -56,15 +56,6 @@ UNITS_M: Final[Mapping[str, float]] = MappingProxyType(
 )
 """Lengths of units in metres, by the names that `--units` takes."""
 
-_CODES: Final = {
-    units.IN: "in",
-    units.FT: "ft",
-    units.MM: "mm",
-    units.CM: "cm",
-    units.M: "m",
-    units.KM: "km",
-    units.DM: "dm",
-}
 MOST_LINES: Final = 2_000_000
 """Most lines of a file: each number of an entity takes one line, and its group code another."""
 
@@ -236,11 +227,11 @@ def _metres_per_unit(path: Path, document: Drawing, unit: str | None) -> float:
                 f"{path}: does not say its unit ($INSUNITS is 0); say it with --units, one of "
                 f"{', '.join(UNITS_M)}"
             )
-        if code not in _CODES:
+        unit = str(units.decode(code))
+        if unit not in UNITS_M:
             raise BlastEnvError(
                 f"{path}: $INSUNITS is {code}, which is none of {', '.join(UNITS_M)}; say --units"
             )
-        unit = _CODES[code]
     if unit not in UNITS_M:
         raise BlastEnvError(
             f"units is {unit!r}{suggestion(unit, UNITS_M)}, must be one of {', '.join(UNITS_M)}"

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isfinite
 from types import MappingProxyType
 from typing import Final
@@ -66,23 +66,13 @@ _GENERAL: Final = ("", "yes")
 _HIGH: Final = "too high is on the unsafe side for a building that shields: compare --low-heights"
 
 
-@dataclass(frozen=True)
-class TaggedHeights:
-    """The heights of an object in its tags.
+def tagged_heights(
+    feature: MapFeature, options: ImportOptions, ledger: Ledger
+) -> tuple[float | None, float]:
+    """Return the heights of top and underside in the tags of an object, m.
 
-    Attributes:
-        top_m: Height of its top, m; `None` if it is not known.
-        base_m: Height of its underside, m.
-    """
-
-    top_m: float | None
-    base_m: float
-
-
-def tagged_heights(feature: MapFeature, options: ImportOptions, ledger: Ledger) -> TaggedHeights:
-    """Return the heights in the tags of an object; the ledger gets those that are unclear.
-
-    An unreadable height does not hide a number of storeys. Of several numbers the largest counts.
+    The top is `None` if it is not known. The ledger gets heights that are unclear. An unreadable
+    height does not hide a number of storeys. Of several numbers the largest counts.
     """
     tags = {str(name).lower(): value for name, value in feature.tags.items()}
     own = None if options.height_from is None else options.height_from.lower()
@@ -93,7 +83,7 @@ def tagged_heights(feature: MapFeature, options: ImportOptions, ledger: Ledger) 
     base_m = _first(feature, tags, _BASE_KEYS, 1.0, ledger)
     if base_m is None:
         base_m = _first(feature, tags, _BASE_LEVEL_KEYS, options.level_height_m, ledger)
-    return TaggedHeights(top_m, base_m or 0.0)
+    return top_m, base_m or 0.0
 
 
 def _first(

@@ -193,7 +193,7 @@ def _thing(feature: MapFeature, role: Role, options: ImportOptions, ledger: Ledg
     tnt_kg = tags.get("tnt_kg")
     name_keys = ("title", *_NAME_KEYS) if own in _OWN_STRUCTURES else _NAME_KEYS
     is_building = role is Role.BUILDING
-    heights = tagged_heights(feature, options, ledger) if is_building else None
+    top_m, base_m = tagged_heights(feature, options, ledger) if is_building else (None, 0.0)
     building = str(tags.get("building", tags.get("building:part", "")))
     kind = building if is_building and not own else own
     if is_building and not building:
@@ -203,8 +203,8 @@ def _thing(feature: MapFeature, role: Role, options: ImportOptions, ledger: Ledg
         geometry=feature.geometry,
         name=next((str(tags[key]) for key in name_keys if tags.get(key)), ""),
         place=feature.place,
-        height_m=None if heights is None else heights.top_m,
-        base_m=0.0 if heights is None else heights.base_m,
+        height_m=top_m,
+        base_m=base_m,
         diameter_m=_diameter_m(feature) if is_building else None,
         protected=own == "protected_structure" or tags.get("protected") in _YES,
         part_of=str(tags.get("building", "")) if own in _OWN_STRUCTURES else "",
