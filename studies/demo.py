@@ -18,7 +18,7 @@ import typer
 from matplotlib.figure import Figure
 from sb3_contrib import MaskablePPO
 
-from blast_env.cli.evaluation_report import interval
+from blast_env.cli.evaluate import interval
 from blast_env.cli.output import (
     print_line,
     print_table,

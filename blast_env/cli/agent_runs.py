@@ -11,7 +11,7 @@ from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, ne
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.run_folder import RunFolder
 
-from blast_env.cli.evaluation_report import EvaluateOptions, report
+from blast_env.cli.evaluate import EvaluateOptions, report
 from blast_env.cli.output import print_line
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (

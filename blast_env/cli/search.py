@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from blast_env.cli.command import writes
-from blast_env.cli.evaluation_report import load_text, share_text
+from blast_env.cli.evaluate import load_text, share_text
 from blast_env.cli.options import (
     SCENARIO_HELP,
     CacheOption,
@@ -342,16 +342,21 @@ def write_search(
     result = run.result
     scenario = run.problem.scenario
     provenance = _provenance(run, options, checked)
-    written = [write_layout(out / LAYOUT_NAME, scenario, result.layout, provenance)]
-    written += save_pictures(
-        (out / LAYOUT_PICTURE, partial(layout_picture, scenario, result.layout)),
-        (out / "search.png" if result.history else None, partial(_figure, run)),
-    )
+    written = _write_layout(scenario, result.layout, provenance, out)
     if result.history:
+        written += save_pictures((out / "search.png", partial(_figure, run)))
         written.append(write_csv(result.history_table(), out / "history.csv"))
     if result.front:
         written.append(write_csv(result.front_table(), out / "front.csv"))
     print_written(written)
+
+
+def _write_layout(
+    scenario: Scenario, layout: Layout, provenance: Mapping[str, Any], out: Path
+) -> list[Path]:
+    file = write_layout(out / LAYOUT_NAME, scenario, layout, provenance)
+    picture = partial(layout_picture, scenario, layout)
+    return [file, *save_pictures((out / LAYOUT_PICTURE, picture))]
 
 
 def _figure(run: SearchRun) -> "Figure":
@@ -424,7 +429,9 @@ def _package_proposal(
         f"{scenario.name}: {_proposal_words(scenario, result)}, by {result.by}, in {ms:,.0f} ms"
     )
     if out is not None:
-        _write_proposal(scenario, result.layout, chosen.source, out)
+        make_folder(out)
+        provenance = {**chosen.source, "command": command(), "versions": versions()}
+        print_written(_write_layout(scenario, result.layout, provenance, out))
     return problem, result.layout
 
 
@@ -455,16 +462,6 @@ def _proposal_words(scenario: Scenario, result: SearchResult) -> str:
     cost = "" if scenario.zone.budget is None else f", {scenario.zone.priced(placement.cost)}"
     gain = result.expectation
     return f"{layout_counts(result.layout)}{cost}{gain and f', {gain}'}"
-
-
-def _write_proposal(
-    scenario: Scenario, layout: Layout, source: Mapping[str, str], out: Path
-) -> None:
-    make_folder(out)
-    provenance = {**source, "command": command(), "versions": versions()}
-    written = [write_layout(out / LAYOUT_NAME, scenario, layout, provenance)]
-    picture = partial(layout_picture, scenario, layout)
-    print_written(written + save_pictures((out / LAYOUT_PICTURE, picture)))
 
 
 def _verify(problem: DesignProblem, layout: Layout, cells: str | None) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from blast_env.cli.command import PICTURES, writes
-from blast_env.cli.evaluation_report import standing_lines
+from blast_env.cli.evaluate import standing_lines
 from blast_env.cli.options import (
     BY_SITE,
     CELL_HELP,

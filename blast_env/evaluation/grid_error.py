@@ -17,7 +17,7 @@ error of the model nor the spread of charges.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
@@ -67,13 +67,12 @@ def final_engine(
     scenarios: Sequence[Scenario],
     cell_m: float | None = None,
     cells: str | None = None,
-    **settings: Any,
 ) -> Engine:
     """Return the engine of final statements on some sites, or the one with the given cells.
 
     An engine in place of a name keeps its cells. Errors are those of `find_engine`.
     """
-    found = find_engine(engine, cell_m, cells=cells, **settings)
+    found = find_engine(engine, cell_m, cells=cells)
     is_given = isinstance(engine, Engine) or cell_m is not None or cells is not None
     return found if is_given else found.final(scenarios)
 

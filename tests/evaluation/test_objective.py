@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blast_env.cli.evaluation_report import print_means
+from blast_env.cli.evaluate import print_means
 from blast_env.design.search import DesignProblem
 from blast_env.envs.barrier_env import BlastBarrierEnv
 from blast_env.errors import BlastEnvError
