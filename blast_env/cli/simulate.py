@@ -290,19 +290,16 @@ def _number(value: float, form: str, missing: str = "-") -> str:
     return missing if isnan(value) else format(value, form)
 
 
-def _scaled(result: "BlastResult | GasResult", name: str) -> dict[str, Any]:
-    """Return the impulse on a structure in Pa s, or the error without one."""
-    try:
-        return result.impulse(name)._asdict()
-    except BlastEnvError as error:
-        return {"error": str(error)}
-
-
 def _record(result: "BlastResult | GasResult", written: Sequence[Path]) -> dict[str, object]:
     """Return the result as plain data; missing numbers are null.
 
     The modules and the single parameters, which the preset implies, are in the workbook.
     """
+    loads, error = _loads(result)
+    impulse = {
+        each.name: {"pa_s": each.impulse_pa_s, "in_range": each.in_range, "notes": each.notes}
+        for each in loads
+    }
     content: dict[str, object] = {
         "run": {
             name: value
@@ -311,7 +308,7 @@ def _record(result: "BlastResult | GasResult", written: Sequence[Path]) -> dict[
         },
         "structures": table_records(result.structures),
         "buildings": table_records(result.buildings),
-        "impulse": {name: _scaled(result, name) for name in result.structures["structure"]},
+        "impulse": impulse or {"error": error},
     }
     if not isinstance(result, BlastResult):
         content["gauges"] = table_records(result.gauges)
