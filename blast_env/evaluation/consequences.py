@@ -430,13 +430,21 @@ class Consequences:
         found: dict[str, list[Neighbour]] = {}
         for each in self.neighbours:
             found.setdefault(each.building, []).append(each)
-        return tuple(max(own, key=_severity_of_neighbour) for own in found.values())
+        major = BuildingDamage.MAJOR
+        return tuple(
+            max(own, key=lambda each: (each.probability[major], each.impulse_pa_s))
+            for own in found.values()
+        )
 
     @property
     def worst_barrier(self) -> BarrierResponse | None:
         """The barrier under the charge that tilts a piece most; `None` without pieces."""
-        standing = [each for each in self.barriers if len(each.pieces)]
-        return max(standing, key=_severity_of_barrier) if standing else None
+        standing = (each for each in self.barriers if len(each.pieces))
+        return max(
+            standing,
+            key=lambda each: (each.pieces["tilt"].max(), each.pieces["tilt"].sum()),
+            default=None,
+        )
 
     def passes(self, target: LevelOfProtection) -> bool:
         """Return whether all buildings reach a level under every charge."""
@@ -474,16 +482,6 @@ class Consequences:
                 for each in self.responses
             ),
         )
-
-
-def _severity_of_neighbour(neighbour: Neighbour) -> Severity:
-    likely = neighbour.probability[BuildingDamage.MAJOR]
-    return Severity(damage=likely, load=neighbour.impulse_pa_s)
-
-
-def _severity_of_barrier(barrier: BarrierResponse) -> Severity:
-    tilt = barrier.pieces["tilt"]
-    return Severity(damage=float(tilt.max()), load=float(tilt.sum()))
 
 
 def other_glazing(scenario: Scenario) -> dict[str, Glazing]:
