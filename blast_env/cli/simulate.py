@@ -74,7 +74,6 @@ def simulate(
     ),
     film: Path | None = writes("Write a film", ".mp4", ".gif"),
     excel: Path | None = writes("Write a workbook", ".xlsx"),
-    parquet: Path | None = writes("Write the collisions, or the loads of all faces", ".parquet"),
     heat_map: Path | None = writes(
         "Write a picture of the load over the protected facades", *PICTURES
     ),
@@ -147,8 +146,6 @@ def simulate(
     result, written = results[-1], [] if film is None else [film]
     if excel is not None:
         written.append(result.to_excel(excel))
-    if parquet is not None:
-        written.append(result.to_parquet(parquet))
     written += files.draw(results)
     if as_json:
         print_json(_record(result, written))

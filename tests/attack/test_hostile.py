@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from stat import S_IFSOCK
 from typing import Any, Final
@@ -32,7 +33,7 @@ from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.files import write_atomically
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutFile
-from blast_env.particles.parquet import checked_table
+from blast_env.particles.parquet import checked_table, write_parquet
 from blast_env.response.components import find_component
 from blast_env.response.facade import respond
 from blast_env.site import Scenario, ScenarioError, save_scenario
@@ -115,7 +116,7 @@ def test_a_path_that_is_none_is_refused_by_every_writer() -> None:
     result = simulate(BALLISTIC_COURTYARD, engine="event")
     for write in (
         result.to_excel,
-        result.to_parquet,
+        partial(write_parquet, result),
         lambda path: write_atomically(path).__enter__(),
     ):
         with pytest.raises(BlastEnvError, match=r"^path is 5, must be a path"):

@@ -48,8 +48,8 @@ def test_simulate_prints_loads_with_units_and_writes_all_files(
     sparse: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(film, "write_film", partial(film.write_film, frames_per_s=0.5))
-    names = ("film.mp4", "table.xlsx", "table.parquet", "map.png")
-    options = ("--film", "--excel", "--parquet", "--heat-map")
+    names = ("film.mp4", "table.xlsx", "map.png")
+    options = ("--film", "--excel", "--heat-map")
     written = [tmp_path / name for name in names]
     layout = tmp_path / "layout.json"
     layout.write_text("[[4, 0], [5, 0]]")

@@ -24,14 +24,7 @@ def site(tmp_path: Path) -> Path:
 
 def test_a_blast_prints_what_the_library_finds(site: Path, tmp_path: Path) -> None:
     expected = blast_env.simulate(hut(), engine="gas")
-    options = (
-        "--engine",
-        "gas",
-        "--excel",
-        tmp_path / "a.xlsx",
-        "--parquet",
-        tmp_path / "a.parquet",
-    )
+    options = ("--engine", "gas", "--excel", tmp_path / "a.xlsx")
     result = run("simulate", site, *options)
     assert result.exit_code == 0, result.output
     assert f"{expected.impulse('hut').pa_s:,.0f}" in result.stdout
@@ -40,7 +33,6 @@ def test_a_blast_prints_what_the_library_finds(site: Path, tmp_path: Path) -> No
     shape = " x ".join(map(str, expected.run.grid.shape))
     assert f" {shape} cells" in " ".join(result.stdout.split())
     assert (tmp_path / "a.xlsx").exists()
-    assert (tmp_path / "a.parquet").exists()
 
 
 def test_a_layout_is_evaluated_by_gas_unless_told_otherwise(site: Path, tmp_path: Path) -> None:

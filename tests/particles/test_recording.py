@@ -198,7 +198,7 @@ def test_a_folder_that_looks_like_a_partition_adds_no_column(
 
 
 def test_every_field_has_its_unit_and_meaning(blast: BlastResult, tmp_path: Path) -> None:
-    schema = pq.read_schema(blast.to_parquet(tmp_path / "run.parquet"))
+    schema = pq.read_schema(write_parquet(blast, tmp_path / "run.parquet"))
     for column in COLLISION_COLUMNS:
         metadata = schema.field(column.name).metadata
         assert metadata[b"unit"].decode() == column.unit
@@ -206,12 +206,12 @@ def test_every_field_has_its_unit_and_meaning(blast: BlastResult, tmp_path: Path
 
 
 def test_the_same_result_gives_the_same_bytes(blast: BlastResult, tmp_path: Path) -> None:
-    first, second = (blast.to_parquet(tmp_path / f"{name}.parquet") for name in "ab")
+    first, second = (write_parquet(blast, tmp_path / f"{name}.parquet") for name in "ab")
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_reading_a_truncated_file(blast: BlastResult, tmp_path: Path) -> None:
-    path = blast.to_parquet(tmp_path / "run.parquet")
+    path = write_parquet(blast, tmp_path / "run.parquet")
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     with pytest.raises(BlastEnvError, match=r"run\.parquet: damaged or not a Parquet file"):

@@ -46,7 +46,6 @@ from blast_env.gas.settings import (
 )
 from blast_env.gas.tables import (
     BUILDING_COLUMNS,
-    FACE_COLUMNS,
     GAUGE_COLUMNS,
     MODULE_COLUMNS,
     STRUCTURE_COLUMNS,
@@ -580,17 +579,6 @@ class GasResult:
         if len(self.pieces):
             tables.append(SheetTable("Pieces", self.pieces, PIECE_COLUMNS))
         return write_tables(self.run_record, tables, path)
-
-    def to_parquet(self, path: str | Path) -> Path:
-        """Write the loads on all faces of cells as Parquet, the run record in its metadata.
-
-        Returns:
-            The path.
-        """
-        from blast_env.particles.parquet import write_table
-
-        faces = self.faces[[column.name for column in FACE_COLUMNS]]
-        return write_table(faces, FACE_COLUMNS, self.run_record, path)
 
     def _notes(self, index: int) -> tuple[str, ...]:
         from blast_env.gas.engine import scaled_distance  # the run has imported it

@@ -389,9 +389,3 @@ class BlastResult:
         from blast_env.particles.workbook import write_workbook
 
         return write_workbook(self, path_of(path))
-
-    def to_parquet(self, path: str | Path) -> Path:
-        """Write the collision table as Parquet, the run record in its metadata; return its path."""
-        from blast_env.particles.parquet import write_parquet
-
-        return write_parquet(self, path_of(path))
