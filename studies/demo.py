@@ -18,7 +18,6 @@ import typer
 from matplotlib.figure import Figure
 from sb3_contrib import MaskablePPO
 
-from blast_env.cli.evaluate import interval
 from blast_env.cli.output import (
     print_line,
     print_table,
@@ -39,10 +38,10 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
+from blast_env.evaluation.answers import interval, percent
 from blast_env.evaluation.cases import one_of_each_charge
 from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
-from blast_env.evaluation.grid_error import percent
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_layouts

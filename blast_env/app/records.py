@@ -13,10 +13,10 @@ from pydantic import BaseModel, ConfigDict
 
 from blast_env.documents import check_values, read_text
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import AnswerTable
+from blast_env.evaluation.answers import AnswerTable, points
 from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad, on_buildings
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.evaluation.grid_error import CellErrors, LoadOf, points
+from blast_env.evaluation.grid_error import CellErrors, LoadOf
 from blast_env.evaluation.standing import worst_standing
 from blast_env.files import write_atomically
 from blast_env.gas.settings import Cells

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from math import isnan, nan
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -49,10 +49,19 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
-from blast_env.evaluation.answers import building_words
+from blast_env.evaluation.answers import (
+    building_words,
+    interval,
+    load_text,
+    percent,
+    points,
+    share_text,
+    standing_lines,
+    worse,
+)
 from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.grid_error import final_engine, percent, points, with_errors, worse
+from blast_env.evaluation.grid_error import final_engine
 from blast_env.files import make_folder, write_text
 from blast_env.geometry import Element, layout_counts
 from blast_env.io.export import LayoutPlan, check_target, export_layouts, is_file
@@ -62,7 +71,6 @@ from blast_env.statistics import CVAR_LEVEL, Estimate, check_cvar_level
 from blast_env.tables import write_csv
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
 _SCENARIO: Final = "courtyard"
@@ -193,35 +201,6 @@ def _evaluate_run(
     with import_extra("agents,render", "--run"):
         from blast_env.cli.agent_runs import evaluate_run
     evaluate_run(run, options)
-
-
-def interval(estimate: Estimate) -> str:
-    """Return an interval of shares in words; a dash for a single threat."""
-    if isnan(estimate.low):
-        return "-"
-    return f"{percent(estimate.low)} to {percent(estimate.high)}"
-
-
-def share_text(estimate: Estimate, error: float = nan, sampled: str = "charges") -> str:
-    """Return a share with its errors: `48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)`.
-
-    `sampled` names the samples of its interval.
-    """
-    half = points(estimate.value - estimate.low)
-    return with_errors(percent(estimate.value), points(error), half and f"{half} (95 %, {sampled})")
-
-
-def load_text(
-    objective: ObjectiveSection, estimate: Estimate, error: float = nan, sampled: str = "charges"
-) -> str:
-    """Return a load with its unit and its errors; see `share_text`."""
-
-    def number(load: float) -> str:
-        return objective.text(load).removesuffix(f" {objective.unit}")
-
-    half = "" if isnan(estimate.low) else number(estimate.value - estimate.low)
-    cells = "" if isnan(error) else number(error)
-    return with_errors(objective.text(estimate.value), cells, half and f"{half} (95 %, {sampled})")
 
 
 def threats_text(count: int, seeds: range) -> str:
@@ -441,19 +420,6 @@ def _print_layout(evaluation: Evaluation, seeds: range) -> None:
     for line in standing_lines(evaluation.scenario, evaluation.building_table, "structure"):
         print_line(line)
     _print_totals(evaluation)
-
-
-def standing_lines(scenario: Scenario, buildings: "pd.DataFrame", column: str) -> Iterator[str]:
-    """Yield the standing of the load on each building, with its reason.
-
-    Args:
-        scenario: It has the titles of the buildings.
-        buildings: A table with `STANDING_COLUMNS`.
-        column: The column with the name of the building.
-    """
-    for each in buildings.to_dict("records"):
-        name = building_words(scenario, str(each[column]))
-        yield f"standing of the load, {name}: {each['standing']} ({each['reason']})"
 
 
 def _number(load: float, error: float) -> str:

@@ -13,7 +13,6 @@ import numpy as np
 import typer
 
 from blast_env.cli.command import writes
-from blast_env.cli.evaluate import load_text, share_text
 from blast_env.cli.options import (
     SCENARIO_HELP,
     CacheOption,
@@ -68,9 +67,10 @@ from blast_env.evaluation import (
     compare,
     draw_threats,
 )
+from blast_env.evaluation.answers import load_text, percent, share_text
 from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.evaluation.engines import JUDGE, find_engine
-from blast_env.evaluation.grid_error import final_engine, percent
+from blast_env.evaluation.grid_error import final_engine
 from blast_env.files import make_folder
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import LayoutState, load_layout, write_layout

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 import typer
 
 from blast_env.cli.command import PICTURES, writes
-from blast_env.cli.evaluate import standing_lines
 from blast_env.cli.options import (
     BY_SITE,
     CELL_HELP,
@@ -33,7 +32,7 @@ from blast_env.cli.output import (
     progress_bar,
 )
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.answers import building_words
+from blast_env.evaluation.answers import building_words, standing_lines
 from blast_env.evaluation.engines import BlastResult, Engine, default_engine, find_engine
 from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
 from blast_env.evaluation.engines.pieces import pieces_answer

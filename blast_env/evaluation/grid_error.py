@@ -20,6 +20,7 @@ from math import isnan, nan
 from typing import Final, TypeAlias
 
 from blast_env.errors import BlastEnvError
+from blast_env.evaluation.answers import percent, points, with_errors, worse
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet
 from blast_env.evaluation.engines.contract import BlastLoads, Engine, find_engine
 from blast_env.evaluation.evaluator import BlastEvaluator
@@ -35,8 +36,6 @@ FACTOR: Final = 3.0
 
 RATIO: Final = 2.0
 """Ratio of the sizes of the cells of an engine and of its `Engine.coarser`."""
-
-_SHOWN: Final = 0.0005  # the least share that is not printed as 0.0 %
 
 LoadOf: TypeAlias = Callable[[BlastLoads], float]
 """Selects a number from the loads of a blast: that of a building, or the objective."""
@@ -197,25 +196,3 @@ def grid_error(
         fine=fine,
         coarse=(protected, unprotected),
     )
-
-
-def with_errors(value: str, cells: str = "", sampled: str = "") -> str:
-    """Return a number in words: `48.5 % +- 1.4 (cells), +- 2.1 (95 %, charges)`."""
-    errors = [f"+- {cells} (cells)"] if cells else []
-    errors += [f"+- {sampled}"] if sampled else []
-    return " ".join([value, ", ".join(errors)]) if errors else value
-
-
-def percent(share: float) -> str:
-    """Return a share in per cent; a dash for NaN."""
-    return "-" if isnan(share) else f"{100.0 * share:.1f} %"
-
-
-def points(error: float) -> str:
-    """Return an error of a share in percentage points; empty for NaN."""
-    return "" if isnan(error) else f"{100.0 * error:.1f}"
-
-
-def worse(reduction: float) -> str:
-    """Return words on a negative reduction, in brackets; empty for any other."""
-    return " (the barrier makes it worse)" if reduction <= -_SHOWN else ""

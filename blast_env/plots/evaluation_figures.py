@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from blast_env.evaluation.answers import points
 from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.comparison import Evaluation
-from blast_env.evaluation.grid_error import points
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout.build_scene import build_site, charge_against
 from blast_env.plots.plan import (

@@ -15,10 +15,11 @@ import numpy as np
 import tomli_w
 
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.evaluation.answers import worse
 from blast_env.evaluation.capacity import mass_near
 from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.engines.pieces import outcome_words
-from blast_env.evaluation.grid_error import FACTOR, ORDER, worse
+from blast_env.evaluation.grid_error import FACTOR, ORDER
 from blast_env.evaluation.probability import level_probability, probability_text
 from blast_env.files import scratch_folder, write_atomically, write_text
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
