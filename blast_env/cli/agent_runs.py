@@ -5,13 +5,13 @@ Imports torch, so the command imports this module only for `--run`.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.run_folder import RunFolder
 
-from blast_env.cli.evaluate import EvaluateOptions, report
+from blast_env.cli.options import EvaluateOptions
 from blast_env.cli.output import print_line
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.evaluation import (
@@ -21,6 +21,7 @@ from blast_env.evaluation import (
     SeedRange,
 )
 from blast_env.evaluation.engines import JUDGE, Engine
+from blast_env.geometry import Layout
 from blast_env.provenance import command, versions
 from blast_env.sites import FAMILIES
 
@@ -29,8 +30,14 @@ _NO_BEST: Final = (
 )
 
 
-def evaluate_run(run: Path, options: EvaluateOptions) -> None:
-    """Evaluate the proposals of the agent of a run folder; print and write the result."""
+Proposals: TypeAlias = tuple[
+    Evaluators | BlastEvaluator, list[LoadCaseSet], list[Layout], dict[str, Any]
+]
+"""What runs the blasts, the cases, the layout of each, and the origin of the layouts."""
+
+
+def proposals(run: Path, options: EvaluateOptions) -> Proposals:
+    """Return the layouts that the agent of a run folder proposes; print a note on its weights."""
     folder = RunFolder(run)
     configuration = folder.configuration()
     settings, weights = configuration.settings, newest_weights(run)
@@ -43,27 +50,25 @@ def evaluate_run(run: Path, options: EvaluateOptions) -> None:
     engine = own if own.name == options.engine != JUDGE else options.engine
     if settings.scenario in FAMILIES:
         source = scenario_source(settings.scenario)
-        _report_cases(agent, settings, source, engine, provenance, options)
-        return
+        return _of_cases(agent, settings, source, engine, provenance, options)
     scenario = folder.scenario(configuration)
     if settings.threat == "hidden":  # one layout for all possible places of the charge
         used = options.engine_for(engine, [scenario])
         case = LoadCaseSet(scenario, options.threats(scenario, used))
         evaluator = BlastEvaluator(scenario, used, cache=options.cache)
-        report(evaluator, [case], [agent.propose(scenario)], options, provenance)
-    else:
-        _report_cases(agent, settings, SingleScenario(scenario), engine, provenance, options)
+        return evaluator, [case], [agent.propose(scenario)], provenance
+    return _of_cases(agent, settings, SingleScenario(scenario), engine, provenance, options)
 
 
-def _report_cases(
+def _of_cases(
     agent: TrainedAgent,
     settings: TrainingSettings,
     source: ScenarioSource,
     engine: str | Engine,
     provenance: dict[str, Any],
     options: EvaluateOptions,
-) -> None:
-    """Report on one layout per charge, or per site."""
+) -> Proposals:
+    """Return one layout per charge, or per site."""
     unseen = unseen_cases(settings, source, options.seeds)
     cases = [_fixed(case, options) for case in unseen]
     used = options.engine_for(engine, [each.scenario for each in cases])
@@ -73,7 +78,7 @@ def _report_cases(
             distinct.setdefault((each.scenario.content_hash, each.charge), each)
         cases = [*distinct.values()]
     layouts = [agent.propose(case.scenario, case.charge) for case in cases]
-    report(Evaluators(used, options.cache), cases, layouts, options, provenance)
+    return Evaluators(used, options.cache), cases, layouts, provenance
 
 
 def _fixed(case: LoadCaseSet, options: EvaluateOptions) -> LoadCaseSet:

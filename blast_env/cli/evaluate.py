@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import partial
 from math import isnan
 from pathlib import Path
@@ -17,6 +17,7 @@ from blast_env.cli.options import (
     ClusterAddress,
     CvarOption,
     EngineChoice,
+    EvaluateOptions,
     FinalCellOption,
     FinalCellsOption,
     GivenCharge,
@@ -43,11 +44,9 @@ from blast_env.evaluation import (
     BlastEvaluator,
     Evaluation,
     Evaluators,
-    LoadCase,
     LoadCaseSet,
     SeedRange,
     compare,
-    draw_threats,
 )
 from blast_env.evaluation.answers import (
     building_words,
@@ -59,9 +58,8 @@ from blast_env.evaluation.answers import (
     standing_lines,
     worse,
 )
-from blast_env.evaluation.cases import are_all, fixed_charges, in_turn, one_of_each_charge
+from blast_env.evaluation.cases import are_all, fixed_charges
 from blast_env.evaluation.engines import JUDGE, Engine
-from blast_env.evaluation.grid_error import final_engine
 from blast_env.files import make_folder, write_text
 from blast_env.geometry import Element, layout_counts
 from blast_env.io.export import LayoutPlan, check_target, export_layouts, is_file
@@ -74,39 +72,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SCENARIO: Final = "courtyard"
-
-
-@dataclass(frozen=True, kw_only=True)
-class EvaluateOptions:
-    """The options of an evaluation common to a layout file and a run; see `evaluate`."""
-
-    given: GivenCharge
-    seeds: range
-    engine: str
-    cell_m: float | None
-    cells: str | None
-    cvar_level: float
-    processes: int
-    cache: Path | None
-    export: Path | None
-    out: Path | None
-    is_json: bool
-
-    def engine_for(self, engine: str | Engine, sites: Sequence[Scenario]) -> Engine:
-        """Return an engine with the requested cells, for final statements on sites."""
-        return final_engine(engine, sites, self.cell_m, self.cells)
-
-    def threats(self, scenario: Scenario, engine: Engine) -> tuple[LoadCase, ...]:
-        """Return the threats drawn by the seeds, with the user's place and mass of the charge.
-
-        Fixed charges come in turn, each once before any repeats. Without noise a charge has one
-        realisation: repeated ones are dropped.
-        """
-        drawn = in_turn(scenario, draw_threats(scenario, self.seeds))
-        threats = tuple(
-            LoadCase(self.given.fixed(scenario, threat.charge), threat.seed) for threat in drawn
-        )
-        return threats if engine.has_noise else one_of_each_charge(threats)
 
 
 def _note_export(context: typer.Context, value: Path | None) -> Path | None:
@@ -184,7 +149,7 @@ def _evaluate_file(path: Path, name: str, options: EvaluateOptions) -> None:
     engine = options.engine_for(options.engine, [scenario])
     case = LoadCaseSet(scenario, options.threats(scenario, engine))
     evaluator = BlastEvaluator(scenario, engine, cache=options.cache)
-    report(evaluator, [case], [layout], options, provenance)
+    _report(evaluator, [case], [layout], options, provenance)
 
 
 def _evaluate_run(
@@ -199,8 +164,9 @@ def _evaluate_run(
         raise BlastEnvError("--scenario cannot be used with --run: the run folder contains it")
     # Here, because runs need the extras.
     with import_extra("agents,render", "--run"):
-        from blast_env.cli.agent_runs import evaluate_run
-    evaluate_run(run, options)
+        from blast_env.cli.agent_runs import proposals
+    evaluators, cases, layouts, provenance = proposals(run, options)
+    _report(evaluators, cases, layouts, options, provenance)
 
 
 def threats_text(count: int, seeds: range) -> str:
@@ -256,7 +222,7 @@ def asked_blasts(
     yield from [(engine.coarser, worst.scenario, worst.threats[0].charge)] * 2
 
 
-def report(
+def _report(
     evaluators: Evaluators | BlastEvaluator,
     cases: Sequence[LoadCaseSet],
     layouts: Sequence[Sequence[Element]],

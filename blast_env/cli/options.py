@@ -1,7 +1,7 @@
 """Options that commands and studies share, with one name and one meaning in all."""
 
 import logging
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +15,9 @@ from blast_env.cli.output import message_console
 from blast_env.cluster import on_cluster
 from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation.cases import LoadCase, draw_threats, one_of_each_charge
-from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE
+from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_of_each_charge
+from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE, Engine
+from blast_env.evaluation.grid_error import final_engine
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
 from blast_env.site.sections import PointM
@@ -228,3 +229,36 @@ class GivenCharge:
         drawn = draw_threats(scenario, range(draws))
         fixed = (replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn)
         return one_of_each_charge(fixed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateOptions:
+    """The options of an evaluation common to a layout file and a run; see `evaluate`."""
+
+    given: GivenCharge
+    seeds: range
+    engine: str
+    cell_m: float | None
+    cells: str | None
+    cvar_level: float
+    processes: int
+    cache: Path | None
+    export: Path | None
+    out: Path | None
+    is_json: bool
+
+    def engine_for(self, engine: str | Engine, sites: Sequence[Scenario]) -> Engine:
+        """Return an engine with the requested cells, for final statements on sites."""
+        return final_engine(engine, sites, self.cell_m, self.cells)
+
+    def threats(self, scenario: Scenario, engine: Engine) -> tuple[LoadCase, ...]:
+        """Return the threats drawn by the seeds, with the user's place and mass of the charge.
+
+        Fixed charges come in turn, each once before any repeats. Without noise a charge has one
+        realisation: repeated ones are dropped.
+        """
+        drawn = in_turn(scenario, draw_threats(scenario, self.seeds))
+        threats = tuple(
+            LoadCase(self.given.fixed(scenario, threat.charge), threat.seed) for threat in drawn
+        )
+        return threats if engine.has_noise else one_of_each_charge(threats)
