@@ -1,4 +1,4 @@
-"""What the documentation shows works: code runs, commands parse, pages that code names exist.
+"""Code of the documentation and examples run, commands parse, pages that code names exist.
 
 `make docs` runs the commands, the notebooks, and what code is dear (tests.documentation.run). Here
 commands are parsed: names, options and the types and bounds of their values.
@@ -8,6 +8,7 @@ import ast
 import doctest
 import importlib.util
 import re
+import runpy
 import shlex
 from pathlib import Path
 from textwrap import dedent
@@ -214,3 +215,26 @@ def test_the_page_of_the_environments_names_every_id() -> None:
 def test_links_outside_the_site_lead_somewhere(page: str) -> None:
     links = re.findall(r"\]\((?!https?:|#)([^)#]+)", TEXTS[page])
     assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+# --- The examples of a newcomer run as they are, in a folder of their own.
+
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+_MOST_LINES = 40
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_and_prints_a_result(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(path), "16"])  # the budget of those that take one
+    runpy.run_path(str(path), run_name="__main__")
+    assert "%" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_fits_on_a_screen(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= _MOST_LINES

@@ -1,16 +1,19 @@
-"""Whole runs, in every engine: the fan, tunnelling, symmetry, the end, the guard of the step."""
+"""Whole runs, in every engine: the fan, tunnelling, closed rings, the end, the time step."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine
+from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine, simulate
 from blast_env.evaluation.engines.particles import PymunkEngine, find_particle_engine
 from blast_env.geometry import Rectangle
 from blast_env.particles.run import EndReason
+from blast_env.site import Scenario
 from blast_env.site.balls import CollisionType, air_lattice, explosion_fan, lattice_capacity
 from blast_env.site.scene import Scene
+from blast_env.units import MODULE_SIDE_M
+from tests.builders import block, point, site
 from tests.particles.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, step_s, wall
 
 
@@ -178,3 +181,43 @@ def test_a_run_ends_at_the_time_limit(engine: ParticleEngine) -> None:
     run = finished(of_scene, engine)
     assert run.end_reason is EndReason.TIME_LIMIT
     assert limit_s <= run.time_s < limit_s + step_s(run)
+
+
+# --- Nothing gets out of a closed ring of modules, however hard the balls inside press on it.
+
+
+def ring(cavity_modules: int, shift_m: float) -> Scenario:
+    """Return a charge in a square cavity with walls all around it, and a target outside.
+
+    Args:
+        cavity_modules: Side of the cavity.
+        shift_m: By which the upper wall is moved along itself, off the lattice of the others.
+    """
+    side, corner = cavity_modules + 2, 6.0
+    near, far = corner + MODULE_SIDE_M, corner + (side - 1) * MODULE_SIDE_M
+    target_m = corner + side * MODULE_SIDE_M + 1.5
+    walls: list[tuple[str, float, float, int, int]] = [
+        ("lower", corner, corner, 1, side),
+        ("upper", corner - shift_m, far, 1, side + (shift_m > 0.0)),
+        ("left", corner, near, cavity_modules, 1),
+        ("right", far, near, cavity_modules, 1),
+        ("target", target_m, corner, side, 2),
+    ]
+    structures = [block(*wall, protected=wall[0] == "target") for wall in walls]
+    middle_m = corner + side * MODULE_SIDE_M / 2.0
+    size_m = (target_m + 4.0, 2.0 * corner + side * MODULE_SIDE_M)
+    model = {"preset": "ballistic", "overrides": {"stepping": {"time_limit_s": 0.25}}}
+    return site("ring", size_m, point(middle_m, middle_m), *structures, simulation=model)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "event"])
+@pytest.mark.parametrize(("cavity_modules", "shift_m"), [(4, 0.0), (5, 0.25)])
+def test_a_closed_ring_is_closed_and_borne_alike_by_its_walls(
+    engine: str, cavity_modules: int, shift_m: float
+) -> None:
+    """On pymunk, balls got between the modules of one wall, in the corners of the ring."""
+    result = simulate(ring(cavity_modules, shift_m), seed=0, engine=engine)
+    loads = [result.impulse_sim(name) for name in ("lower", "upper", "left", "right")]
+    assert 1000.0 < max(loads) < 1.1 * min(loads)
+    assert result.impulse_sim("target") == 0.0
+    assert set(result.collisions["structure"]) == {"lower", "upper", "left", "right"}
