@@ -179,6 +179,8 @@ def test_a_visible_charge_is_a_point() -> None:
     options = {"charge_position_m": (3.8, 9.0), "tnt_kg": 8.0}
     values, _ = env.reset(seed=1, options=options)
     assert values[3:9].tolist() == pytest.approx([0.2, 0.5, 0.2, 0.5, 0.2, 0.2])
+    heavy, _ = env.reset(seed=1, options=options | {"tnt_kg": 3000.0})
+    assert heavy[7:9].tolist() == [1.0, 1.0]
 
 
 def test_a_hidden_charge_is_a_box_around_its_places() -> None:
