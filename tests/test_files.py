@@ -115,10 +115,9 @@ FORKING = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 
 def filled(path: Path) -> Store:
     store = Store(path)
+    store.put("key 2", b"a first content, which a later one takes the place of")
     for number in range(3):
         store.put(f"key {number}", bytes([number]) * 2000)
-    store.put("key 2", b"first")
-    store.put("key 2", bytes([2]) * 2000)  # in the place of the first
     return store
 
 
