@@ -117,6 +117,12 @@ def test_conditions_of_gsa(flight_m: float, hit_m: float, label: str) -> None:
     assert GlazingCondition(condition).label == label
 
 
+def test_ratings_of_iso_go_with_the_conditions_of_gsa() -> None:
+    assert [each.words for each in GlazingCondition] == [
+        *("1, A", "2, B", "3a, D", "3b, E", "4, F", "5, F")
+    ]
+
+
 @pytest.mark.parametrize("sizes", [(0.0, 1.0, 0.006), (1.0, 1.0, -0.006), (6.0, 1.0, 0.006)])
 def test_wrong_panes(sizes: tuple[float, float, float]) -> None:
     with pytest.raises(BlastEnvError, match="must"):
