@@ -37,7 +37,7 @@ class Server:
 
 _WALL: Final = "blast-env search --scenario courtyard --method wall_near_charge --out wall"
 _SITE: Final = (
-    "blast-env import docs/data/pump_house.geojson --protect 'Pump House' --stock 8 --out site.toml"
+    "blast-env import docs/data/pump_house.geojson --protect 'Pump House' --out site.toml"
     " && blast-env search --scenario site.toml --method wall_near_building --threat hidden"
     " --threats 1 --held-out 1 --out wall"
 )
