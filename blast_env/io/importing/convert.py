@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -19,7 +19,6 @@ from blast_env.io.importing.options import CALIBRATIONS, ImportOptions
 from blast_env.io.importing.osm import SUFFIXES as OSM_SUFFIXES
 from blast_env.io.importing.osm import read_osm
 from blast_env.io.importing.placing import OUTSIDE, PlacedSite, place_site
-from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.protection import protected_as_asked
 from blast_env.io.importing.roles import Selector, Selectors, things_of
 from blast_env.io.importing.site_map import SiteMap
@@ -186,42 +185,19 @@ def _others(
     return used
 
 
-def _read_as_geojson(path: Path, options: ImportOptions) -> SiteMap:
-    _refuse(options.units, "--units", "GeoJSON, whose coordinates --crs is about")
-    return read_geojson(path, options.crs)
-
-
-def _read_as_osm(path: Path, options: ImportOptions) -> SiteMap:
-    _refuse(options.units, "--units", "OpenStreetMap, which is in longitude and latitude")
-    _refuse(options.crs, "--crs", "OpenStreetMap, which is in longitude and latitude")
-    return read_osm(path)
-
-
-def _read_as_dxf(path: Path, options: ImportOptions) -> SiteMap:
-    site_map = read_dxf(path, options.units)
-    if options.crs is None:
-        return site_map
-    coordinates = site_map.coordinates
-    if isinstance(coordinates, DrawingPlane) and coordinates.metres_per_unit != 1.0:
-        raise BlastEnvError(f"{path}: --crs needs a drawing in metres: say --units m if it is")
-    return replace(site_map, coordinates=MapCoordinates(options.crs))
-
-
-def _read_as_ifc(path: Path, options: ImportOptions) -> SiteMap:
-    _refuse(options.units, "--units", "IFC, which states its unit")
-    _refuse(options.crs, "--crs", "IFC, which is in metres of its own")
+def _read_ifc(path: Path, options: ImportOptions) -> SiteMap:
     from blast_env.io.importing.ifc import read_ifc  # here, because it needs the extra `ifc`
 
-    return read_ifc(path)
+    return read_ifc(path, options)
 
 
 _READERS: Final[Mapping[str, Callable[[Path, ImportOptions], SiteMap]]] = MappingProxyType(
     {
-        ".geojson": _read_as_geojson,
-        ".json": _read_as_geojson,
-        ".dxf": _read_as_dxf,
-        ".ifc": _read_as_ifc,
-        **dict.fromkeys(OSM_SUFFIXES, _read_as_osm),
+        ".geojson": read_geojson,
+        ".json": read_geojson,
+        ".dxf": read_dxf,
+        ".ifc": _read_ifc,
+        **dict.fromkeys(OSM_SUFFIXES, read_osm),
     }
 )
 
@@ -233,11 +209,6 @@ def read_map(path: Path, options: ImportOptions) -> SiteMap:
         if name.endswith(suffix):
             return reader(path, options)
     raise BlastEnvError(f"{path}: suffix is {path.suffix!r}, must be one of {', '.join(_READERS)}")
-
-
-def _refuse(value: object, option: str, what: str) -> None:
-    if value is not None:
-        raise BlastEnvError(f"{option} is not for {what}")
 
 
 def selectors_of(site_map: SiteMap, options: ImportOptions) -> Selectors:

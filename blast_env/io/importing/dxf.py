@@ -11,7 +11,8 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra, suggestion, value_text
-from blast_env.io.importing.plane import DrawingPlane
+from blast_env.io.importing.options import ImportOptions
+from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.site_map import (
     MOST_COORDINATE,
     MOST_FEATURES,
@@ -74,7 +75,7 @@ _FRAMES: Final = ("IMAGE", "WIPEOUT", "VIEWPORT")
 _LEAST_SAG: Final = 1e-9  # of the largest coordinate: rounding must not add ever more points
 
 
-def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
+def read_dxf(path: Path, options: ImportOptions) -> SiteMap:
     """Return the content of the model space of a DXF file, blocks expanded.
 
     Closed lines, hatches and footprints of meshes are outlines, texts are points. All have the tag
@@ -84,7 +85,8 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
 
     Args:
         path: The file.
-        unit: One of `UNITS_M`; the unit of the file unless given.
+        options: The unit, one of `UNITS_M`, that of the file unless given; and the reference system
+            of a drawing in metres with a place on the Earth.
 
     Raises:
         BlastEnvError: If the file cannot be read or exceeds a limit, or its unit is unknown.
@@ -97,13 +99,16 @@ def read_dxf(path: Path, unit: str | None = None) -> SiteMap:
         document = _document(path, remarks)
         remarks += _scaled(document)
         _Unfolded(path, document).check()
-        metres = _metres_per_unit(path, document, unit)
+        metres = _metres_per_unit(path, document, options.units)
         found = list(islice(_Drawn(path, document, metres).features(), MOST_FEATURES + 1))
     if len(found) > MOST_FEATURES:
         raise too_many(path)
     lost = tuple(each for each in found if isinstance(each, LostFeature))
     features = tuple(each for each in found if not isinstance(each, LostFeature))
-    return SiteMap(path, DrawingPlane(metres), features, lost, tuple(remarks))
+    if options.crs is not None and metres != 1.0:
+        raise BlastEnvError(f"{path}: --crs needs a drawing in metres: say --units m if it is")
+    coordinates = DrawingPlane(metres) if options.crs is None else MapCoordinates(options.crs)
+    return SiteMap(path, coordinates, features, lost, tuple(remarks))
 
 
 def _document(path: Path, remarks: list[Remark]) -> Drawing:

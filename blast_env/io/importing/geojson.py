@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from blast_env.errors import BlastEnvError, import_extra, shortened, value_text
+from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.plane import DrawingPlane, MapCoordinates
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
@@ -37,17 +38,19 @@ _KINDS: Final = (
 )
 
 
-def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
+def read_geojson(path: Path, options: ImportOptions) -> SiteMap:
     """Return the map of a GeoJSON file.
 
     Args:
         path: The file.
-        crs: Reference system of the coordinates, `local` for metres without a place on the Earth;
-            that of the file unless given, or longitude and latitude (EPSG:4326) if it has none.
+        options: The reference system of the coordinates, `local` for metres without a place on the
+            Earth; that of the file unless given, or longitude and latitude (EPSG:4326) if it has
+            none.
 
     Raises:
         BlastEnvError: If it cannot be read, or is not GeoJSON.
     """
+    options.refuse("GeoJSON, whose coordinates --crs is about", "units")
     document = _parsed(checked_file(path))
     listed = _listed_features(path, document)
     if len(listed) > MOST_FEATURES:
@@ -60,7 +63,7 @@ def read_geojson(path: Path, crs: str | None = None) -> SiteMap:
             lost.append(feature)
         else:
             features.append(feature)
-    coordinates = _coordinates(path, document, crs)
+    coordinates = _coordinates(path, document, options.crs)
     return SiteMap(path, coordinates, tuple(features), tuple(lost))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, import_extra
+from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.plane import DrawingPlane
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
@@ -60,7 +61,7 @@ class _Solid:
     high_m: float
 
 
-def read_ifc(path: Path) -> SiteMap:
+def read_ifc(path: Path, options: ImportOptions) -> SiteMap:
     """Return the buildings of an IFC model, in metres, each with its height, storeys and windows.
 
     A building is what its walls, slabs and roofs cover. Everything else is on the ledger.
@@ -68,6 +69,8 @@ def read_ifc(path: Path) -> SiteMap:
     Raises:
         BlastEnvError: If the file cannot be read, states no unit of length, or has no building.
     """
+    options.refuse("IFC, which states its unit", "units")
+    options.refuse("IFC, which is in metres of its own", "crs")
     checked_file(path)
     with errors_of("ifcopenshell", path, "IFC"):
         model = ifcopenshell.open(str(path))

@@ -136,6 +136,16 @@ class ImportOptions:
         if self.size_m is not None and self.origin is None and self.centre is None:
             raise BlastEnvError("--size needs --origin or --centre: where the site is to be")
 
+    def refuse(self, what: str, *names: str) -> None:
+        """Refuse options that are not for a kind of file.
+
+        Raises:
+            BlastEnvError: If one of them is given.
+        """
+        for name in names:
+            if getattr(self, name) is not None:
+                raise BlastEnvError(f"{_option(name)} is not for {what}")
+
 
 def _option(name: str) -> str:
     """Return the command-line option of a value."""

@@ -13,6 +13,7 @@ from xml.parsers import expat
 
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.files import scratch_folder, write_atomically
+from blast_env.io.importing.options import ImportOptions
 from blast_env.io.importing.plane import MapCoordinates
 from blast_env.io.importing.site_map import (
     MOST_FEATURES,
@@ -60,15 +61,16 @@ OPEN: Final = "relations with rings that do not close"
 TOUCHING: Final = "relations with rings that touch or cross, put together from their ways"
 
 
-def read_osm(path: Path) -> SiteMap:
+def read_osm(path: Path, options: ImportOptions) -> SiteMap:
     """Return the map of an OpenStreetMap extract: tagged ways, areas and nodes, in any order.
 
     Closed ways without `highway` and multipolygon relations are outlines. Objects that JOSM has
     marked as deleted are not read.
 
     Raises:
-        BlastEnvError: If it cannot be read.
+        BlastEnvError: If it cannot be read, or options do not fit.
     """
+    options.refuse("OpenStreetMap, which is in longitude and latitude", "units", "crs")
     with (
         _unpacked(checked_file(path)) as plain,
         errors_of("osmium", path, "OpenStreetMap data"),
