@@ -11,12 +11,9 @@ from typing import Annotated, Final
 
 import numpy as np
 import typer
-from blast_agents.training.cases import training_cases
-from blast_agents.training.run_folder import RunFolder
 
 from blast_env import load_scenario
 from blast_env.cli.output import print_line, user_errors
-from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastKey, BlastStore, StructureLoad, draw_threats
 from blast_env.files import make_folder
@@ -142,10 +139,6 @@ def main(
     scenario: Annotated[
         list[str] | None, typer.Option(help="Scenario files to name, beside the bundled ones.")
     ] = None,
-    run: Annotated[
-        list[Path] | None,
-        typer.Option(help="Run folders of self-labelling whose generated sites are to be named."),
-    ] = None,
 ) -> None:
     """Write the table, each blast once."""
     with user_errors():
@@ -155,8 +148,6 @@ def main(
             for seed in range(HELD_OUT_SITES + first, HELD_OUT_SITES + first + sites):
                 name = site_name(seed, side_m, front=front)
                 names[scenario_of(name).content_hash] = name
-        for folder in run or ():
-            names |= _sites_of(folder)
         rows: dict[str, list[dict[str, object]]] = {}
         for folder in folders:
             if not folder.is_dir():
@@ -169,18 +160,6 @@ def main(
         make_folder(out.parent)
         write_table(table, COLUMNS, {"blasts": len(rows), **versions()}, out)
     print_line(f"{len(rows):,} blasts; wrote {out}")
-
-
-def _sites_of(folder: Path) -> dict[str, str]:
-    """Return the names of a self-labelling run's generated training sites, by scenario hash."""
-    configuration = RunFolder(folder).configuration()
-    settings = configuration.settings
-    if settings.scenario != ITEM_SITES or settings.algorithm != "self_labelling":
-        raise BlastEnvError(f"{folder}: is no run by self-labelling on {ITEM_SITES}")
-    source = scenario_source(settings.scenario)
-    cases = training_cases(settings, source, configuration.self_labelling.cases)
-    sites = [case.scenario for case in cases]
-    return {each.content_hash: each.name.replace("site_", SITE_NAME) for each in sites}
 
 
 def load_row(names: dict[str, str], key: BlastKey, load: StructureLoad) -> dict[str, object]:

@@ -39,3 +39,9 @@ def yard_document(**zone: Any) -> dict[str, Any]:
 def yard(**zone: Any) -> Scenario:
     """Return the yard, with other keys of the build zone where some are given."""
     return Scenario.from_document(yard_document(**zone), "yard")
+
+
+def wide_yard(tnt_kg: float = 5.0) -> Scenario:
+    """Return the yard with a charge that may be anywhere in an area."""
+    area = {"kind": "rectangle", "corner_m": [1.0, 3.0], "size_m": [1.5, 6.0], "tnt_kg": tnt_kg}
+    return Scenario.from_document(yard_document() | {"charge": [area]}, "wide yard")

@@ -5,9 +5,9 @@ Imports torch, so the command imports this module only for `--run`.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, TypeAlias
 
-from blast_agents.training import TrainedAgent, TrainingSettings, load_agent, newest_weights
+from blast_agents.training import TrainedAgent, TrainingSettings, load_agent
 from blast_agents.training.cases import unseen_cases
 from blast_agents.training.run_folder import RunFolder
 
@@ -25,11 +25,6 @@ from blast_env.geometry import Layout
 from blast_env.provenance import command, versions
 from blast_env.sites import FAMILIES
 
-_NO_BEST: Final = (
-    "the run has no evaluation yet, so there are no best weights: the last ones propose"
-)
-
-
 Proposals: TypeAlias = tuple[
     Evaluators | BlastEvaluator, list[LoadCaseSet], list[Layout], dict[str, Any]
 ]
@@ -40,10 +35,9 @@ def proposals(run: Path, options: EvaluateOptions) -> Proposals:
     """Return the layouts that the agent of a run folder proposes; print a note on its weights."""
     folder = RunFolder(run)
     configuration = folder.configuration()
-    settings, weights = configuration.settings, newest_weights(run)
-    agent = load_agent(run, weights)
-    provenance = _provenance(run, settings, weights)
-    note = _overlap(settings, options.seeds) if weights == "best" else _NO_BEST
+    settings, agent = configuration.settings, load_agent(run)
+    provenance = _provenance(run, settings)
+    note = _overlap(settings, options.seeds)
     if note and not options.is_json:
         print_line(f"note: {note}")
     own = settings.judge  # gas dynamics judges final statements
@@ -90,11 +84,11 @@ def _fixed(case: LoadCaseSet, options: EvaluateOptions) -> LoadCaseSet:
     return replace(case, threats=threats, charge=charge)
 
 
-def _provenance(run: Path, settings: TrainingSettings, weights: str) -> dict[str, Any]:
+def _provenance(run: Path, settings: TrainingSettings) -> dict[str, Any]:
     return {
         "command": command(),
         "run": str(run),
-        "weights": weights,
+        "weights": "best",
         "algorithm": settings.algorithm,
         "threat": settings.threat,
         "versions": versions(packages=("torch", "stable-baselines3", "numpy")),

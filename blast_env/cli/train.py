@@ -52,7 +52,7 @@ _WITH_RESUME: Final = ("resume", "scenario", "cluster")
 def train(
     context: typer.Context,
     algo: str | None = typer.Option(
-        None, help="ppo, maskable_ppo or self_labelling.", show_default=_DEFAULT_ALGORITHM
+        None, help="ppo or maskable_ppo.", show_default=_DEFAULT_ALGORITHM
     ),
     scenario: str | None = typer.Option(
         None,
@@ -61,14 +61,13 @@ def train(
     ),
     steps: int | None = typer.Option(
         None,
-        help="Steps: one module each (self_labelling: one threat and its layout each); else as in "
-        "the YAML file.",
+        help="Steps, a module or piece each; else as in the YAML file.",
         min=1,
     ),
     seed: int | None = typer.Option(None, help="Decides everything.", min=0, show_default="0"),
     envs: int | None = typer.Option(
         None,
-        help="Parallel environments (self_labelling: worker processes); else as in the YAML file.",
+        help="Parallel environments; else as in the YAML file.",
         min=1,
     ),
     run: Path | None = writes("Folder for the run; new or empty"),
@@ -153,11 +152,10 @@ def _train(
     # Here, because torch takes seconds to start, and is an extra.
     with import_extra("agents,render", "training"):
         from blast_agents.training import load_hyperparameters, train
-        from blast_agents.training.environments import environment_id
         from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
-        from blast_agents.training.run_folder import SETTING_KEYS, settings_from
+        from blast_agents.training.run_folder import SETTING_KEYS, environment_id, settings_from
 
-    changes = parse_options(set_to, [*hyperparameter_keys(algorithm), *SETTING_KEYS])
+    changes = parse_options(set_to, [*hyperparameter_keys(), *SETTING_KEYS])
     if given.get("observation") in _POLICIES:
         changes.setdefault("policy", _POLICIES[given["observation"]])
     site = scenario_source(scenario).representative
@@ -171,7 +169,9 @@ def _train(
 
 
 def _print_result(result: "TrainingResult") -> None:
-    counters, folder = result.progress.counters, result.folder
+    from blast_agents.training.evaluations import best_of
+
+    folder, last, best = result.folder, result.evaluations[-1], best_of(result.evaluations)
     settings = result.configuration.settings
     blasts = "guesses" if settings.guesses else "blasts"
     scenario = folder.scenario(result.configuration)
@@ -179,25 +179,24 @@ def _print_result(result: "TrainingResult") -> None:
     if settings.judge.name != settings.blast_engine.name:
         print_line(f"weights chosen by {settings.judge.describe([scenario])}")
     print_line(
-        f"{counters.steps:,} steps, {counters.episodes:,} episodes, {counters.blasts:,} {blasts} "
-        f"in {counters.seconds:,.0f} s"
+        f"{last.timesteps:,} steps, {last.episodes:,} episodes, {last.blasts:,} {blasts} "
+        f"in {last.seconds:,.0f} s"
     )
-    for row in result.progress.evaluations:
-        if row.steps == counters.best_steps:
-            print_line(
-                f"best on held-out threats, after {row.steps:,} steps: reduction "
-                f"{row.reduction:.1%} (95 % interval {row.low:.1%} to {row.high:.1%})"
-            )
-    print_written((folder.checkpoint, folder.evaluations, folder.learning_curve))
+    if best is not None:
+        print_line(
+            f"best on held-out threats, after {best.timesteps:,} steps: reduction "
+            f"{best.reduction:.1%} (95 % interval {best.low:.1%} to {best.high:.1%})"
+        )
+    print_written((folder.best_model, folder.evaluations, folder.learning_curve))
     draw = partial(_proposal, folder, scenario, settings.threat)
     print_written(save_figures((folder.path / LAYOUT_PICTURE, draw)))
 
 
 def _proposal(folder: "RunFolder", scenario: Scenario, threat: str) -> "Figure":
     """Draw the agent's proposal for the run's scenario, with a charge if known."""
-    from blast_agents.training import load_agent, newest_weights
+    from blast_agents.training import load_agent
 
-    agent = load_agent(folder.path, newest_weights(folder.path))
+    agent = load_agent(folder.path)
     charge = None if threat == "hidden" else scenario.sample_charge(np.random.default_rng(0))
     shown = scenario.with_charge(charge) if isinstance(charge, Charge) else scenario
     return layout_picture(shown, agent.propose(scenario, charge))

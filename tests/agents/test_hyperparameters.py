@@ -10,9 +10,8 @@ import gymnasium as gym
 import pytest
 import yaml
 from blast_agents.training import TrainedAgent, load_archive
-from blast_agents.training.environments import environment_id
 from blast_agents.training.hyperparameters import (
-    PPO_ALGORITHMS,
+    ALGORITHMS,
     Hyperparameters,
     WrapperName,
     hyperparameter_file,
@@ -21,6 +20,7 @@ from blast_agents.training.hyperparameters import (
     parse_options,
     schedule,
 )
+from blast_agents.training.run_folder import environment_id
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import PPO
 
@@ -52,7 +52,7 @@ def sections(algorithm: str) -> dict[str, dict]:
     return content
 
 
-@pytest.mark.parametrize("algorithm", PPO_ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_every_scenario_has_a_section_for_its_zone(algorithm: str, scenario: str) -> None:
     """RL Zoo cannot fill in rows and columns, so the file must have the right ones."""
@@ -63,7 +63,7 @@ def test_every_scenario_has_a_section_for_its_zone(algorithm: str, scenario: str
     load_hyperparameters(algorithm, environment_id(scenario))
 
 
-@pytest.mark.parametrize("algorithm", PPO_ALGORITHMS)
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_rl_zoo_can_use_every_section(algorithm: str) -> None:
     """Its keys go to the algorithm as they are; policy and wrappers are imported by name."""
     accepted = set(inspect.signature(MODELS[algorithm]).parameters)
@@ -116,7 +116,7 @@ def test_an_archive_of_rl_zoo_is_read_where_rl_zoo_is_missing(
 
 def test_options_are_read_as_json_or_text_and_reach_the_policy() -> None:
     options = ["ent_coef=0.02", "learning_rate=lin_3e-4", "policy_kwargs.width=16", "gamma=9e-1"]
-    changes = parse_options(options, hyperparameter_keys("maskable_ppo"))
+    changes = parse_options(options, hyperparameter_keys())
     chosen = load_hyperparameters("maskable_ppo", "BlastBarrier-v0", changes)
     assert isinstance(chosen, Hyperparameters)
     assert (chosen.ent_coef, chosen.gamma, chosen.policy_kwargs.width) == (0.02, 0.9, 16)
@@ -146,7 +146,7 @@ def test_a_wrong_option_is_refused_with_the_reason(option: str, words: str) -> N
         load_hyperparameters(
             "maskable_ppo",
             "BlastBarrier-v0",
-            parse_options([option], hyperparameter_keys("maskable_ppo")),
+            parse_options([option], hyperparameter_keys()),
         )
 
 

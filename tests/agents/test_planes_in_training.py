@@ -43,11 +43,7 @@ def configuration(scenario: Scenario, observation: str, policy: str | None) -> R
     if policy is not None:
         changes["policy"] = policy
     hyperparameters = load_hyperparameters("maskable_ppo", "BlastBarrier-v0", changes)
-    return RunConfiguration(
-        settings=settings,
-        hyperparameters=fitted(hyperparameters, settings, scenario),
-        scenario_hash=scenario.content_hash,
-    )
+    return fitted(RunConfiguration(settings, hyperparameters, scenario.content_hash), scenario)
 
 
 def environment(scenario: Scenario, observation: str = "grid") -> BlastBarrierEnv:

@@ -1,6 +1,5 @@
 """A trained agent proposes legal layouts at once, and loading one never runs code."""
 
-import io
 from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
@@ -9,18 +8,16 @@ import numpy as np
 import pytest
 import torch
 from blast_agents.policies.spatial import SpatialPolicy
-from blast_agents.training import TrainedAgent, load_agent, load_archive, train
-from blast_agents.training.agent import logits_of, make_model, policy_for
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.environments import make_environments
+from blast_agents.training import TrainedAgent, load_agent, load_archive, resume, train
+from blast_agents.training.agent import logits_of, policy_for
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
+from blast_agents.training.weights import read_parameters
 from gymnasium import spaces
-from sb3_contrib import MaskablePPO
+from stable_baselines3.common.save_util import save_to_zip_file
 
 from blast_env import load_scenario
 from blast_env.design.search import LayoutAgent
 from blast_env.envs.observations import GridObservation, Observable
-from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.layout import LayoutState
 from blast_env.site import PointSource, Scenario
@@ -93,8 +90,7 @@ def test_an_agent_of_another_observation_learns_is_chosen_and_proposes(
 ) -> None:
     chosen = settings(scenario_file(tmp_path), steps=16, observation=observation)
     result = train(chosen, hyperparameters({"policy": policy}), tmp_path / "run")
-    assert len(result.progress.evaluations) == 1
-    assert f'"observation": "{observation}"' in (tmp_path / "run" / "config.json").read_text()
+    assert len(result.evaluations) == 1
     agent = load_agent(tmp_path / "run")
     assert agent.observation == observation
     for charge in CHARGES:
@@ -162,10 +158,11 @@ def test_a_scenario_of_another_size_is_refused(run: Path) -> None:
 
 def test_best_and_last_weights_can_be_told_apart(run: Path, tmp_path: Path) -> None:
     copy = RunFolder(Path(copytree(run, tmp_path / "run")))
-    last = Checkpoint.load(copy.checkpoint)
-    for values in last.policy.values():
+    (last,) = copy.checkpoints.values()
+    parameters = read_parameters(last)
+    for values in parameters["policy"].values():
         values.zero_()
-    last.save(copy.checkpoint)
+    save_to_zip_file(last, params=parameters)
     weights = load_agent(copy.path, "last").policy.state_dict()
     assert all(not values.any() for values in weights.values())
     assert any(values.any() for values in load_agent(copy.path).policy.state_dict().values())
@@ -181,34 +178,44 @@ class _Exploit:
         return Path.touch, (self.path,)
 
 
-def test_code_in_a_checkpoint_does_not_run(run: Path, tmp_path: Path) -> None:
+def test_code_among_the_tensors_of_a_run_does_not_run(run: Path, tmp_path: Path) -> None:
     copy = RunFolder(Path(copytree(run, tmp_path / "run")))
     victim = tmp_path / "victim"
-    stored = io.BytesIO()
-    torch.save({"format": 1, "policy": _Exploit(victim)}, stored)
-    copy.checkpoint.write_bytes(stored.getvalue())
+    save_to_zip_file(copy.best_model, params={"policy": {"a": _Exploit(victim)}})
     with pytest.raises(BlastEnvError, match="damaged"):
         load_agent(copy.path)
     assert not victim.exists()
 
 
-def test_an_archive_needs_trust(run: Path, tmp_path: Path) -> None:
-    folder = RunFolder(run)
-    configuration = folder.configuration()
-    environments = make_environments(configuration, scenario_source(str(run / "scenario.toml")))
-    model = make_model(configuration, environments)
-    assert isinstance(model, MaskablePPO)
-    archive = tmp_path / "model.zip"
-    model.save(archive)
-    environments.close()
+def test_code_beside_the_tensors_of_a_run_does_not_run(run: Path, tmp_path: Path) -> None:
+    """Libraries that load the whole archive do run it."""
+    copy = RunFolder(Path(copytree(run, tmp_path / "run")))
+    victim = tmp_path / "victim"
+    (last,) = copy.checkpoints.values()
+    for path in (copy.best_model, last):
+        save_to_zip_file(path, {"a": _Exploit(victim)}, read_parameters(path))
+    charge = CHARGES[0]
+    expected = load_agent(run).propose(small_scenario(), charge)
+    assert load_agent(copy.path).propose(small_scenario(), charge) == expected
+    arguments = copy.path / "BlastBarrier-v0" / "args.yml"
+    arguments.write_text(arguments.read_text().replace("steps: 16\n", "steps: 17\n"))
+    assert resume(copy.path).evaluations[-1].timesteps == 32
+    assert not victim.exists()
+    with pytest.raises(BlastEnvError, match="cannot be read"):
+        load_archive(path, "maskable_ppo", small_scenario(), trust_archive=True)
+    assert victim.exists()
+
+
+def test_an_archive_needs_trust(run: Path) -> None:
+    archive = run / "best_model.zip"
     with pytest.raises(BlastEnvError, match="pickled code"):
         load_agent(archive)
     with pytest.raises(BlastEnvError, match="trust_archive is False, must be True"):
         load_archive(archive, "maskable_ppo", small_scenario())
     agent = load_archive(archive, "maskable_ppo", small_scenario(), trust_archive=True)
-    expected = TrainedAgent(model.policy, small_scenario())
     charge = CHARGES[0]
-    assert agent.propose(small_scenario(), charge) == expected.propose(small_scenario(), charge)
+    expected = load_agent(run).propose(small_scenario(), charge)
+    assert agent.propose(small_scenario(), charge) == expected
     with pytest.raises(BlastEnvError, match=r"observation_space is .* must be .* 'courtyard'"):
         load_archive(archive, "maskable_ppo", "courtyard", trust_archive=True)
 

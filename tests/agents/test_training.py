@@ -1,22 +1,28 @@
-"""A training is the same every time, survives any interruption, and its folder is checked."""
+"""A training is the same every time, goes on after an interruption, and its folder is RL Zoo's."""
 
 import json
 import multiprocessing
-from dataclasses import astuple, replace
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from shutil import copytree
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from blast_agents.training import resume, train
-from blast_agents.training.checkpoint import Checkpoint, Weights
-from blast_agents.training.run_folder import EvaluationRow, RolloutRow, read_rows
+from blast_agents.training import load_agent, resume, train
+from blast_agents.training.cases import Selection
+from blast_agents.training.evaluations import best_of, read_evaluations
+from blast_agents.training.run_folder import RunFolder
 from blast_agents.training.train import TrainingResult
+from blast_agents.training.weights import read_parameters
+from stable_baselines3.common.monitor import load_results
 
+from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError
-from blast_env.site import load_scenario
+from blast_env.evaluation.store import BlastStore
+from blast_env.site import load_scenario, save_scenario
 from tests.agents.training_runs import (
     ROLLOUT,
     STEPS,
@@ -25,18 +31,23 @@ from tests.agents.training_runs import (
     settings,
     small_scenario,
 )
+from tests.catalogue_sites import wide_yard
 
 FILES = {
-    "checkpoint.pt",
-    "command.txt",
-    "config.json",
-    "evaluations.csv",
+    "0.monitor.csv",
+    "BlastBarrier-v0",
+    "BlastBarrier-v0.zip",
+    "best_model.zip",
+    "evaluations.npz",
     "learning_curve.png",
-    "rollouts.csv",
+    "rl_model_16_steps.zip",
+    "rl_model_32_steps.zip",
+    "rl_model_48_steps.zip",
     "scenario.toml",
     "tensorboard",
     "versions.json",
 }
+PARAMETERS = {"args.yml", "command.txt", "config.yml"}
 
 
 @pytest.fixture(scope="module")
@@ -47,25 +58,18 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def outcome(run: Path) -> tuple[list[tuple], list[tuple], Weights]:
-    """Return all that a run has come to, but for the time it took and where blasts came from."""
-    rollouts = read_rows(run / "rollouts.csv", RolloutRow)
-    evaluations = read_rows(run / "evaluations.csv", EvaluationRow)
-    return (
-        [astuple(replace(row, seconds=0.0, blasts=0, cache_hits=0)) for row in rollouts],
-        [astuple(replace(row, seconds=0.0, blasts=0)) for row in evaluations],
-        Checkpoint.load(run / "checkpoint.pt").policy,
-    )
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    return read_parameters(path)["policy"]
 
 
-def assert_same_outcome(run: Path, other: Path) -> None:
-    rollouts, evaluations, weights = outcome(run)
-    other_rollouts, other_evaluations, other_weights = outcome(other)
-    assert rollouts == other_rollouts
-    assert evaluations == other_evaluations
-    assert weights.keys() == other_weights.keys()
-    for name, values in weights.items():
-        assert torch.equal(values, other_weights[name]), name
+def outcome(run: Path) -> tuple[Any, ...]:
+    """Return all that a run has come to, but for the time it took."""
+    folder = RunFolder(run)
+    rows = [replace(row, seconds=0.0) for row in read_evaluations(folder.evaluations)]
+    lines = [line.split(",") for line in folder.monitor(0).read_text().splitlines()[2:]]
+    episodes = [(r, length, reduction) for r, length, _, reduction in lines]
+    last = {name: values.tolist() for name, values in weights(folder.last_model).items()}
+    return rows, episodes, last
 
 
 def interrupted(run: Path, scenario: Path, after_steps: int) -> None:
@@ -81,24 +85,39 @@ def interrupted(run: Path, scenario: Path, after_steps: int) -> None:
 
 def test_a_run_folder_has_all_that_a_reader_asks_for(finished: Path) -> None:
     assert {path.name for path in finished.iterdir()} == FILES
-    configuration = json.loads((finished / "config.json").read_text())
-    assert configuration["settings"]["seed"] == 0
-    assert configuration["scenario_hash"] == small_scenario().content_hash
+    assert {path.name for path in (finished / "BlastBarrier-v0").iterdir()} == PARAMETERS
+    configuration = RunFolder(finished).configuration()
+    assert configuration.settings.seed == 0
+    assert configuration.hyperparameters.policy_kwargs.rows == 8
+    assert configuration.scenario_hash == small_scenario().content_hash
     assert load_scenario(finished / "scenario.toml") == small_scenario()
     assert "torch" in json.loads((finished / "versions.json").read_text())
-    rollouts, evaluations, _ = outcome(finished)
-    assert [row[0] for row in rollouts] == [row[0] for row in evaluations] == [16, 32, 48]
-    assert all(row.blasts > 0 for row in read_rows(finished / "rollouts.csv", RolloutRow))
+
+
+def test_libraries_read_the_tables(finished: Path) -> None:
+    """Those of stable-baselines3 and RL Zoo, which draw learning curves from them."""
+    episodes = load_results(str(finished))
+    assert {"r", "l", "t", "reduction"} <= set(episodes)
+    assert len(episodes) == 12
+    assert episodes["l"].sum() == STEPS
+    with np.load(finished / "evaluations.npz") as evaluations:
+        assert evaluations["timesteps"].tolist() == [16, 32, 48]
+        assert evaluations["results"].shape == evaluations["ep_lengths"].shape == (3, 2)
+        np.testing.assert_allclose(evaluations["results"].mean(axis=1), evaluations["reduction"])
 
 
 def test_the_best_weights_are_those_of_the_best_evaluation(finished: Path) -> None:
-    evaluations = read_rows(finished / "evaluations.csv", EvaluationRow)
-    best = max(evaluations, key=lambda row: row.reduction)
-    checkpoint = Checkpoint.load(finished / "checkpoint.pt")
-    assert checkpoint.counters.best_reduction == best.reduction
-    assert checkpoint.counters.best_steps == best.steps
-    same = [torch.equal(checkpoint.best_policy[n], v) for n, v in checkpoint.policy.items()]
-    assert all(same) == (best.steps == checkpoint.counters.steps)
+    folder = RunFolder(finished)
+    best = best_of(read_evaluations(folder.evaluations))
+    assert best is not None
+    checkpoint = weights(folder.checkpoint(best.timesteps))
+    kept = weights(folder.best_model)
+    assert all(torch.equal(kept[name], values) for name, values in checkpoint.items())
+    assert Selection.of(
+        folder.configuration().settings, scenario_source(str(finished / "scenario.toml"))
+    ).evaluate(load_agent(finished)).reduction == pytest.approx(
+        (best.reduction, best.low, best.high)
+    )
 
 
 def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:
@@ -106,35 +125,77 @@ def test_tensorboard_has_what_there_is_to_watch(finished: Path) -> None:
     events = module.EventAccumulator(str(finished / "tensorboard"))
     events.Reload()
     watched = {
-        "rollout/reward",
-        "rollout/reduction",
-        "blasts/per_second",
+        "rollout/ep_rew_mean",
+        "blasts/simulated",
         "blasts/cache_hits",
-        "evaluation/reduction",
+        "eval/reduction",
         "train/approx_kl",
     }
     assert watched <= set(events.Tags()["scalars"])
-    assert [event.step for event in events.Scalars("rollout/reduction")] == [16, 32, 48]
+    assert [event.step for event in events.Scalars("rollout/ep_rew_mean")] == [16, 32, 48]
 
 
-def test_another_seed_gives_another_one(finished: Path, tmp_path: Path) -> None:
-    short = settings(scenario_file(tmp_path), seed=1, steps=ROLLOUT)
-    train(short, hyperparameters(), tmp_path / "run")
-    assert outcome(finished)[0][:1] != outcome(tmp_path / "run")[0]
+def test_the_same_seed_gives_the_same_run_and_another_seed_another(
+    finished: Path, tmp_path: Path
+) -> None:
+    """Weights, episodes and evaluations, to the last bit."""
+    scenario = scenario_file(tmp_path)
+    for seed in (0, 1):
+        train(settings(scenario, seed=seed), hyperparameters(), tmp_path / f"run{seed}")
+    assert outcome(tmp_path / "run0") == outcome(finished)
+    assert outcome(tmp_path / "run1")[1] != outcome(finished)[1]
 
 
-def test_an_interrupted_run_ends_as_if_it_had_not_been(finished: Path, tmp_path: Path) -> None:
-    """Weights, tables and steps, to the last bit: the same seed gives the same run."""
-    interrupted(tmp_path / "run", scenario_file(tmp_path), ROLLOUT + 3)
-    result = resume(tmp_path / "run")
-    assert result.progress.counters.steps == STEPS
-    assert_same_outcome(finished, tmp_path / "run")
+def test_an_interrupted_run_goes_on_from_its_last_checkpoint(
+    finished: Path, tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    interrupted(run, scenario_file(tmp_path), ROLLOUT + 3)
+    before = weights(run / f"rl_model_{ROLLOUT}_steps.zip")
+    result = resume(run)
+    assert [row.timesteps for row in result.evaluations] == [ROLLOUT, 2 * ROLLOUT, STEPS]
+    episodes = [row.episodes for row in result.evaluations]
+    assert episodes == [4, 8, 12]
+    blasts = [row.blasts for row in result.evaluations]
+    assert blasts == sorted(blasts)
+    assert [*RunFolder(run).monitors] == [0, ROLLOUT]
+    kept = weights(run / f"rl_model_{ROLLOUT}_steps.zip")
+    assert all(torch.equal(kept[name], values) for name, values in before.items())
+    assert outcome(finished)[0][0] == replace(result.evaluations[0], seconds=0.0)
+
+
+def test_a_run_goes_on_with_weights_and_optimiser_of_the_checkpoint(tmp_path: Path) -> None:
+    """A step so small that nothing changes shows them."""
+    run, slow = tmp_path / "run", hyperparameters({"learning_rate": 1e-12})
+    train(settings(scenario_file(tmp_path), steps=ROLLOUT), slow, run)
+    arguments = run / "BlastBarrier-v0" / "args.yml"
+    text = arguments.read_text()
+    arguments.write_text(text.replace(f"steps: {ROLLOUT}\n", f"steps: {2 * ROLLOUT}\n"))
+    resume(run)
+    first, second = (
+        read_parameters(RunFolder(run).checkpoint(steps)) for steps in (ROLLOUT, 2 * ROLLOUT)
+    )
+    assert all(
+        torch.allclose(second["policy"][name], values, atol=1e-9)
+        for name, values in first["policy"].items()
+    )
+    counts = [each["policy.optimizer"]["state"][0]["step"].item() for each in (first, second)]
+    assert counts[1] == 2 * counts[0] > 0  # updates of both trainings
+
+
+def test_blasts_without_noise_are_kept_for_a_continued_run(tmp_path: Path) -> None:
+    scenario = tmp_path / "yard.toml"
+    save_scenario(wide_yard(), scenario)
+    chosen = settings(scenario, engine="gas", steps=16)
+    small = hyperparameters({"n_epochs": 1})
+    train(chosen, small, tmp_path / "run")
+    assert len(BlastStore(tmp_path / "run" / "blasts")) > 0
 
 
 def test_a_finished_run_stays_as_it_is(finished: Path, tmp_path: Path) -> None:
     run = Path(copytree(finished, tmp_path / "run"))
-    assert resume(run).progress.counters.steps == STEPS
-    assert_same_outcome(finished, run)
+    assert resume(run).evaluations[-1].timesteps == STEPS
+    assert outcome(run) == outcome(finished)
 
 
 def test_the_loss_of_an_environment_s_process_is_told(tmp_path: Path) -> None:
@@ -178,17 +239,17 @@ def test_other_algorithms_and_hidden_threats_train_too(
     result: TrainingResult = train(
         chosen, hyperparameters({"policy": policy}, algorithm), tmp_path / "run"
     )
-    assert result.progress.counters.steps == STEPS
-    assert np.isfinite(result.progress.counters.best_reduction)
+    assert result.evaluations[-1].timesteps == STEPS
+    assert np.isfinite(result.evaluations[-1].reduction)
     places = result.configuration.hyperparameters.policy_kwargs.places
     assert places == (1 if threat == "visible" else 9)  # a hidden charge may be in many
 
 
 def test_training_learns(tmp_path: Path) -> None:
-    """On a site where only cells in the line of sight help, within some 150 blasts."""
+    """On a site where only cells in the line of sight help, within some 250 blasts."""
     changes = {"n_steps": 128, "batch_size": 64, "n_epochs": 4, "learning_rate": 0.01}
     chosen = hyperparameters({**changes, "policy_kwargs.width": 16})
-    run = settings(scenario_file(tmp_path), steps=128 * 3, evaluation_interval=3)
-    rows = train(run, chosen, tmp_path / "run").progress.rollouts
-    first, last = (np.mean([row.reduction for row in part]) for part in (rows[:1], rows[-1:]))
-    assert last > first + 0.1
+    run = settings(scenario_file(tmp_path), steps=128 * 6, evaluation_interval=6)
+    train(run, chosen, tmp_path / "run")
+    reduction = load_results(str(tmp_path / "run"))["reduction"]
+    assert reduction[-32:].mean() > reduction[:32].mean() + 0.1

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from blast_agents.training import TrainingSettings, load_hyperparameters
 from blast_agents.training.environments import (
-    SITES_ID,
     EnvironmentMaker,
     ThreatPool,
     make_environments,
 )
+from blast_agents.training.hyperparameters import SITES_SECTION
 from blast_agents.training.run_folder import RunConfiguration
 from stable_baselines3.common.vec_env import DummyVecEnv
 
@@ -57,7 +57,7 @@ def test_a_pool_repeats_its_threats_so_that_half_of_the_blasts_are_known() -> No
 
 def test_training_remembers_more_sites_than_an_environment_by_itself() -> None:
     """The blast without a barrier is there when a site of the pool comes again, however late."""
-    hyperparameters = load_hyperparameters("maskable_ppo", SITES_ID)
+    hyperparameters = load_hyperparameters("maskable_ppo", SITES_SECTION)
     pool = [{"blast_agents.training.environments.ThreatPool": {"size": 6}}]
     configuration = RunConfiguration(
         settings=TrainingSettings(

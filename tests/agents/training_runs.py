@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from blast_agents.training import TrainingSettings, load_hyperparameters
-from blast_agents.training.hyperparameters import AnyHyperparameters
+from blast_agents.training.hyperparameters import Hyperparameters
 
 from blast_env.site import Scenario, save_scenario
 from tests.builders import site, square, zone
@@ -58,6 +58,6 @@ def settings(scenario: Path, **changes: Any) -> TrainingSettings:
 
 def hyperparameters(
     changes: Mapping[str, Any] = MappingProxyType({}), algorithm: str = "maskable_ppo"
-) -> AnyHyperparameters:
+) -> Hyperparameters:
     """Return hyperparameters for the small scenario."""
     return load_hyperparameters(algorithm, "BlastBarrier-v0", {**SMALL, **changes})

@@ -11,15 +11,16 @@ from typing import Any, Final
 import numpy as np
 import torch
 from blast_agents.training import load_hyperparameters
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
-from blast_agents.training.run_folder import (
-    RolloutRow,
-    RunConfiguration,
-    RunFolder,
-    read_rows,
-    write_rows,
+from blast_agents.training.evaluations import (
+    EvaluationRow,
+    read_episodes,
+    read_evaluations,
+    write_evaluations,
 )
+from blast_agents.training.hyperparameters import hyperparameter_keys, parse_options
+from blast_agents.training.run_folder import RunConfiguration, RunFolder
+from blast_agents.training.weights import read_parameters
+from stable_baselines3.common.save_util import save_to_zip_file
 
 from blast_env.app.design import Design, DesignStep, History
 from blast_env.app.folder import DesignFolder
@@ -109,31 +110,43 @@ def _run_configuration() -> RunConfiguration:
     )
 
 
-def _configuration(folder: Path) -> Format:
-    run = RunFolder(folder / "run")
-    with run.making(_run_configuration(), small_scenario(), "command"):
-        pass
-    path = run.path / "config.json"
-    return Format((path.read_bytes(),), _from_file(path, lambda _: run.configuration()))
+def _settings(name: str) -> Callable[[Path], Format]:
+    """Return a file of the settings of a run."""
+
+    def form(folder: Path) -> Format:
+        run = RunFolder(folder / "run")
+        run.make(_run_configuration(), small_scenario(), "command")
+        path = run.path / "BlastBarrier-v0" / name
+        return Format((path.read_bytes(),), _from_file(path, lambda _: run.configuration()))
+
+    return form
 
 
-def _rollouts(folder: Path) -> Format:
-    path = folder / "rollouts.csv"
-    rows = [RolloutRow(16 * n, n, 0.1, 0.25, 3.5, 10 * n, n, 1.5 * n) for n in range(1, 8)]
-    write_rows(path, RolloutRow, rows)
-    return Format((path.read_bytes(),), _from_file(path, lambda path: read_rows(path, RolloutRow)))
+def _episodes(folder: Path) -> Format:
+    head = '#{"t_start": 1.0, "env_id": "None"}\nr,l,t,reduction\n'
+    rows = "".join(f"0.25,{n},{1.5 * n},0.125\n" for n in range(1, 8))
+    return Format(((head + rows).encode(),), _from_file(folder / "0.monitor.csv", read_episodes))
 
 
-def _checkpoint(folder: Path) -> Format:
-    path = folder / "checkpoint.pt"
+def _evaluations(folder: Path) -> Format:
+    path = folder / "evaluations.npz"
+    rows = [
+        EvaluationRow(16 * n, (0.1, 0.2), (3, 4), 0.15, 0.1, 0.2, n, 10 * n, 1.5 * n)
+        for n in range(1, 8)
+    ]
+    write_evaluations(path, rows)
+    return Format((path.read_bytes(),), _from_file(path, read_evaluations), True)
+
+
+def _weights(folder: Path) -> Format:
+    path = folder / "best_model.zip"
     rng = np.random.default_rng(0)
     weights = {"a": torch.from_numpy(rng.random(40)), "b": torch.zeros(3)}
-    Checkpoint.of_start(_run_configuration(), weights).save(path)
+    save_to_zip_file(path, params={"policy": weights})
 
     def read(path: Path) -> Any:
-        found = Checkpoint.load(path)
-        policy = {name: each.numpy().tobytes() for name, each in found.policy.items()}
-        return found.configuration, found.counters, policy, found.rollouts, found.evaluations
+        found = read_parameters(path)["policy"]
+        return {name: each.numpy().tobytes() for name, each in found.items()}
 
     return Format((path.read_bytes(),), _from_file(path, read), True)
 
@@ -141,7 +154,7 @@ def _checkpoint(folder: Path) -> Format:
 def _setting(_: Path) -> Format:
     samples = tuple(f"{key}={value}".encode() for key, value in SMALL.items())
     samples += (b"learning_rate=lin_3e-4", b"env_wrapper=[]", b"gamma=0.5", b"target_kl=null")
-    known = hyperparameter_keys("maskable_ppo")
+    known = hyperparameter_keys()
 
     def read(content: bytes) -> Any:
         changes = parse_options([content.decode("utf-8", "surrogateescape")], known)
@@ -226,9 +239,11 @@ FORMATS: Final[Mapping[str, Callable[[Path], Format]]] = MappingProxyType(
         "scenario": _scenario,
         "layout": _layout,
         "calibration": _calibration,
-        "run: config.json": _configuration,
-        "run: rollouts.csv": _rollouts,
-        "run: checkpoint.pt": _checkpoint,
+        "run: config.yml": _settings("config.yml"),
+        "run: args.yml": _settings("args.yml"),
+        "run: monitor.csv": _episodes,
+        "run: evaluations.npz": _evaluations,
+        "run: best_model.zip": _weights,
         "--set": _setting,
         "store of blasts": _loads,
         "GeoJSON": _map(".geojson"),

@@ -14,12 +14,19 @@ from types import MappingProxyType, SimpleNamespace
 from typing import Any, Final
 from unittest.mock import Mock, patch
 
+import gymnasium
+import numpy as np
 import pytest
-import torch
-from blast_agents.training import resume, train
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.run_folder import RunConfiguration
+from blast_agents.training import load_agent, resume, train
+from blast_agents.training.evaluations import (
+    EvaluationRow,
+    read_evaluations,
+    write_evaluations,
+)
+from blast_agents.training.run_folder import RunFolder
+from blast_agents.training.weights import read_parameters, write_model
 from matplotlib.figure import Figure
+from stable_baselines3 import PPO
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
@@ -70,11 +77,20 @@ def _film(path: Path) -> None:
     write_film(_blast(), path, frames_per_s=5.0, slow_motion=40.0, width_px=320)
 
 
-def _checkpoint(path: Path) -> None:
-    configuration = RunConfiguration(
-        settings=settings(path), hyperparameters=hyperparameters(), scenario_hash="0" * 64
-    )
-    Checkpoint.of_start(configuration, {"weight": torch.zeros(2000)}).save(path)
+class _Corridor(gymnasium.Env[np.ndarray, int]):
+    """The least that a model needs."""
+
+    observation_space = gymnasium.spaces.Box(0.0, 1.0, (1,))
+    action_space = gymnasium.spaces.Discrete(2)  # type: ignore[assignment]
+
+
+@cache
+def _model() -> PPO:
+    return PPO("MlpPolicy", _Corridor(), n_steps=2, batch_size=2, device="cpu")
+
+
+def _evaluations(path: Path) -> None:
+    write_evaluations(path, [EvaluationRow(16, (0.1,), (3,), 0.1, 0.0, 0.2, 4, 8, 1.0)] * 9)
 
 
 def _report(path: Path) -> None:
@@ -98,7 +114,8 @@ WRITERS: Final[Mapping[str, Writer]] = MappingProxyType(
         "figure.pdf": _figure,
         "film.mp4": _film,
         "calibration.json": lambda path: save_calibration(load_calibration("ballistic_ufc"), path),
-        "checkpoint.pt": _checkpoint,
+        "best_model.zip": lambda path: write_model(_model(), path),
+        "evaluations.npz": _evaluations,
         "report.html": _report,
     }
 )
@@ -138,7 +155,7 @@ def test_what_was_there_outlives_a_full_device(
         assert list(tmp_path.iterdir()) == [path]
 
 
-# --- kill -9 at a step on the disk, then the same work again: the result is the undisturbed one.
+# --- kill -9 at a step on the disk, then the same work again: nothing that was whole is lost.
 
 
 STEPS = ("os.rename", "os.mkdir", "os.remove", "open")
@@ -154,22 +171,6 @@ def training(folder: Path) -> None:
         if "--resume continues" not in str(error):
             raise
         resume(folder / "run")
-
-
-def outcome(folder: Path) -> Any:
-    """Return all of a training but its times."""
-    run = folder / "run"
-    checkpoint = Checkpoint.load(run / "checkpoint.pt")
-    lines = [(run / f"{name}.csv").read_text().count("\n") for name in ("rollouts", "evaluations")]
-    weights = [
-        each.numpy().tobytes()
-        for policy in (checkpoint.policy, checkpoint.best_policy)
-        for each in policy.values()
-    ]
-    steps = [row.steps for row in checkpoint.rollouts]
-    reductions = [row.reduction for row in checkpoint.evaluations]
-    left = [path.name for path in run.iterdir() if is_temporary(path.name)]
-    return weights, steps, reductions, lines, left
 
 
 def run_until(work: Callable[[Path], None], folder: Path, kill_at: int, steps: Any) -> None:
@@ -201,11 +202,19 @@ def in_process(work: Callable[[Path], None], folder: Path, kill_at: int = -1) ->
 
 
 @pytest.mark.slow
-def test_training_goes_on_after_a_kill(tmp_path: Path) -> None:
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_training_goes_on_after_a_kill(tmp_path: Path, share: float) -> None:
+    """Every checkpoint that it leaves is whole, and the last one is where the run goes on."""
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     code, steps = in_process(training, whole)
     assert code == 0
     assert steps > 10
-    assert in_process(training, killed, steps // 2)[0] == -signal.SIGKILL
+    assert in_process(training, killed, int(share * steps))[0] == -signal.SIGKILL
+    folder = RunFolder(killed / "run")
+    before = {path: path.read_bytes() for path in folder.checkpoints.values()}
+    assert all(read_parameters(path)["policy"] for path in before)
     assert in_process(training, killed)[0] == 0
-    assert outcome(killed) == outcome(whole)
+    assert all(path.read_bytes() == content for path, content in before.items())
+    assert read_evaluations(folder.evaluations)[-1].timesteps == 32
+    assert not any(is_temporary(path.name) for path in folder.path.rglob("*"))
+    load_agent(folder.path)

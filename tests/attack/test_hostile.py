@@ -12,8 +12,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-import torch
-from blast_agents.training.checkpoint import _check_optimizer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -296,30 +294,3 @@ def test_messages_quote_little_of_a_long_text() -> None:
 def test_a_function_that_is_no_method_is_refused(name: str) -> None:
     with pytest.raises(BlastEnvError):
         find_method(name)(make("control_room-known-v2", 0), 0)
-
-
-def stepped() -> torch.optim.Adam:
-    layer = torch.nn.Linear(2, 1)
-    optimizer = torch.optim.Adam(layer.parameters(), lr=1e-3)
-    layer(torch.ones(1, 2)).sum().backward()
-    optimizer.step()
-    return optimizer
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("lr", "fast"),
-        ("foreach", True),
-        ("exp_avg", torch.zeros(7)),
-        ("exp_avg", "x"),
-        ("exp_avg_sq", torch.full((1, 2), -1.0)),
-    ],
-)
-def test_the_state_of_a_forged_optimiser_is_refused(key: str, value: Any) -> None:
-    optimizer = stepped()
-    content = optimizer.state_dict()
-    _check_optimizer(optimizer, content)
-    (content["param_groups"][0] if key in ("lr", "foreach") else content["state"][0])[key] = value
-    with pytest.raises((ValueError, KeyError)):
-        _check_optimizer(stepped(), content)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.run_folder import RunFolder
+from blast_agents.training.callbacks import HeldOutCallback
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
@@ -248,28 +247,22 @@ def test_an_interruption_says_how_to_go_on_and_leaves_no_empty_folder(
 # Runs that were interrupted.
 
 
-def test_an_interrupted_training_says_how_to_go_on_and_can_be_evaluated(
+def test_an_interrupted_training_says_how_to_go_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before the first evaluation there are no best weights: the last ones propose."""
+    """Before the first evaluation there are no weights to evaluate."""
     site, folder = scenario_file(tmp_path), tmp_path / "run"
-    write_tables, left = Checkpoint.write_tables, [3]
 
-    def interrupt(self: Checkpoint, run_folder: RunFolder) -> None:
-        write_tables(self, run_folder)
-        left[0] -= 1
-        if left[0] == 0:
-            raise KeyboardInterrupt
+    def interrupt(self: HeldOutCallback) -> None:
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(Checkpoint, "write_tables", interrupt)
-    changes = ("n_steps=8", "batch_size=8", "evaluation_interval=1000", "evaluation_cases=2")
+    monkeypatch.setattr(HeldOutCallback, "_record", interrupt)
+    changes = ("n_steps=8", "batch_size=8", "evaluation_interval=1", "evaluation_cases=2")
     options = [text for each in changes for text in ("--set", each)]
     result = run("train", "--scenario", site, "--run", folder, "--envs", 1, *options)
     assert result.exit_code == 130, result.output
     assert f"blast-env train --resume {folder} continues the run" in result.stderr
     monkeypatch.undo()
-    evaluate = ("evaluate", "--run", folder, "--engine", "event")
-    result = run(*evaluate, "--seeds", 2, "--json")
-    assert result.exit_code == 0, result.output
-    assert json.loads(result.stdout)["provenance"]["weights"] == "last"
-    assert "no evaluation yet" in run(*evaluate, "--seeds", 1).stdout
+    result = run("evaluate", "--run", folder, "--engine", "event", "--seeds", 1)
+    assert result.exit_code == 2
+    assert "has no weights yet, before its first evaluation" in " ".join(result.stderr.split())

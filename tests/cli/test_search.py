@@ -18,7 +18,7 @@ from blast_env.layout import LayoutFile, load_layout
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import SegmentSource
 from blast_env.site.scene import Charge
-from tests.agents.test_self_labelling import wide_yard
+from tests.catalogue_sites import wide_yard
 from tests.design.search_cases import small_scenario
 
 CHARGE = Charge((5.0, 20.5), 100.0)

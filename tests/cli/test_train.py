@@ -25,7 +25,7 @@ def test_a_run_says_what_it_came_to_and_can_be_taken_up_again(tmp_path: Path) ->
     assert result.exit_code == 0, result.output
     assert "32 steps, 8 episodes" in result.stdout  # two whole rollouts
     assert "best on held-out threats" in result.stdout
-    assert str(folder / "checkpoint.pt") in result.stdout
+    assert str(folder / "best_model.zip") in result.stdout
     again = train("--resume", folder)
     assert again.exit_code == 0, again.output
     assert "32 steps, 8 episodes" in again.stdout

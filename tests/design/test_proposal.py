@@ -22,7 +22,7 @@ from blast_env.geometry import Layout, Piece, Removal
 from blast_env.layout import load_layout
 from blast_env.site import Scenario, save_scenario
 from blast_env.site.scene import Charge
-from tests.agents.test_self_labelling import wide_yard
+from tests.catalogue_sites import wide_yard
 
 CHARGE = Charge((1.7, 5.2), 5.0)
 WALL, SHORT, POST = (Piece(row, 0, "wall") for row in range(3))

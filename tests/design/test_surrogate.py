@@ -54,7 +54,7 @@ from blast_env.site import AnyCharge, Scenario, load_scenario
 from blast_env.site.scene import Charge
 from studies.blast_table import COLUMNS
 from studies.surrogate import HeldOut, Recipe, verdict
-from tests.agents.test_self_labelling import wide_yard
+from tests.catalogue_sites import wide_yard
 
 CHARGE_M = np.array([0.0, 0.0, 0.3])
 POINT_M = np.array([[20.0, 0.0, 1.5]])

@@ -45,10 +45,7 @@ _TRAIN: Final = (
     "--steps 64 --envs 1 --set n_steps=64 --set batch_size=64 --set evaluation_cases=2"
     " --set evaluation_interval=1"
 )
-_LABEL: Final = (
-    "--steps 4 --envs 1 --set cases=2 --set cases_per_round=1 --set samples=1 --set neighbours=1"
-    " --set first_updates=2 --set updates=1 --set evaluation_cases=2"
-)
+_WARM: Final = "--set imitation_cases=2 --set imitation_updates=1"
 _AGENT: Final = f"blast-env train --scenario courtyard --run agent {_TRAIN}"
 
 GIVEN: Final = (
@@ -171,8 +168,8 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env search --method nsga2 --threat hidden --threats 16 --budget 1000 --processes 2"
     " --out out/front": "--engine event --budget 40 --held-out 2",
     "blast-env train --algo maskable_ppo --scenario courtyard --run runs/courtyard": _TRAIN,
-    "blast-env train --algo self_labelling --engine gas --scenario visitor_entrance"
-    " --run runs/own_best": _LABEL,
+    "blast-env train --scenario visitor_entrance --engine surrogate --set imitation_updates=200"
+    " --run runs/warm": f"{_TRAIN} {_WARM}",
     "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
         "--seeds 4"
     ),

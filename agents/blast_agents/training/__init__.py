@@ -1,11 +1,6 @@
 """Training of agents with stable-baselines3, in run folders that survive interruptions."""
 
-from blast_agents.training.agent import (
-    TrainedAgent,
-    load_agent,
-    load_archive,
-    newest_weights,
-)
+from blast_agents.training.agent import TrainedAgent, load_agent, load_archive
 from blast_agents.training.environments import BatchVecEnv
 from blast_agents.training.hyperparameters import Hyperparameters, load_hyperparameters
 from blast_agents.training.run_folder import TrainingSettings
@@ -19,7 +14,6 @@ __all__ = [
     "load_agent",
     "load_archive",
     "load_hyperparameters",
-    "newest_weights",
     "resume",
     "train",
 ]

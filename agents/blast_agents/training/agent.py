@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal
 
 import numpy as np
 import torch
@@ -23,9 +23,9 @@ from stable_baselines3.common.preprocessing import is_image_space
 from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage
 
 from blast_agents.policies.spatial import SpatialMaskablePolicy, SpatialPolicy, ZonePolicy
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.hyperparameters import CommonHyperparameters, schedule
+from blast_agents.training.hyperparameters import schedule
 from blast_agents.training.run_folder import RunConfiguration, RunFolder, TrainingSettings
+from blast_agents.training.weights import load_policy, read_parameters
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import (
     OBSERVATIONS,
@@ -46,17 +46,22 @@ from blast_env.site.vehicles import source_of
 Model = PPO | MaskablePPO
 Policy = ActorCriticPolicy | MaskableActorCriticPolicy
 _PLACES: Final = {"visible": 1, "hidden": 9}
-AnyOf = TypeVar("AnyOf", bound=CommonHyperparameters)
 
 
-def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenario) -> AnyOf:
-    """Return hyperparameters with the arguments given by the scenario's build zone and the threat.
+def fitted(configuration: RunConfiguration, scenario: Scenario) -> RunConfiguration:
+    """Return a configuration with the policy's arguments that scenario and threat determine.
 
     Raises:
         BlastEnvError: If the policy does not suit the algorithm and the observation.
     """
-    zone = scenario.zone
-    places = hyperparameters.policy_kwargs.places or _PLACES[settings.threat]
+    zone, settings = scenario.zone, configuration.settings
+    given = configuration.hyperparameters
+    policies = _policies(settings)
+    if given.policy not in policies:
+        raise BlastEnvError(
+            f"policy is {given.policy}, must be one of {', '.join(policies)} for "
+            f"{settings.algorithm} on the observation {settings.observation!r}"
+        )
     changes = {
         "rows": zone.rows,
         "columns": zone.columns,
@@ -64,33 +69,11 @@ def fitted(hyperparameters: AnyOf, settings: TrainingSettings, scenario: Scenari
             *item_channels(zone.catalogue),
             *vehicle_channels(bool(scenario.vehicles)),
         ),
-        "places": places,
+        "places": given.policy_kwargs.places or _PLACES[settings.threat],
     }
-    policies = _policies(settings)
-    if hyperparameters.policy not in policies:
-        raise BlastEnvError(
-            f"policy is {hyperparameters.policy}, must be one of {', '.join(policies)} for "
-            f"{settings.algorithm} on the observation {settings.observation!r}"
-        )
-    arguments = hyperparameters.policy_kwargs.model_copy(update=changes)
-    return hyperparameters.model_copy(update={"policy_kwargs": arguments})
-
-
-def check_fit(configuration: RunConfiguration, scenario: Scenario, folder: RunFolder) -> None:
-    """Refuse hyperparameters that do not fit the scenario's build zone.
-
-    Raises:
-        BlastEnvError: If an argument of the policy differs.
-    """
-    found = configuration.hyperparameters
-    wanted = fitted(found, configuration.settings, scenario)
-    for name, value in found.policy_kwargs:
-        must_be = getattr(wanted.policy_kwargs, name)
-        if value != must_be:
-            raise BlastEnvError(
-                f"{folder.path}: policy_kwargs.{name} is {value}, must be {must_be}, as in "
-                "the build zone of the scenario"
-            )
+    arguments = given.policy_kwargs.model_copy(update=changes)
+    hyperparameters = given.model_copy(update={"policy_kwargs": arguments})
+    return replace(configuration, hyperparameters=hyperparameters)
 
 
 def channels_of(observation: str) -> tuple[str, ...]:
@@ -102,13 +85,12 @@ def channels_of(observation: str) -> tuple[str, ...]:
     return channels
 
 
-def make_model(configuration: RunConfiguration, environments: VecEnv) -> Model:
-    """Return a model with random weights, drawn by the seed of the run."""
-    arguments = configuration.ppo.model_arguments()
+def make_model(configuration: RunConfiguration, environments: VecEnv, seed: int = 0) -> Model:
+    """Return a model with random weights, drawn by a seed below 2**32."""
+    arguments = configuration.hyperparameters.model_arguments()
     for name in ("learning_rate", "clip_range"):
         arguments[name] = schedule(arguments[name])
     policy_class, policy_arguments = _policy_class(configuration)
-    seed = configuration.settings.seed % 2**32
     common: dict[str, Any] = {"policy_kwargs": policy_arguments, "seed": seed, "device": "cpu"}
     if configuration.settings.algorithm == "ppo":
         return PPO(policy_class, environments, **arguments, **common)
@@ -315,14 +297,21 @@ class TrainedAgent:
         return actions
 
 
-def newest_weights(run: str | Path) -> Literal["best", "last"]:
-    """Return the weights to use of a run folder: the best, or the last before any evaluation.
+def weights_of(run: str | Path, weights: Literal["best", "last"] = "best") -> Path:
+    """Return the archive of the best or the last weights of a run folder.
 
     Raises:
-        BlastEnvError: If it is not a run folder or is damaged.
+        BlastEnvError: If it is not a run folder, or has no such weights yet.
     """
-    checkpoint = Checkpoint.load(RunFolder(Path(run)).checkpoint)
-    return "best" if checkpoint.best_policy else "last"
+    folder = RunFolder(Path(run))
+    folder.configuration()
+    checkpoints = [*folder.checkpoints.values()]
+    if not checkpoints:
+        raise BlastEnvError(
+            f"{run}: has no weights yet, before its first evaluation; "
+            f"blast-env train --resume {run} continues the run"
+        )
+    return folder.best_model if weights == "best" else checkpoints[-1]
 
 
 def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> TrainedAgent:
@@ -347,14 +336,12 @@ def load_agent(run: str | Path, weights: Literal["best", "last"] = "best") -> Tr
     folder = RunFolder(Path(run))
     configuration = folder.configuration()
     scenario = folder.scenario(configuration)
-    check_fit(configuration, scenario, folder)
-    checkpoint = Checkpoint.load(folder.checkpoint)
-    checkpoint.check_configuration(configuration, folder.path)
-    settings = configuration.settings
+    configuration = fitted(configuration, scenario)
+    place = weights_of(run, weights)
     policy = policy_for(configuration, scenario)
-    checkpoint.load_policy(policy, folder.path, weights)
+    load_policy(policy, read_parameters(place), place)
     policy.set_training_mode(False)
-    return TrainedAgent(policy, scenario, settings.observation)
+    return TrainedAgent(policy, scenario, configuration.settings.observation)
 
 
 def load_archive(

@@ -9,12 +9,19 @@ from blast_agents.training.run_folder import TrainingSettings
 from blast_env.design.search import LayoutAgent
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
 from blast_env.errors import BlastEnvError
-from blast_env.evaluation import Evaluators, LoadCase, LoadCaseSet, SeedRange, compare, draw_threats
+from blast_env.evaluation import (
+    Evaluation,
+    Evaluators,
+    LoadCase,
+    LoadCaseSet,
+    SeedRange,
+    compare,
+    draw_threats,
+)
 from blast_env.evaluation.cases import in_turn
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
 from blast_env.sites.ranges import Ranges
-from blast_env.statistics import Estimate
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,17 +31,13 @@ class Selection:
     Attributes:
         cases: The cases.
         evaluators: Run their blasts, and cache those without a barrier.
-        processes: Worker processes for the blasts.
     """
 
     cases: tuple[LoadCaseSet, ...]
     evaluators: Evaluators
-    processes: int = 1
 
     @classmethod
-    def of(
-        cls, settings: TrainingSettings, source: ScenarioSource, processes: int = 1
-    ) -> "Selection":
+    def of(cls, settings: TrainingSettings, source: ScenarioSource) -> "Selection":
         """Draw the cases of a run, which depend only on the settings.
 
         Generated sites are the last ones of the held-out sites.
@@ -42,7 +45,6 @@ class Selection:
         Args:
             settings: Settings of the run.
             source: Source of the run's scenarios.
-            processes: Worker processes for the blasts; results do not depend on their number.
 
         Raises:
             CalibrationError: If the scenario has no calibration for the judge.
@@ -58,16 +60,16 @@ class Selection:
             scenarios = tuple(sites)
         evaluators = Evaluators(settings.judge, most=count)
         evaluators.of(scenarios[0])  # refuses an unknown engine before anything is written
-        return cls(_cases(settings, scenarios, seeds), evaluators, processes)
+        return cls(_cases(settings, scenarios, seeds), evaluators)
 
-    def reduction(self, agent: LayoutAgent) -> Estimate:
-        """Return the reduction over all cases, with its 95 % interval.
+    def evaluate(self, agent: LayoutAgent) -> Evaluation:
+        """Return the evaluation of an agent's layouts over all cases.
 
         Raises:
             BlastEnvError: If nothing arrives in a case even without a barrier.
         """
         layouts = [agent.propose(case.scenario, case.charge) for case in self.cases]
-        return compare(self.evaluators, self.cases, layouts, self.processes).reduction
+        return compare(self.evaluators, self.cases, layouts)
 
 
 def training_cases(

@@ -4,13 +4,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from multiprocessing import get_all_start_methods, get_context
+from pathlib import Path
 from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvIndices,
@@ -18,15 +18,13 @@ from stable_baselines3.common.vec_env.base_vec_env import (
     VecEnvStepReturn,
 )
 
-from blast_agents.training.hyperparameters import DEFAULT_SECTION
-from blast_agents.training.run_folder import RunConfiguration
+from blast_agents.training.run_folder import RunConfiguration, TrainingSettings
 from blast_env.envs.observations import Array
 from blast_env.envs.strategies import ScenarioSource
 from blast_env.envs.vector_env import BlastBarrierVectorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.store import BlastStore
 from blast_env.runner import workers_told
-from blast_env.sites import FAMILIES
 from blast_env.values import checked_seed, whole_number
 
 _Env = gym.Env[Array, np.int64]
@@ -85,20 +83,17 @@ class ThreatPool(_Masked):
         return self.env.reset(seed=self._pool.draw(seed), options=options)
 
 
-SITES_ID: Final = "BlastBarrierSites-v0"
-
 _LOADS: Final = 8192
 """Number of loads that an environment caches, so that recurring sites repeat no blast."""
 
+_MOST_BYTES: Final = 2_000_000_000
+"""Bound on the size of a run's blasts on disk; a blast takes some kilobytes."""
+
+REDUCTION: Final = ("reduction",)
+"""Values of an episode's final information that the table of episodes has, too."""
+
 _FORK_SERVER: Final = "forkserver"
 """Start method of stable-baselines3's processes on systems that support it."""
-
-
-def environment_id(scenario: str) -> str:
-    """Return the section of the hyperparameters for a scenario's name or path."""
-    if scenario in FAMILIES:
-        return SITES_ID
-    return DEFAULT_SECTION
 
 
 class BatchVecEnv(VecEnv):
@@ -221,11 +216,13 @@ class EnvironmentMaker:
         configuration: Configuration of the run.
         source: Source of the episodes' scenarios.
         index: Index of the environment.
+        blasts: Folder of a store for blasts that may recur; `None` to keep them in memory only.
     """
 
     configuration: RunConfiguration
     source: ScenarioSource
     index: int
+    blasts: Path | None = None
 
     def __call__(self) -> gym.Env[Any, Any]:
         """Return the environment with its wrappers."""
@@ -234,14 +231,14 @@ class EnvironmentMaker:
         )
         for pool in self._pools([self.index]):
             env = ThreatPool(env, **pool)
-        return Monitor(env)
+        return env
 
     def batch(self) -> VecEnv:
         """Return the environments from this one on in one batch, with their wrappers."""
-        count = self.configuration.ppo.n_envs - self.index
+        count = self.configuration.hyperparameters.n_envs - self.index
         envs = BlastBarrierVectorEnv(count, AutoresetMode.DISABLED, **self._arguments(count))
         pools = self._pools(range(self.index, self.index + count))
-        return VecMonitor(BatchVecEnv(envs, pools))
+        return BatchVecEnv(envs, pools)
 
     def _arguments(self, count: int) -> dict[str, Any]:
         settings = self.configuration.settings
@@ -252,7 +249,7 @@ class EnvironmentMaker:
             "realisations": 1,
             "engine": settings.blast_engine,
             "observation": settings.observation,
-            "cache": BlastStore(size=_LOADS * count),
+            "cache": training_store(settings, self.blasts, _LOADS * count),
             "threat": settings.threat,
             **threats,
         }
@@ -260,24 +257,57 @@ class EnvironmentMaker:
     def _pools(self, indices: Iterable[int]) -> list[dict[str, int]]:
         """Return the arguments of the pools of some environments; none without a pool."""
         found: list[dict[str, int]] = []
-        for _, arguments in self.configuration.ppo.wrappers():
+        for _, arguments in self.configuration.hyperparameters.wrappers():
             for index in indices:
                 sequence = np.random.SeedSequence((self.configuration.settings.seed, index))
                 found.append({"seed": int(sequence.generate_state(1)[0]), **arguments})
         return found
 
 
-def make_environments(configuration: RunConfiguration, source: ScenarioSource) -> VecEnv:
+def training_store(settings: TrainingSettings, folder: Path | None, size: int) -> BlastStore:
+    """Return a store of loads for a training.
+
+    Loads are also in the folder if a further training may repeat their blasts, so not with noise:
+    its seeds are other ones. Predictions take less time than reading them from a file.
+
+    Args:
+        settings: Settings of the run.
+        folder: Folder for loads that may recur; `None` for none.
+        size: Number of loads in memory.
+    """
+    is_kept = not (settings.guesses or settings.blast_engine.has_noise)
+    return BlastStore(folder if is_kept else None, size, _MOST_BYTES)
+
+
+def make_environments(
+    configuration: RunConfiguration,
+    source: ScenarioSource,
+    monitor: Path | None = None,
+    blasts: Path | None = None,
+) -> VecEnv:
     """Return the parallel environments, each in a separate process if there are several.
 
     They are a batch in this process where the engine computes many blasts at once, and within
     `on_cluster`, whose workers run their blasts.
+
+    Args:
+        configuration: Configuration of the run.
+        source: Source of the episodes' scenarios.
+        monitor: Table of the episodes; `None` for none.
+        blasts: Folder for blasts that may recur; `None` to keep them in memory only.
     """
-    count = configuration.ppo.n_envs
+    envs = _parallel(configuration, source, blasts)
+    return VecMonitor(envs, None if monitor is None else str(monitor), info_keywords=REDUCTION)
+
+
+def _parallel(
+    configuration: RunConfiguration, source: ScenarioSource, blasts: Path | None
+) -> VecEnv:
+    count = configuration.hyperparameters.n_envs
     engine = configuration.settings.blast_engine
     if workers_told() > 1 or (count > 1 and engine.at_once > 1):
-        return EnvironmentMaker(configuration, source, 0).batch()
-    makers = [EnvironmentMaker(configuration, source, index) for index in range(count)]
+        return EnvironmentMaker(configuration, source, 0, blasts).batch()
+    makers = [EnvironmentMaker(configuration, source, index, blasts) for index in range(count)]
     if count == 1:
         return DummyVecEnv([*makers])
     if _FORK_SERVER in get_all_start_methods():

@@ -103,21 +103,18 @@ def schedule(amount: float | str) -> float | Callable[[float], float]:
     return amount
 
 
-PPO_ALGORITHMS: Final = ("ppo", "maskable_ppo")
-"""Algorithms of stable-baselines3 and sb3-contrib."""
-
-SELF_LABELLING: Final = "self_labelling"
-"""Starts from the rules and imitates its best layouts; see `training.self_labelling`."""
-
-ALGORITHMS: Final = (*PPO_ALGORITHMS, SELF_LABELLING)
-
 ALGORITHM_NAMES: Final[Mapping[str, str]] = MappingProxyType(
-    {"ppo": "PPO", "maskable_ppo": "MaskablePPO", SELF_LABELLING: "Self-labelling"}
+    {"ppo": "PPO", "maskable_ppo": "MaskablePPO"}
 )
-"""Names of the algorithms for readers."""
+"""Names for readers of the algorithms, those of stable-baselines3 and sb3-contrib."""
+
+ALGORITHMS: Final = tuple(ALGORITHM_NAMES)
 
 DEFAULT_SECTION: Final = "BlastBarrier-v0"
-"""The section for scenarios without a separate one."""
+"""The section, and environment id, for scenarios without a separate one."""
+
+SITES_SECTION: Final = "BlastBarrierSites-v0"
+"""The section, and environment id, for generated sites."""
 
 _FOLDER: Final = Path(__file__).parents[1] / "hyperparameters"
 
@@ -169,58 +166,59 @@ class PolicyArguments(BaseModel):
     finish_bias: Annotated[StrictFloat, Field(ge=-50.0, le=50.0)] = -3.0
 
 
-class CommonHyperparameters(BaseModel):
-    """Hyperparameters of all algorithms; each algorithm defines its step.
+_NO_MODEL_ARGUMENTS: Final = (
+    *("n_timesteps", "n_envs", "env_wrapper", "policy", "policy_kwargs"),
+    *("imitation_updates", "imitation_cases"),
+)
+
+
+class Hyperparameters(BaseModel):
+    """Hyperparameters of PPO and MaskablePPO, named as there and in RL Zoo.
 
     Attributes:
-        n_timesteps: Default number of steps of training.
-        n_envs: Default number of parallel environments or worker processes.
+        n_timesteps: Default number of steps of training: modules or pieces.
+        n_envs: Default number of parallel environments.
+        env_wrapper: Wrappers of the environment, the innermost first: names with arguments.
         policy: The policy.
         policy_kwargs: Its arguments.
         learning_rate: A number, or `"lin_"` and a number for a linear decay to 0.
+        n_steps: Steps of each environment between two updates.
         batch_size: Steps in a minibatch.
+        n_epochs: Passes over the steps in an update.
+        gamma: Discount; 1 for none.
+        gae_lambda: Trade-off between bias and variance of the advantages.
+        clip_range: Bound on the change of a probability ratio in an update; as `learning_rate`.
+        ent_coef: Weight of the entropy bonus, which sustains exploration.
         vf_coef: Weight of the critic's error.
         max_grad_norm: Bound on the norm of the gradient.
+        normalize_advantage: Whether advantages are normalised per minibatch.
+        target_kl: Divergence of the policy that ends an update; `None` for no limit.
+        imitation_updates: Minibatches of the warm start, which imitates the best layout by rule of
+            each case before the first step; 0 for none.
+        imitation_cases: Charges, or generated sites, of the warm start.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     n_timesteps: Annotated[StrictInt, Field(ge=1, le=10**10)]
     n_envs: Annotated[StrictInt, Field(ge=1, le=256)]
+    env_wrapper: Annotated[tuple[dict[WrapperName, PoolArguments], ...], Field(max_length=4)] = ()
     policy: PolicyName
     policy_kwargs: PolicyArguments = PolicyArguments()
     learning_rate: Amount
-    batch_size: Annotated[StrictInt, Field(ge=2, le=10**8)]
-    vf_coef: Annotated[StrictFloat, Field(ge=0.0, le=100.0)] = 0.5
-    max_grad_norm: Annotated[StrictFloat, Field(gt=0.0, le=1000.0)] = 0.5
-
-
-class Hyperparameters(CommonHyperparameters):
-    """Hyperparameters of PPO and MaskablePPO, named as there and in RL Zoo.
-
-    A step is a step of an environment: a module or piece.
-
-    Attributes:
-        env_wrapper: Wrappers of the environment, the innermost first: names with arguments.
-        n_steps: Steps of each environment between two updates.
-        n_epochs: Passes over the steps in an update.
-        gamma: Discount; 1 for none.
-        gae_lambda: Trade-off between bias and variance of the advantages.
-        clip_range: Bound on the change of a probability ratio in an update; as `learning_rate`.
-        ent_coef: Weight of the entropy bonus, which sustains exploration.
-        normalize_advantage: Whether advantages are normalised per minibatch.
-        target_kl: Divergence of the policy that ends an update; `None` for no limit.
-    """
-
-    env_wrapper: Annotated[tuple[dict[WrapperName, PoolArguments], ...], Field(max_length=4)] = ()
     n_steps: Annotated[StrictInt, Field(ge=2, le=100_000)]
+    batch_size: Annotated[StrictInt, Field(ge=2, le=10**8)]
     n_epochs: Annotated[StrictInt, Field(ge=1, le=100)]
     gamma: Share = 1.0
     gae_lambda: Share = 0.95
     clip_range: Amount = 0.2
     ent_coef: Annotated[StrictFloat, Field(ge=0.0, le=10.0)] = 0.0
+    vf_coef: Annotated[StrictFloat, Field(ge=0.0, le=100.0)] = 0.5
+    max_grad_norm: Annotated[StrictFloat, Field(gt=0.0, le=1000.0)] = 0.5
     normalize_advantage: bool = True
     target_kl: Annotated[StrictFloat, Field(gt=0.0)] | None = None
+    imitation_updates: Annotated[StrictInt, Field(ge=0, le=10_000)] = 0
+    imitation_cases: Annotated[StrictInt, Field(ge=1, le=100_000)] = 96
 
     @model_validator(mode="after")
     def _check_batches(self) -> "Hyperparameters":
@@ -234,8 +232,7 @@ class Hyperparameters(CommonHyperparameters):
 
     def model_arguments(self) -> dict[str, Any]:
         """Return the arguments of PPO and MaskablePPO except the policy and its arguments."""
-        others = {"n_timesteps", "n_envs", "policy", "policy_kwargs", "env_wrapper"}
-        return self.model_dump(exclude=others)
+        return self.model_dump(exclude={*_NO_MODEL_ARGUMENTS})
 
     def wrappers(self) -> tuple[tuple[str, dict[str, Any]], ...]:
         """Return name and arguments of each wrapper, the innermost first."""
@@ -244,48 +241,9 @@ class Hyperparameters(CommonHyperparameters):
         )
 
 
-Count = Annotated[StrictInt, Field(ge=0, le=10_000)]
-
-
-class SelfLabellingHyperparameters(CommonHyperparameters):
-    """Hyperparameters of self-labelling; see `training.self_labelling`.
-
-    A step is the load of one layout under one threat: a blast, unless it is cached.
-
-    Attributes:
-        cases: Number of training cases: charges or sites.
-        cases_per_round: Number of cases, in turn, with new layouts in each round after the first.
-        samples: Layouts per case that the policy samples.
-        neighbours: Layouts per case that are small changes of its best one so far.
-        borrowed: Layouts per case that are the best ones of the nearest charges.
-        first_updates: Minibatches after the first round, which has the layouts of the rules.
-        updates: Minibatches after each further round.
-    """
-
-    cases: Annotated[StrictInt, Field(ge=1, le=100_000)]
-    cases_per_round: Annotated[StrictInt, Field(ge=1, le=100_000)]
-    samples: Count
-    neighbours: Count
-    borrowed: Count = 0
-    first_updates: Count
-    updates: Count
-
-
-AnyHyperparameters = Hyperparameters | SelfLabellingHyperparameters
-
-_MODELS: Final[Mapping[str, type[AnyHyperparameters]]] = MappingProxyType(
-    dict.fromkeys(PPO_ALGORITHMS, Hyperparameters) | {SELF_LABELLING: SelfLabellingHyperparameters}
-)
-
-
-def hyperparameter_keys(algorithm: str) -> tuple[str, ...]:
-    """Return the valid keys of changes, such as `"policy_kwargs.width"`.
-
-    Raises:
-        UnknownNameError: If the algorithm is unknown; the message names the nearest one.
-    """
-    check_names("algorithm", [algorithm], ALGORITHMS)
-    return tuple(option_names(_MODELS[algorithm]))
+def hyperparameter_keys() -> tuple[str, ...]:
+    """Return the valid keys of changes, such as `"policy_kwargs.width"`."""
+    return tuple(option_names(Hyperparameters))
 
 
 def hyperparameter_file(algorithm: str) -> Path:
@@ -303,7 +261,7 @@ def load_hyperparameters(
     env_id: str,
     changes: Mapping[str, Any] = MappingProxyType({}),
     envs: int | None = None,
-) -> AnyHyperparameters:
+) -> Hyperparameters:
     """Return the hyperparameters of an algorithm for an environment.
 
     Args:
@@ -318,11 +276,11 @@ def load_hyperparameters(
     """
     path = hyperparameter_file(algorithm)
     sections = yaml.safe_load(path.read_text(encoding="utf-8"))  # our own file, with aliases
-    check_names("hyperparameter", changes, hyperparameter_keys(algorithm))
+    check_names("hyperparameter", changes, hyperparameter_keys())
     values = with_changes(sections.get(env_id, sections[DEFAULT_SECTION]), changes)
     if envs is not None:
         values["n_envs"] = envs
     try:
-        return _MODELS[algorithm].model_validate(values)
+        return Hyperparameters.model_validate(values)
     except ValidationError as error:
         raise BlastEnvError(f"hyperparameters: {described(error)}") from error

@@ -1,43 +1,39 @@
-"""The settings and the run folder of a training."""
+"""The settings and the folder of a training, laid out as by RL Zoo.
 
-import csv
+No file of a run folder can run code when it is read here: settings are plain YAML, and of the
+archives of stable-baselines3 only the tensors are read (`training.weights`).
+"""
+
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from blast_agents.training.hyperparameters import (
     ALGORITHMS,
-    SELF_LABELLING,
-    AnyHyperparameters,
+    DEFAULT_SECTION,
+    SITES_SECTION,
     Hyperparameters,
-    SelfLabellingHyperparameters,
 )
 from blast_env.design.surrogate.engine import engine_to_train_on, is_surrogate
-from blast_env.documents import (
-    DocumentError,
-    checked_as,
-    described,
-    parse_csv,
-    parse_json,
-    read_text,
-)
+from blast_env.documents import DocumentError, checked_as, described, read_text
 from blast_env.envs.arguments import check_names
 from blast_env.envs.observations import SINGLE_ARRAYS
-from blast_env.errors import BlastEnvError, value_text
+from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import JUDGE, Engine, find_engine
-from blast_env.files import is_temporary, make_folder, sync, write_atomically, write_text
+from blast_env.files import is_temporary, make_folder, write_text
 from blast_env.provenance import versions
 from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario
-from blast_env.tables import cell_text
+from blast_env.sites import FAMILIES
 
-CONFIGURATION_FORMAT: Final = 1
 THREATS: Final = ("visible", "hidden")
 
 SETTING_KEYS: Final = (
@@ -55,9 +51,9 @@ class TrainingSettings(BaseModel):
     """Algorithm, scenario, engine and evaluation of a training, without the hyperparameters.
 
     Attributes:
-        algorithm: `"ppo"`, `"maskable_ppo"` or `"self_labelling"`.
+        algorithm: `"ppo"` or `"maskable_ppo"`.
         scenario: Bundled name, path of a scenario file, or `"sites"` for generated ones.
-        steps: Steps to train for; the last rollout, or round, is always completed.
+        steps: Steps to train for; the last rollout is always completed.
         seed: Seed of weights, episodes, actions and minibatches.
         threat: `"visible"`: the agent sees the charge; `"hidden"`: it sees the possible places.
         engine: Engine of the blasts; `"surrogate"` or a surrogate's file for predictions instead
@@ -67,7 +63,7 @@ class TrainingSettings(BaseModel):
         observation: Name of the observation; see `BlastBarrier-v0`.
         hidden_threats: Charges per episode with a hidden threat. The expected reward does not
             depend on it; with few charges, the same number of blasts covers more layouts.
-        evaluation_interval: Rollouts between two evaluations.
+        evaluation_interval: Rollouts between two evaluations, with a checkpoint each.
         evaluation_cases: Number of held-out threats of an evaluation.
         evaluation_engine: Engine that selects the best weights; by default that of the training,
             or gas dynamics if a surrogate trains.
@@ -79,7 +75,7 @@ class TrainingSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    algorithm: Literal["ppo", "maskable_ppo", "self_labelling"]
+    algorithm: Literal["ppo", "maskable_ppo"]
     scenario: str
     steps: Annotated[int, Field(ge=1, le=10**10)]
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
@@ -131,49 +127,25 @@ class TrainingSettings(BaseModel):
         return find_engine(JUDGE) if self.guesses else self.blast_engine
 
 
-class RunConfiguration(BaseModel):
+class _Arguments(TrainingSettings):
+    """The content of `args.yml`."""
+
+    scenario_hash: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+@dataclass(frozen=True)
+class RunConfiguration:
     """The complete configuration of a run, which is reproducible from it and the scenario's file.
 
     Attributes:
-        format: Version of the file format.
         settings: The settings.
         hyperparameters: The hyperparameters.
         scenario_hash: Content hash of the scenario; for generated sites, that of the first one.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    format: Literal[1] = CONFIGURATION_FORMAT
     settings: TrainingSettings
-    hyperparameters: AnyHyperparameters
-    scenario_hash: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-
-    @model_validator(mode="after")
-    def _check_algorithm(self) -> "RunConfiguration":
-        """Refuse hyperparameters of another algorithm."""
-        if isinstance(self.hyperparameters, Hyperparameters) == (
-            self.settings.algorithm == SELF_LABELLING
-        ):
-            raise ValueError(f"hyperparameters are none of {self.settings.algorithm}")
-        return self
-
-    @property
-    def ppo(self) -> Hyperparameters:
-        """The hyperparameters of a run of PPO or MaskablePPO."""
-        if not isinstance(self.hyperparameters, Hyperparameters):
-            raise TypeError(f"{self.settings.algorithm} is not trained in environments")
-        return self.hyperparameters
-
-    @property
-    def self_labelling(self) -> SelfLabellingHyperparameters:
-        """The hyperparameters of a run of self-labelling."""
-        if not isinstance(self.hyperparameters, SelfLabellingHyperparameters):
-            raise TypeError(f"{self.settings.algorithm} has no labels")
-        return self.hyperparameters
-
-    def document(self) -> dict[str, Any]:
-        """Return the configuration as plain data."""
-        return self.model_dump(mode="json")
+    hyperparameters: Hyperparameters
+    scenario_hash: str
 
 
 def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
@@ -193,83 +165,6 @@ def settings_from(values: Mapping[str, Any]) -> TrainingSettings:
         raise BlastEnvError(f"training: {described(error)}") from error
 
 
-@dataclass(frozen=True)
-class RolloutRow:
-    """Results of a rollout or, in self-labelling, of a round.
-
-    Attributes:
-        steps: Steps of training at its end.
-        episodes: Episodes that ended in the rollout; layouts tried in the round.
-        reward: Mean reward of these episodes; mean reduction of the best layouts of all cases.
-        reduction: Mean reduction of these episodes or layouts.
-        modules: Mean number of modules or pieces of the layouts.
-        blasts: Blasts simulated since the start of training.
-        cache_hits: Cached loads used since the start of training.
-        seconds: Time since the start of training, in s.
-    """
-
-    steps: int
-    episodes: int
-    reward: float
-    reduction: float
-    modules: float
-    blasts: int
-    cache_hits: int
-    seconds: float
-
-
-@dataclass(frozen=True)
-class EvaluationRow:
-    """An evaluation on held-out threats.
-
-    Attributes:
-        steps: Steps of training.
-        episodes: Episodes of training.
-        reduction: Reduction on the held-out threats.
-        low: Lower end of its 95 % interval.
-        high: Upper end of its 95 % interval.
-        blasts: Blasts of training, without those of the evaluations.
-        seconds: Time since the start of training, in s.
-    """
-
-    steps: int
-    episodes: int
-    reduction: float
-    low: float
-    high: float
-    blasts: int
-    seconds: float
-
-
-Row = TypeVar("Row", RolloutRow, EvaluationRow)
-
-
-def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
-    """Write rows as CSV, atomically.
-
-    Raises:
-        BlastEnvError: If the file cannot be written.
-    """
-    with (
-        write_atomically(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.DictWriter(file, [field.name for field in fields(kind)])
-        writer.writeheader()
-        for row in rows:
-            writer.writerow({name: cell_text(value) for name, value in asdict(row).items()})
-
-
-def read_rows(path: Path, kind: type[Row]) -> list[Row]:
-    """Read rows from CSV.
-
-    Raises:
-        BlastEnvError: If the file does not exist or is damaged.
-    """
-    with refusing(path, "missing or damaged"):
-        return list(parse_csv(read_text(path), kind))
-
-
 _PACKAGES: Final = (
     "blast-env",
     "gymnasium",
@@ -281,30 +176,16 @@ _PACKAGES: Final = (
     "torch",
 )
 
+_CHECKPOINT: Final = re.compile(r"rl_model_([0-9]{1,12})_steps\.zip")
 
-def check_format(path: Path, content: Any, wanted: int) -> None:
-    """Refuse a file of another format version.
+_MONITOR: Final = re.compile(r"([0-9]{1,12})\.monitor\.csv")
 
-    Args:
-        path: The file, for the error.
-        content: Its content.
-        wanted: The required version.
-
-    Raises:
-        BlastEnvError: If its `format` differs.
-    """
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != wanted:
-        raise BlastEnvError(f"{path}: format is {value_text(found)}, must be {wanted}")
+_MOST_YAML_BYTES: Final = 200_000
 
 
 @contextmanager
-def refusing(path: Path, what: str = "damaged") -> Iterator[None]:
+def refusing(path: Path) -> Iterator[None]:
     """Report document errors in this block as a damaged file.
-
-    Args:
-        path: The file.
-        what: Condition of the file, for the error.
 
     Raises:
         BlastEnvError: If the block raises a `DocumentError`.
@@ -312,12 +193,31 @@ def refusing(path: Path, what: str = "damaged") -> Iterator[None]:
     try:
         yield
     except DocumentError as error:
-        raise BlastEnvError(f"{path}: is {what}: {error}") from error
+        raise BlastEnvError(f"{path}: is missing or damaged: {error}") from error
+
+
+def parse_yaml(text: str) -> Any:
+    """Return the plain values of a YAML text; no tag makes an object, and none repeats by an alias.
+
+    Raises:
+        DocumentError: If it is anything else.
+    """
+    try:
+        for event in yaml.parse(text, yaml.SafeLoader):
+            if isinstance(event, yaml.AliasEvent):  # a few bytes that become any number of values
+                raise DocumentError("", f"has the alias *{event.anchor}, must have none")
+        content = yaml.safe_load(text)
+        json.dumps(content, default=str)  # refuses keys that are no text, and numbers of any length
+    except DocumentError:
+        raise
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
+        raise DocumentError("", f"is no YAML: {' '.join(str(error).split())}") from error
+    return content
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """The files of a run.
+    """The files of a run, named as by RL Zoo and the callbacks of stable-baselines3.
 
     Attributes:
         path: The folder.
@@ -326,19 +226,37 @@ class RunFolder:
     path: Path
 
     @property
-    def checkpoint(self) -> Path:
-        """The state of the run: weights, best weights, optimiser, counters and tables."""
-        return self.path / "checkpoint.pt"
+    def best_model(self) -> Path:
+        """The weights of the best evaluation."""
+        return self.path / "best_model.zip"
 
     @property
-    def rollouts(self) -> Path:
-        """The results of the rollouts for readers, one per row; a copy of the checkpoint's."""
-        return self.path / "rollouts.csv"
+    def last_model(self) -> Path:
+        """The weights at the end of the training."""
+        return self.path / f"{self._parameters.name}.zip"
+
+    @property
+    def checkpoints(self) -> dict[int, Path]:
+        """The checkpoints, weights and optimiser, by the number of steps, in this order."""
+        return self._numbered(_CHECKPOINT)
+
+    def checkpoint(self, steps: int) -> Path:
+        """Return the checkpoint after a number of steps."""
+        return self.path / f"rl_model_{steps}_steps.zip"
 
     @property
     def evaluations(self) -> Path:
-        """The evaluations on held-out threats, one per row; a copy of the checkpoint's."""
-        return self.path / "evaluations.csv"
+        """The evaluations on held-out threats."""
+        return self.path / "evaluations.npz"
+
+    def monitor(self, steps: int) -> Path:
+        """Return the table of the episodes of a training that begins after a number of steps."""
+        return self.path / f"{steps}.monitor.csv"
+
+    @property
+    def monitors(self) -> dict[int, Path]:
+        """The tables of episodes by the number of steps before them, in this order."""
+        return self._numbered(_MONITOR)
 
     @property
     def learning_curve(self) -> Path:
@@ -351,59 +269,48 @@ class RunFolder:
         return self.path / "tensorboard"
 
     @property
-    def is_run(self) -> bool:
-        """Whether the folder contains a run."""
-        return self._configuration.exists()
-
-    @property
-    def command(self) -> str:
-        """The command that started the run.
-
-        Raises:
-            BlastEnvError: If the file is missing or damaged.
-        """
-        return self._said("command.txt").strip()
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """The versions of the software at the start of the run.
-
-        Raises:
-            BlastEnvError: If the file is missing or damaged.
-        """
-        with refusing(self.path / "versions.json"):
-            return checked_as(dict[str, str], parse_json(self._said("versions.json")))
-
-    def _said(self, name: str) -> str:
-        with refusing(self.path / name, "missing or damaged"):
-            return read_text(self.path / name)
-
-    @property
     def blasts(self) -> Path:
         """The stored blasts of a training, for its continuation and for others."""
         return self.path / "blasts"
 
     @property
+    def is_run(self) -> bool:
+        """Whether the folder contains a run."""
+        return self._configuration.exists()
+
+    @property
+    def _names(self) -> list[str]:
+        return os.listdir(self.path) if self.path.is_dir() else []
+
+    def _numbered(self, pattern: re.Pattern[str]) -> dict[int, Path]:
+        found = [match for match in map(pattern.fullmatch, self._names) if match]
+        return {
+            int(each[1]): self.path / each[0] for each in sorted(found, key=lambda m: int(m[1]))
+        }
+
+    @property
+    def _parameters(self) -> Path:
+        """The folder of the settings, named by the environment's id."""
+        sites = self.path / SITES_SECTION
+        return sites if sites.is_dir() else self.path / DEFAULT_SECTION
+
+    @property
     def _configuration(self) -> Path:
-        return self.path / "config.json"
+        """The hyperparameters, whose file is written last and makes the folder a run."""
+        return self._parameters / "config.yml"
+
+    @property
+    def _arguments(self) -> Path:
+        return self._parameters / "args.yml"
 
     @property
     def _scenario(self) -> Path:
         return self.path / "scenario.toml"
 
-    @property
-    def _unfinished(self) -> Path:
-        """The configuration during the creation of the folder; its renaming completes the run."""
-        return self.path / ".config.json"
+    def make(self, configuration: RunConfiguration, scenario: Scenario, command: str) -> None:
+        """Create the folder and write its constant files.
 
-    @contextmanager
-    def making(
-        self, configuration: RunConfiguration, scenario: Scenario, command: str
-    ) -> Iterator[None]:
-        """Create the folder and write its constant files; the block writes the variable ones.
-
-        One rename makes the folder a run folder after the block has succeeded. An interrupted
-        creation starts again in the same folder.
+        An interrupted creation starts again in the same folder.
 
         Args:
             configuration: Configuration of the run.
@@ -415,34 +322,34 @@ class RunFolder:
         """
         make_folder(self.path)
         self._check_empty()
-        write_text(self._unfinished, json.dumps(configuration.document(), indent=2) + "\n")
+        settings = configuration.settings
+        parameters = self.path / environment_id(settings.scenario)
+        make_folder(parameters)
         self.clear_temporaries()
         save_scenario(scenario, self._scenario)
-        write_text(self.path / "command.txt", f"{command}\n")
         known = {"platform": platform.platform()} | versions(packages=_PACKAGES)
         write_text(self.path / "versions.json", json.dumps(known, indent=2) + "\n")
-        yield
-        try:
-            os.replace(self._unfinished, self._configuration)
-            sync(self.path)
-        except OSError as error:
-            raise BlastEnvError(
-                f"{self._configuration}: cannot be written: {error.strerror or error}"
-            ) from error
+        write_text(parameters / "command.txt", f"{command}\n")
+        arguments = settings.model_dump(mode="json")
+        arguments["scenario_hash"] = configuration.scenario_hash
+        write_text(self._arguments, yaml.safe_dump(arguments))
+        hyperparameters = configuration.hyperparameters.model_dump(mode="json")
+        write_text(self._configuration, yaml.safe_dump(hyperparameters))
 
     def clear_temporaries(self) -> None:
         """Remove temporary files of killed writers."""
-        for path in self.path.iterdir():
-            if is_temporary(path.name):
-                path.unlink(missing_ok=True)
+        for folder in (self.path, self._parameters):
+            for path in folder.iterdir():
+                if is_temporary(path.name):
+                    path.unlink(missing_ok=True)
 
     def _check_empty(self) -> None:
         """Refuse a folder with a run, or with files other than those of an interrupted creation."""
         if self.is_run:
             raise BlastEnvError(f"{self.path}: has a run in it already; --resume continues it")
-        if self._unfinished.exists():
-            return
-        taken = sorted(name for name in os.listdir(self.path) if not is_temporary(name))
+        own = {"scenario.toml", "versions.json", self._parameters.name}
+        names = {name for name in self._names if not is_temporary(name)}
+        taken = sorted(names - (own if self._parameters.name in names else set()))
         if taken:
             raise BlastEnvError(f"{self.path}: has {taken[0]!r} in it, must be empty")
 
@@ -454,15 +361,19 @@ class RunFolder:
         """
         path = self._configuration
         if not path.exists():
+            begun = self._parameters.is_dir()
             raise BlastEnvError(
-                f"{self.path}: is no run folder: there is no {path.name} in it"
-                + ("; its making was interrupted: train begins anew" * self._unfinished.exists())
+                f"{self.path}: is no run folder: there is no {path.parent.name}/{path.name} in it"
+                + ("; its making was interrupted: train begins anew" * begun)
             )
         with refusing(path):
-            document = parse_json(read_text(path))
-        check_format(path, document, CONFIGURATION_FORMAT)
-        with refusing(path):
-            return checked_as(RunConfiguration, document)
+            content = parse_yaml(read_text(path, _MOST_YAML_BYTES))
+            hyperparameters = checked_as(Hyperparameters, content)
+        with refusing(self._arguments):
+            content = parse_yaml(read_text(self._arguments, _MOST_YAML_BYTES))
+            arguments = checked_as(_Arguments, content)
+        settings = TrainingSettings.model_validate(arguments.model_dump(exclude={"scenario_hash"}))
+        return RunConfiguration(settings, hyperparameters, arguments.scenario_hash)
 
     def scenario(self, configuration: RunConfiguration) -> Scenario:
         """Return the scenario of the run.
@@ -479,6 +390,11 @@ class RunFolder:
             raise BlastEnvError(f"{self.path}: the run folder is damaged: {error}") from error
         check_scenario(scenario, configuration, str(self._scenario))
         return scenario
+
+
+def environment_id(scenario: str) -> str:
+    """Return the environment id, and section of the hyperparameters, for a scenario's name."""
+    return SITES_SECTION if scenario in FAMILIES else DEFAULT_SECTION
 
 
 def check_scenario(scenario: Scenario, configuration: RunConfiguration, place: str) -> None:

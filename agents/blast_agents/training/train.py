@@ -7,26 +7,34 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from stable_baselines3.common.logger import configure
 
-from blast_agents.training.agent import check_fit, fitted, make_model, policy_for, torch_threads
+from blast_agents.training.agent import (
+    Model,
+    fitted,
+    make_model,
+    policy_for,
+    torch_threads,
+    weights_of,
+)
+from blast_agents.training.callbacks import HeldOutCallback
 from blast_agents.training.cases import Selection
-from blast_agents.training.checkpoint import Checkpoint
 from blast_agents.training.environments import make_environments
-from blast_agents.training.hyperparameters import SELF_LABELLING, AnyHyperparameters
-from blast_agents.training.recorder import TrainingRecorder, learning_curve
+from blast_agents.training.evaluations import EvaluationRow, learning_curve, read_evaluations
+from blast_agents.training.hyperparameters import Hyperparameters
+from blast_agents.training.imitation import imitate_rules
 from blast_agents.training.run_folder import (
     RunConfiguration,
     RunFolder,
     TrainingSettings,
     check_scenario,
 )
-from blast_agents.training.self_labelling import SelfLabelling
+from blast_agents.training.weights import load_model, load_policy, read_parameters
 from blast_env.envs.strategies import ScenarioSource, SingleScenario, scenario_source
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import BlastEvaluator
 from blast_env.plots.figures import save_figure
-from blast_env.site import Scenario
 from blast_env.sites import FAMILIES
 
 
@@ -37,17 +45,17 @@ class TrainingResult:
     Attributes:
         folder: The run folder.
         configuration: Configuration of the run.
-        progress: Counters and tables.
+        evaluations: The evaluations on held-out threats; the last one is of the last weights.
     """
 
     folder: RunFolder
     configuration: RunConfiguration
-    progress: Checkpoint
+    evaluations: tuple[EvaluationRow, ...]
 
 
 def train(
     settings: TrainingSettings,
-    hyperparameters: AnyHyperparameters,
+    hyperparameters: Hyperparameters,
     run: str | Path,
     progress: Callable[[float], None] = lambda _: None,
 ) -> TrainingResult:
@@ -65,21 +73,19 @@ def train(
     """
     source = scenario_source(settings.scenario)
     scenario = source.representative
-    configuration = RunConfiguration(
-        settings=settings,
-        hyperparameters=fitted(hyperparameters, settings, scenario),
-        scenario_hash=scenario.content_hash,
-    )
-    # Refuse unsuitable engines, for training and for selection, before anything is written.
+    given = RunConfiguration(settings, hyperparameters, scenario.content_hash)
+    configuration = fitted(given, scenario)
+    # Refuse unsuitable engines and weights before anything is written.
     BlastEvaluator(scenario, settings.blast_engine)
-    selection = _selection(configuration, source)
+    selection = Selection.of(settings, source)
+    if settings.start_from is not None:
+        place = weights_of(settings.start_from)
+        load_policy(policy_for(configuration, scenario), read_parameters(place), place)
     folder = RunFolder(Path(run))
-    start = _start(configuration, scenario)
     # Only the program's name: the place of its installation must not enter a shared run.
     command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
-    with folder.making(configuration, scenario, command):
-        start.save(folder.checkpoint)
-    return _run(_Run(folder, configuration, source, selection), start, progress)
+    folder.make(configuration, scenario, command)
+    return _Run(folder, configuration, source, selection).go_on(progress)
 
 
 def resume(
@@ -89,7 +95,7 @@ def resume(
 ) -> TrainingResult:
     """Continue a run from its last checkpoint to the configured number of steps.
 
-    At most one rollout is repeated, and the result is that of an uninterrupted run.
+    The steps after the checkpoint are made anew, with other random numbers.
 
     Args:
         run: The run folder.
@@ -104,38 +110,14 @@ def resume(
     if scenario is not None:
         check_scenario(scenario_source(scenario).representative, configuration, scenario)
     own = folder.scenario(configuration)
-    check_fit(configuration, own, folder)
+    configuration = fitted(configuration, own)
     source: ScenarioSource = SingleScenario(own)
     if configuration.settings.scenario in FAMILIES:
         source = scenario_source(configuration.settings.scenario)
         check_scenario(source.representative, configuration, "generated sites")
-    selection = _selection(configuration, source)
-    job = _Run(folder, configuration, source, selection)
-    checkpoint = Checkpoint.load(folder.checkpoint)
-    checkpoint.check_configuration(configuration, folder.path)
+    selection = Selection.of(configuration.settings, source)
     folder.clear_temporaries()
-    return _run(job, checkpoint, progress)
-
-
-def _start(configuration: RunConfiguration, scenario: Scenario) -> Checkpoint:
-    """Return the initial checkpoint of a run, with random weights or those of another run."""
-    if configuration.settings.start_from is None:
-        return Checkpoint.of_start(configuration)
-    folder = RunFolder(Path(configuration.settings.start_from))
-    weights = Checkpoint.load(folder.checkpoint).best_policy
-    start = Checkpoint.of_start(configuration, weights)
-    start.load_policy(policy_for(configuration, scenario), folder.path)  # refuses another size
-    return start
-
-
-def _selection(configuration: RunConfiguration, source: ScenarioSource) -> Selection:
-    """Return the cases that select the best weights.
-
-    Self-labelling runs their blasts in its worker processes.
-    """
-    is_own = configuration.settings.algorithm == SELF_LABELLING
-    processes = configuration.hyperparameters.n_envs if is_own else 1
-    return Selection.of(configuration.settings, source, processes)
+    return _Run(folder, configuration, source, selection).go_on(progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,58 +129,71 @@ class _Run:
     source: ScenarioSource
     selection: Selection
 
+    def go_on(self, show: Callable[[float], None]) -> TrainingResult:
+        """Train from the last checkpoint, or the beginning, to the end."""
+        settings, path = self.configuration.settings, self.folder.path
+        steps = max(self.folder.checkpoints, default=0)
+        if steps < settings.steps:
+            try:
+                with torch_threads(settings.torch_threads):
+                    self._learn(steps, show)
+            except (EOFError, ConnectionError) as error:
+                raise BlastEnvError(
+                    f"{path}: a process with an environment has ended, for lack of memory or "
+                    "because it was killed; --resume continues it"
+                ) from error
+            except OSError as error:
+                raise BlastEnvError(
+                    f"{path}: cannot be written: {error.strerror or error}; --resume continues"
+                ) from error
+        rows = tuple(read_evaluations(self.folder.evaluations))
+        if not rows:
+            raise BlastEnvError(f"{self.folder.evaluations}: there is no such file")
+        curve = learning_curve(self.folder, self.configuration, rows)
+        save_figure(curve, self.folder.learning_curve)
+        return TrainingResult(self.folder, self.configuration, rows)
 
-def _run(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> TrainingResult:
-    """Train from a checkpoint to the end."""
-    settings = job.configuration.settings
-    so_far.write_tables(job.folder)  # a killed run may have left them incomplete
-    if so_far.counters.steps < settings.steps:
-        learn = _learn_from_own_best if settings.algorithm == SELF_LABELLING else _learn_by_acting
-        try:
-            with torch_threads(settings.torch_threads):
-                learn(job, so_far, show)
-        except (EOFError, ConnectionError) as error:
-            raise BlastEnvError(
-                f"{job.folder.path}: a process with an environment has ended, for lack of memory "
-                "or because it was killed; --resume continues it"
-            ) from error
-        except OSError as error:
-            raise BlastEnvError(
-                f"{job.folder.path}: cannot be written: {error.strerror or error}; "
-                "--resume continues"
-            ) from error
-    save_figure(learning_curve(so_far, job.configuration), job.folder.learning_curve)
-    return TrainingResult(job.folder, job.configuration, so_far)
-
-
-def _learn_from_own_best(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> None:
-    """Train by self-labelling from a checkpoint."""
-    training = SelfLabelling.of(job.folder, job.configuration, job.source, job.selection, so_far)
-    while so_far.counters.steps < job.configuration.settings.steps:
-        training.do_round()
-        show(min(so_far.counters.steps / job.configuration.settings.steps, 1.0))
-
-
-def _learn_by_acting(job: _Run, so_far: Checkpoint, show: Callable[[float], None]) -> None:
-    """Train by PPO or MaskablePPO from a checkpoint."""
-    settings = job.configuration.settings
-    environments = make_environments(job.configuration, job.source)
-    try:
-        model = make_model(job.configuration, environments)
-        so_far.load_into(model.policy, job.folder.checkpoint)
-        if not so_far.is_start:
-            model.num_timesteps = so_far.counters.steps
-            model._n_updates = so_far.counters.updates
-        scenario = job.source.representative
-        recorder = TrainingRecorder(
-            job.folder, job.configuration, scenario, job.selection, so_far, show
+    def _learn(self, steps: int, show: Callable[[float], None]) -> None:
+        """Train from a checkpoint, or from the beginning if there are no steps yet."""
+        settings, folder = self.configuration.settings, self.folder
+        environments = make_environments(
+            self.configuration, self.source, folder.monitor(steps), folder.blasts
         )
-        recorder.algorithm = model
-        model.set_logger(configure(str(job.folder.tensorboard), ["tensorboard"]))
-        left = settings.steps - so_far.counters.steps
-        model.learn(left, callback=recorder, reset_num_timesteps=so_far.is_start)
-        model.logger.close()
-    finally:
-        # After Ctrl-C the processes have already ended.
-        with suppress(EOFError, OSError):
-            environments.close()
+        try:
+            # Further steps are under other threats than the first ones.
+            sequence = np.random.SeedSequence((settings.seed, steps))
+            seed = int(sequence.generate_state(1)[0])
+            model = make_model(self.configuration, environments, seed)
+            checkpoint = folder.checkpoints.get(steps)
+            begins_trained = False
+            if checkpoint is not None:
+                load_model(model, read_parameters(checkpoint), checkpoint)
+                model.num_timesteps = steps
+            else:
+                begins_trained = self._begin(model)
+            callback = HeldOutCallback(
+                folder,
+                self.configuration,
+                self.source.representative,
+                self.selection,
+                begins_trained,
+                show,
+            )
+            model.set_logger(configure(str(folder.tensorboard), ["tensorboard"]))
+            model.learn(settings.steps - steps, callback=callback, reset_num_timesteps=steps == 0)
+            model.logger.close()
+        finally:
+            # After Ctrl-C the processes have already ended.
+            with suppress(EOFError, OSError):
+                environments.close()
+
+    def _begin(self, model: Model) -> bool:
+        """Give a model its first weights; return whether they are other than random ones."""
+        start_from = self.configuration.settings.start_from
+        if start_from is not None:
+            place = weights_of(start_from)
+            load_policy(model.policy, read_parameters(place), place)
+        has_learnt = imitate_rules(
+            model.policy, self.configuration, self.source, self.folder.blasts
+        )
+        return has_learnt or start_from is not None

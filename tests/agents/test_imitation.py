@@ -1,13 +1,13 @@
-"""The policy learns from layouts; labels are never worse than rules; runs survive interruptions."""
+"""A warm start teaches the best layout by rule of each case; other weights can begin a run, too."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from blast_agents.training import load_agent, load_hyperparameters, resume, train
+from blast_agents.training import Hyperparameters, load_agent, resume, train
 from blast_agents.training.agent import (
     Policy,
     TrainedAgent,
@@ -17,22 +17,14 @@ from blast_agents.training.agent import (
     policy_for,
 )
 from blast_agents.training.cases import Selection, training_cases
-from blast_agents.training.checkpoint import Checkpoint
-from blast_agents.training.hyperparameters import AnyHyperparameters
-from blast_agents.training.run_folder import (
-    EvaluationRow,
-    RolloutRow,
-    RunConfiguration,
-    read_rows,
-    settings_from,
-)
-from blast_agents.training.self_labelling import (
+from blast_agents.training.imitation import (
     Demonstration,
-    Judge,
+    best_by_rule,
     imitate,
     imitation_loss,
-    race,
 )
+from blast_agents.training.run_folder import RunConfiguration, RunFolder, settings_from
+from blast_agents.training.weights import read_parameters
 
 from blast_env.design.search.registry import layouts_by_rule
 from blast_env.envs.strategies import SingleScenario
@@ -43,56 +35,30 @@ from blast_env.layout import LayoutState
 from blast_env.site import Scenario, VehicleCharge, save_scenario
 from blast_env.site.scene import Charge
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
-from tests.catalogue_sites import yard_document
+from tests.catalogue_sites import wide_yard
 from tests.vehicle_sites import gate_site
 
-SMALL: dict[str, Any] = {
-    "n_envs": 1,
-    "batch_size": 8,
-    "policy_kwargs.width": 8,
-    "policy_kwargs.critic_width": 8,
-    "cases": 4,
-    "cases_per_round": 2,
-    "samples": 1,
-    "neighbours": 2,
-    "borrowed": 1,
-    "first_updates": 4,
-    "updates": 2,
-}
-STEPS = 30
-"""The rules of four cases, then three rounds."""
+SLOW = {"learning_rate": 1e-12}
+"""A step so small that nothing changes in training."""
 
 
-def wide_yard(tnt_kg: float = 5.0) -> Scenario:
-    """Return the yard with a charge that may be anywhere in an area."""
-    area = {"kind": "rectangle", "corner_m": [1.0, 3.0], "size_m": [1.5, 6.0], "tnt_kg": tnt_kg}
-    return Scenario.from_document(yard_document() | {"charge": [area]}, "wide yard")
-
-
-def own(**changes: Any) -> AnyHyperparameters:
-    return load_hyperparameters("self_labelling", "BlastBarrier-v0", {**SMALL, **changes})
-
-
-def run_settings(scenario: Path, **changes: Any) -> Any:
-    changes = {"algorithm": "self_labelling", "steps": STEPS, **changes}
-    return settings(scenario, **changes)
+def warm(**changes: Any) -> Hyperparameters:
+    """Return hyperparameters with a short warm start."""
+    return hyperparameters({"imitation_updates": 4, "imitation_cases": 4, **changes})
 
 
 def agent_for(scenario: Scenario, observation: str = "grid") -> TrainedAgent:
     """Return an agent that has learnt nothing."""
-    chosen = run_settings(Path("anywhere"), observation=observation)
+    chosen = settings(Path("anywhere"), observation=observation)
     policy = {"policy": "MlpPolicy"} if observation == "features" else {}
-    configuration = RunConfiguration(
-        settings=chosen,
-        hyperparameters=fitted(own(**policy), chosen, scenario),
-        scenario_hash=scenario.content_hash,
-    )
+    given = RunConfiguration(chosen, hyperparameters(policy), scenario.content_hash)
+    configuration = fitted(given, scenario)
     torch.manual_seed(0)
     return TrainedAgent(policy_for(configuration, scenario), scenario, observation)
 
 
 def first_cases(scenario: Scenario, count: int, **changes: Any) -> tuple[LoadCaseSet, ...]:
-    chosen = run_settings(Path("anywhere"), **changes)
+    chosen = settings(Path("anywhere"), **changes)
     return training_cases(chosen, SingleScenario(scenario), count)
 
 
@@ -162,9 +128,8 @@ def test_a_policy_learns_to_place_what_it_was_shown(observation: str, count: int
     agent = agent_for(scenario, observation)
     layouts = [by_rule(each) for each in cases]
     shown = [Demonstration(*each, 0.4, observation) for each in zip(cases, layouts, strict=True)]
-    rng = np.random.default_rng(0)
-    for updates, learning_rate in ((120, 0.01), (60, 0.001)):
-        loss = imitate(agent.policy, shown, updates, 8, learning_rate, 0.5, 0.5, rng)
+    chosen = warm(imitation_updates=300, learning_rate="lin_1e-2", batch_size=8)
+    loss = imitate(agent.policy, shown, chosen, np.random.default_rng(0))
     assert loss < 0.8
     for case, layout, each in zip(cases, layouts, shown, strict=True):
         assert sorted(agent.propose(scenario, case.charge)) == sorted(layout)
@@ -183,116 +148,77 @@ def test_sites_with_and_without_vehicles_are_learnt_side_by_side() -> None:
     assert len(alone.observation) < len(seen)
 
 
-def test_a_race_ends_with_the_best_of_those_that_met_all_threats() -> None:
-    scenario = small_scenario()
-    (case,) = first_cases(scenario, 4, threat="hidden", hidden_threats=3)  # one layout for all
-    assert (len(case.threats), case.charge) == (3, None)
-    layouts = [(), ((0, 0),), ((3, 0), (4, 0)), ((3, 0), (4, 0), (5, 0))]
-    judge = Judge(Evaluators("event"))
-    (met,) = race(judge, [case], [layouts])
-    assert sorted(len(each) for each in met.values()) == [1, 1, 2, 3]
-    assert judge.asked == judge.evaluators.counts.blasts == 7
-    evaluator = BlastEvaluator(scenario, "event")
-    for layout, impulses in met.items():
-        blasts = [evaluator.loads(layout, threat) for threat in case.threats]
-        own = [each.protected_impulse_pa_s for each in blasts]
-        assert impulses == tuple(own[: len(impulses)])
-
-
 def test_no_case_comes_twice() -> None:
     (only,) = first_cases(gate_site(), 8)
     assert isinstance(only.charge, VehicleCharge)
     assert len(first_cases(wide_yard(), 8)) == 8
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a run that is finished; not to be changed."""
-    folder = tmp_path_factory.mktemp("finished")
-    train(run_settings(scenario_file(folder)), own(), folder / "run")
-    return folder / "run"
-
-
-def outcome(run: Path) -> tuple[Any, ...]:
-    """Return all that a run has come to, but for the time it took."""
-    checkpoint = Checkpoint.load(run / "checkpoint.pt")
-    rollouts = read_rows(run / "rollouts.csv", RolloutRow)
-    evaluations = read_rows(run / "evaluations.csv", EvaluationRow)
-    return (
-        [astuple(replace(row, seconds=0.0)) for row in rollouts],
-        [astuple(replace(row, seconds=0.0)) for row in evaluations],
-        checkpoint.labels,
-        {name: values.tolist() for name, values in checkpoint.policy.items()},
-    )
-
-
-def test_no_label_is_worse_than_a_rule_s_layout(finished: Path) -> None:
-    checkpoint = Checkpoint.load(finished / "checkpoint.pt")
+@pytest.mark.parametrize("threat", ["visible", "hidden"])
+def test_the_best_by_rule_is_that_of_blasts_under_the_threats_of_the_case(threat: str) -> None:
     scenario = small_scenario()
-    cases = training_cases(checkpoint.configuration.settings, SingleScenario(scenario), 4)
+    cases = first_cases(scenario, 3, threat=threat, hidden_threats=3)
+    assert [len(case.threats) for case in cases] == ([1] * 3 if threat == "visible" else [3])
+    evaluators = Evaluators("event")
+    found = best_by_rule(evaluators, cases)
     evaluator = BlastEvaluator(scenario, "event")
-    for case, label in zip(cases, checkpoint.labels, strict=True):
-        (threat,) = case.threats
-        best = evaluator.loads(label.layout, threat).protected_impulse_pa_s
-        assert label.load == (best,)
-        for layout in layouts_by_rule(scenario, case.charge).values():
-            assert best <= evaluator.loads(layout, threat).protected_impulse_pa_s
-    rows = read_rows(finished / "rollouts.csv", RolloutRow)
-    reached = [row.reward for row in rows]
-    assert reached == sorted(reached)
-    assert len(rows) > 2
-    assert rows[-1].steps >= STEPS > rows[-2].steps
-    assert all(row.blasts + row.cache_hits == row.steps for row in rows)
+    for case, (layout, reduction) in zip(cases, found, strict=True):
+        loads = [
+            np.mean([evaluator.loads(each, t).protected_impulse_pa_s for t in case.threats])
+            for each in ((), layout, *layouts_by_rule(scenario, case.charge).values())
+        ]
+        assert loads[1] == min(loads)
+        assert reduction == pytest.approx(1.0 - loads[1] / loads[0])
+    assert evaluators.counts.blasts == len(evaluators._store)
 
 
-def test_an_interrupted_run_ends_as_if_it_had_not_been(finished: Path, tmp_path: Path) -> None:
-    calls, rounds = [], 2
+def test_a_run_begins_with_an_evaluation_of_its_warm_start(tmp_path: Path) -> None:
+    """A continued run does not learn the rules again."""
+    run, scenario = tmp_path / "run", scenario_file(tmp_path)
 
-    def progress(share: float) -> None:
-        calls.append(share)
-        if len(calls) == rounds:
-            raise KeyboardInterrupt
+    def stop(share: float) -> None:
+        raise KeyboardInterrupt
 
-    run = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        train(run_settings(scenario_file(tmp_path)), own(), run, progress)
-    assert len(read_rows(run / "rollouts.csv", RolloutRow)) == rounds
-    resume(run)
-    assert outcome(run) == outcome(finished)
+        train(settings(scenario, steps=16), warm(**SLOW), run, stop)
+    start = read_parameters(RunFolder(run).checkpoint(0))["policy"]
+    result = resume(run)
+    assert [row.timesteps for row in result.evaluations] == [0, 16]
+    end = read_parameters(RunFolder(run).checkpoint(16))["policy"]
+    assert all(torch.allclose(end[name], values, atol=1e-9) for name, values in start.items())
 
 
-def test_another_training_begins_with_the_weights_of_a_run(finished: Path, tmp_path: Path) -> None:
-    """A step so small that nothing changes shows them."""
-    chosen = settings(scenario_file(tmp_path), start_from=str(finished), steps=16)
-    slow = hyperparameters({"learning_rate": 1e-12})
-    train(chosen, slow, tmp_path / "run")
-    before = Checkpoint.load(finished / "checkpoint.pt").best_policy
-    after = Checkpoint.load(tmp_path / "run" / "checkpoint.pt").policy
+def test_another_training_begins_with_the_weights_of_a_run(tmp_path: Path) -> None:
+    first, scenario = tmp_path / "first", scenario_file(tmp_path)
+    train(settings(scenario, steps=16), hyperparameters(), first)
+    chosen = settings(scenario, start_from=str(first), steps=16)
+    result = train(chosen, hyperparameters(SLOW), tmp_path / "run")
+    assert [row.timesteps for row in result.evaluations] == [0, 16]
+    before = read_parameters(RunFolder(first).best_model)["policy"]
+    after = read_parameters(RunFolder(tmp_path / "run").last_model)["policy"]
     assert before.keys() == after.keys()
     assert all(torch.allclose(after[name], before[name], atol=1e-9) for name in before)
     other = tmp_path / "other.toml"
     save_scenario(wide_yard(), other)
     with pytest.raises(BlastEnvError, match="weights and configuration differ"):
-        train(settings(other, start_from=str(finished), engine="gas"), slow, tmp_path / "none")
-    assert not (tmp_path / "none").exists()
+        train(
+            settings(other, start_from=str(first), engine="gas"), hyperparameters(), tmp_path / "no"
+        )
+    assert not (tmp_path / "no").exists()
 
 
 def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -> None:
     scenario = tmp_path / "yard.toml"
     save_scenario(wide_yard(), scenario)
-    small = own(cases=2, samples=1, neighbours=1, borrowed=0)
-    chosen = run_settings(scenario, engine="surrogate", steps=21, evaluation_interval=100)
-    result = train(chosen, small, tmp_path / "run")
-    first, *_, last = result.progress.rollouts
-    assert first.reward > 0.03  # the best rule of each case, at the safe end of its interval
-    assert last.reward >= first.reward
-    assert last.episodes <= 6
-    (evaluation,) = result.progress.evaluations
+    chosen = settings(scenario, engine="surrogate", steps=16, evaluation_interval=100)
+    result = train(chosen, warm(), tmp_path / "run")
+    first, last = result.evaluations
+    assert (first.timesteps, last.timesteps) == (0, 16)
     assert not (tmp_path / "run" / "blasts").exists()
     selection = Selection.of(chosen, SingleScenario(wide_yard()))
     assert selection.evaluators.engine.name == "gas"
-    best = selection.reduction(load_agent(tmp_path / "run"))
-    assert (best.value, best.low) == (evaluation.reduction, evaluation.low)
+    best = selection.evaluate(load_agent(tmp_path / "run")).reduction
+    assert best.value == max(first.reduction, last.reduction)
 
 
 @pytest.mark.parametrize(
@@ -309,7 +235,7 @@ def test_what_it_cannot_do_is_refused_before_anything_is_written(
     tmp_path: Path, changes: dict[str, str], words: str
 ) -> None:
     with pytest.raises(ValueError, match=words):
-        train(run_settings(scenario_file(tmp_path), **changes), own(), tmp_path / "run")
+        train(settings(scenario_file(tmp_path), **changes), warm(), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
