@@ -2,7 +2,7 @@
 
 import re
 import warnings
-from math import exp, nan
+from math import exp, inf, nan
 
 import numpy as np
 import pandas as pd
@@ -294,6 +294,8 @@ def test_the_waveform_is_equation_1() -> None:
     times_s = [0.0, 0.0299, 0.04, 0.05]
     assert wave.pressure(times_s).tolist() == [0.0, 0.0, 0.0, 0.0]
     assert type(wave.pressure(0.034)) is float
+    with pytest.raises(BlastEnvError, match="positive_duration_s is inf"):
+        Friedlander(1e5, inf, 1.0)
 
 
 @given(peaks, durations, st.floats(1e-6, 0.499))
