@@ -26,7 +26,7 @@ with render_extra():
 _MOST_BYTES: Final = 100_000_000
 
 _WINDOW: Final = 100
-"""Episodes of a point of the learning curve, as of the means of stable-baselines3."""
+"""Most episodes of a point of the learning curve, as of the means of stable-baselines3."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,8 @@ def _training_curve(
     known = np.maximum.accumulate([0, *(row.timesteps for row in rows)])
     spent = np.interp(steps, known, [0, *(row.blasts for row in rows)])
     reduction = np.array([each.reduction for each in episodes])
-    parts = [slice(first, first + _WINDOW) for first in range(0, len(episodes), _WINDOW)]
+    window = max(min(len(episodes) // 10, _WINDOW), 1)
+    parts = [slice(first, first + window) for first in range(0, len(episodes), window)]
     return [spent[part].mean() for part in parts], [reduction[part].mean() for part in parts]
 
 
