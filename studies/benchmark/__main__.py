@@ -16,8 +16,8 @@ from blast_env.benchmark import (
     JUDGE_CELL_M,
     BenchmarkProblem,
     Definition,
+    JudgedSubmission,
     ScoreReference,
-    Submission,
     make,
     shipped_standings,
 )
@@ -34,9 +34,10 @@ from studies.benchmark.references import (
     mean_curve,
     named_definition,
     published_blasts,
+    rescaled,
     seen_references,
-    submitted_layouts,
     with_fine_shares,
+    with_judged,
     with_published,
 )
 
@@ -50,31 +51,32 @@ _REFERENCES = TypeAdapter(dict[str, ScoreReference])
 def references(
     cache: Annotated[Path, typer.Option(help="Folder in which blasts are kept.")],
     out: Annotated[Path, typer.Option(help="The file.")] = _STORED,
-    submission: Annotated[
-        list[Path] | None, typer.Option(help="Submission with layouts of its problems.")
+    judged: Annotated[
+        list[Path] | None,
+        typer.Option(help="Judged submission whose better layouts become the best known ones."),
     ] = None,
     most_s: Annotated[float, typer.Option(help="Stop before a problem after so many s.")] = 1e9,
 ) -> None:
     """Evaluate the rules and all known layouts on every problem without a reference.
 
-    Problems with layouts in the submissions get new references that include those layouts. Use
-    submissions only for a version without entries, since new references change the scale.
+    A better layout of a judged submission becomes the best known one, which changes the scale of
+    the score: give all judged submissions, whose files are then written with the new scale.
     """
     with user_errors():
         known = _REFERENCES.validate_json(out.read_bytes()) if out.exists() else {}
-        found = submitted_layouts([Submission.load(path) for path in submission or ()])
+        submissions = {path: JudgedSubmission.load(path) for path in judged or ()}
         published, began = published_blasts(DEFINITIONS), monotonic()
         store = with_published(cache, published)
         engine = find_engine(JUDGE, 0.5)
         for name, definition in DEFINITIONS.items():
             stored = known.get(name)
             made_by = (definition.digest, engine_key(engine))
-            if stored and (stored.digest, stored.engine) == made_by and name not in found:
+            if stored and (stored.digest, stored.engine) == made_by:
                 continue
             if monotonic() - began > most_s:
                 break
             evaluator = BlastEvaluator(definition.scenario, engine, cache=store)
-            more = known_layouts(definition, published) | found.get(name, {})
+            more = known_layouts(definition, published)
             if stored:
                 more = {stored.best.method: stored.best.layout} | more
             known[name] = reference_of(definition, evaluator, more, _CELL)
@@ -92,6 +94,13 @@ def references(
             known[name] = with_fine_shares(DEFINITIONS[name], known[name], evaluator)
             print_line(f"{name}, {_FINE} m: {evaluator.counts.blasts} blasts")
             _write(known, out)
+        better = with_judged(known, submissions.values(), store)
+        _write(better, out)
+        for path, each in submissions.items():
+            rescaled(each, better).save(path)
+        for name in DEFINITIONS:
+            if better[name] != known[name]:
+                print_line(f"{name}: best known by {better[name].best.method}")
 
 
 def _write(known: dict[str, ScoreReference], out: Path) -> None:

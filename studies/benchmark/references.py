@@ -10,12 +10,13 @@ import numpy as np
 
 from blast_env.arrays import FloatArray, IntArray
 from blast_env.benchmark import (
+    DEFINITIONS,
     JUDGE_CELL_M,
     Definition,
+    JudgedSubmission,
     KnownLayout,
     Run,
     ScoreReference,
-    Submission,
     make,
     stored_references,
 )
@@ -27,6 +28,7 @@ from blast_env.benchmark.references import cell_key
 from blast_env.design.search import layouts_by_rule
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation import BlastEvaluator, BlastStore
+from blast_env.evaluation.engines import JUDGE, find_engine
 from blast_env.geometry import Layout
 from blast_env.layout import load_layout
 from blast_env.site import Charge, VehicleCharge
@@ -78,14 +80,42 @@ def known_layouts(definition: Definition, published: BlastStore) -> dict[str, La
     return {name: tuple(sorted(layout)) for name, layout in found.items()}
 
 
-def submitted_layouts(submissions: Iterable[Submission]) -> dict[str, dict[str, Layout]]:
-    """Return the layouts of submissions, by problem and by their origin."""
-    found: dict[str, dict[str, Layout]] = defaultdict(dict)
-    for each in submissions:
-        for run in each.runs:
-            method = f"{each.method}, {run.budget:,} blasts, seed {run.seed}"
-            found[run.problem][method] = run.layout
+def with_judged(
+    known: Mapping[str, ScoreReference],
+    judged: Iterable[JudgedSubmission],
+    cache: BlastStore,
+) -> dict[str, ScoreReference]:
+    """Return references whose best known layout is the best by the judge's cells.
+
+    Args:
+        known: The references.
+        judged: Judged submissions, whose layouts are candidates.
+        cache: Store of the blasts with cells of 0.5 m.
+    """
+    coarse, fine = cell_key(0.5), cell_key(JUDGE_CELL_M)
+    found = dict(known)
+    for submission in judged:
+        for run in submission.runs:
+            best = found[run.problem].best
+            if cell_key(submission.cell_m) == fine and run.share < best.shares[fine]:
+                method = f"{submission.method}, {run.budget:,} blasts, seed {run.seed}"
+                new = KnownLayout(method, run.layout, {fine: run.share})
+                found[run.problem] = replace(found[run.problem], best=new)
+    engine = find_engine(JUDGE, 0.5)
+    for name, each in found.items():
+        if coarse not in each.best.shares:
+            evaluator = BlastEvaluator(DEFINITIONS[name].scenario, engine, cache=cache)
+            (share,) = shares_of(DEFINITIONS[name].case, [each.best.layout], evaluator)
+            best = replace(each.best, shares={coarse: share, **each.best.shares})
+            found[name] = replace(each, best=best)
     return found
+
+
+def rescaled(judged: JudgedSubmission, known: Mapping[str, ScoreReference]) -> JudgedSubmission:
+    """Return a judged submission with the best known shares of new references."""
+    key = cell_key(judged.cell_m)
+    runs = (replace(run, best=known[run.problem].best.shares[key]) for run in judged.runs)
+    return replace(judged, runs=tuple(runs))
 
 
 def published_blasts(definitions: Mapping[str, Definition]) -> BlastStore:
