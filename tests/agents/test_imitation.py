@@ -214,6 +214,7 @@ def test_it_learns_by_guesses_from_pieces_and_is_judged_by_gas(tmp_path: Path) -
     result = train(chosen, warm(), tmp_path / "run")
     first, last = result.evaluations
     assert (first.timesteps, last.timesteps) == (0, 16)
+    assert 0 < first.blasts < last.blasts  # those of the rules count
     assert not (tmp_path / "run" / "blasts").exists()
     selection = Selection.of(chosen, SingleScenario(wide_yard()))
     assert selection.evaluators.engine.name == "gas"

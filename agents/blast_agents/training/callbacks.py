@@ -32,6 +32,8 @@ class HeldOutCallback(BaseCallback):
         scenario: A scenario of the size that the policy is for.
         selection: Cases that select the best weights.
         begins_trained: Whether to evaluate the weights before the first step, too.
+        blasts: Blasts spent before the first step.
+        began_s: Time of `perf_counter` at the start, s.
         show: Called with the share of the steps that is done.
 
     Raises:
@@ -45,14 +47,16 @@ class HeldOutCallback(BaseCallback):
         scenario: Scenario,
         selection: Selection,
         begins_trained: bool,
+        blasts: int,
+        began_s: float,
         show: Callable[[float], None],
     ) -> None:
         super().__init__()
         self.folder, self.settings, self.scenario = folder, configuration.settings, scenario
         self.selection, self.begins_trained, self.show = selection, begins_trained, show
         self.rows = read_evaluations(folder.evaluations)
-        self._rollouts, self._began = 0, perf_counter()
-        self._episodes, self._blasts, self._seconds = 0, 0, 0.0
+        self._rollouts, self._began_s = 0, began_s
+        self._episodes, self._blasts, self._seconds = 0, blasts, 0.0
         self._counts: dict[int, tuple[int, int]] = {}
 
     def _on_training_start(self) -> None:
@@ -105,7 +109,7 @@ class HeldOutCallback(BaseCallback):
             *found.reduction,
             self._episodes,
             self._spent,
-            self._seconds + perf_counter() - self._began,
+            self._seconds + perf_counter() - self._began_s,
         )
         best = best_of(self.rows)
         if best is None or row.reduction > best.reduction:

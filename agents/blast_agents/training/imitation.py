@@ -216,7 +216,7 @@ def best_by_rule(
 
 def imitate_rules(
     policy: Policy, configuration: RunConfiguration, source: ScenarioSource, blasts: Path
-) -> bool:
+) -> tuple[bool, int]:
     """Train a policy to place the best layout by rule of each training case.
 
     Args:
@@ -226,11 +226,12 @@ def imitate_rules(
         blasts: Folder for blasts that may recur.
 
     Returns:
-        Whether it has learnt anything: not without minibatches, nor if no rule helps in any case.
+        Whether it has learnt anything (not without minibatches, nor if no rule helps in any case),
+        and the number of blasts spent.
     """
     settings, hyperparameters = configuration.settings, configuration.hyperparameters
     if not hyperparameters.imitation_updates:
-        return False
+        return False, 0
     cases = training_cases(settings, source, hyperparameters.imitation_cases)
     scenarios = {case.scenario.content_hash for case in cases}
     store = training_store(settings, blasts, _LOADS)
@@ -246,4 +247,4 @@ def imitate_rules(
     ]
     if shown:
         imitate(policy, shown, hyperparameters, np.random.default_rng(settings.seed))
-    return bool(shown)
+    return bool(shown), evaluators.counts.blasts

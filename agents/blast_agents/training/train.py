@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 from stable_baselines3.common.logger import configure
@@ -155,7 +156,7 @@ class _Run:
 
     def _learn(self, steps: int, show: Callable[[float], None]) -> None:
         """Train from a checkpoint, or from the beginning if there are no steps yet."""
-        settings, folder = self.configuration.settings, self.folder
+        settings, folder, began_s = self.configuration.settings, self.folder, perf_counter()
         environments = make_environments(
             self.configuration, self.source, folder.monitor(steps), folder.blasts
         )
@@ -165,18 +166,20 @@ class _Run:
             seed = int(sequence.generate_state(1)[0])
             model = make_model(self.configuration, environments, seed)
             checkpoint = folder.checkpoints.get(steps)
-            begins_trained = False
+            begins_trained, blasts = False, 0
             if checkpoint is not None:
                 load_model(model, read_parameters(checkpoint), checkpoint)
                 model.num_timesteps = steps
             else:
-                begins_trained = self._begin(model)
+                begins_trained, blasts = self._begin(model)
             callback = HeldOutCallback(
                 folder,
                 self.configuration,
                 self.source.representative,
                 self.selection,
                 begins_trained,
+                blasts,
+                began_s,
                 show,
             )
             model.set_logger(configure(str(folder.tensorboard), ["tensorboard"]))
@@ -187,13 +190,17 @@ class _Run:
             with suppress(EOFError, OSError):
                 environments.close()
 
-    def _begin(self, model: Model) -> bool:
-        """Give a model its first weights; return whether they are other than random ones."""
+    def _begin(self, model: Model) -> tuple[bool, int]:
+        """Give a model its first weights.
+
+        Returns:
+            Whether they are other than random ones, and the number of blasts spent.
+        """
         start_from = self.configuration.settings.start_from
         if start_from is not None:
             place = weights_of(start_from)
             load_policy(model.policy, read_parameters(place), place)
-        has_learnt = imitate_rules(
+        has_learnt, blasts = imitate_rules(
             model.policy, self.configuration, self.source, self.folder.blasts
         )
-        return has_learnt or start_from is not None
+        return has_learnt or start_from is not None, blasts
