@@ -70,6 +70,13 @@ def wall(
     )
 
 
+FACADE = wall((100.0, 90.0), 10, 1)
+"""From (100, 90) to (102, 110), units."""
+
+FAR_WALL = wall((180.0, 180.0), 2, 2)
+"""A structure that nothing reaches."""
+
+
 def scene(
     of_balls: Balls,
     structures: Sequence[StructureOutline],

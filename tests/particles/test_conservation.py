@@ -10,6 +10,7 @@ from tests.particles.scenes import (
     AIR,
     EVENT,
     EXPLOSIVE,
+    FAR_WALL,
     KEEP_MASS,
     balls,
     closed_box,
@@ -19,11 +20,9 @@ from tests.particles.scenes import (
     parameters,
     scene,
     states_at,
-    wall,
 )
 from tests.particles.worlds import WorldRun, angular_momentum, whole_energy
 
-FAR_WALL = wall((180.0, 180.0), 2, 2)
 BOX = closed_box((58.0, 66.0), (24, 18))
 """Around the cloud, so that it stays together and collides on."""
 

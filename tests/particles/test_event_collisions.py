@@ -17,6 +17,8 @@ from tests.particles.scenes import (
     AIR,
     EVENT,
     EXPLOSIVE,
+    FACADE,
+    FAR_WALL,
     KEEP_MASS,
     balls,
     energy,
@@ -28,10 +30,6 @@ from tests.particles.scenes import (
     wall,
 )
 from tests.particles.worlds import WorldRun
-
-FAR_WALL = wall((180.0, 180.0), 2, 2)
-FACADE = wall((100.0, 90.0), 10, 1)
-"""From (100, 90) to (102, 110)."""
 
 
 def elastic_rules(restitution: float, at_module: float = 1.0) -> SimulationParameters:

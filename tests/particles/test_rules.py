@@ -14,6 +14,8 @@ from tests.particles.scenes import (
     AIR,
     EVENT,
     EXPLOSIVE,
+    FACADE,
+    FAR_WALL,
     KEEP_MASS,
     balls,
     finished,
@@ -24,9 +26,6 @@ from tests.particles.scenes import (
     wall,
 )
 from tests.scenarios import BALLISTIC_COURTYARD
-
-FACADE = wall((100.0, 90.0), 10, 1)
-FAR_WALL = wall((180.0, 180.0), 2, 2)
 
 
 def shot(
