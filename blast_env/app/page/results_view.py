@@ -15,6 +15,12 @@ _FILM: Final = "film"
 _NOTHING: Final = "No results yet for the current layouts: press Blast."
 _RUNNING: Final = "Running: the panel Work shows the progress."
 _DAMAGE: Final = "damage of "
+_START_FILMS: Final = """
+const films = [...document.querySelectorAll("img.be-film")];
+Promise.all(films.map((film) => fetch(film.src).then((answer) => answer.blob()))).then((blobs) =>
+  films.forEach((film, index) => { film.src = URL.createObjectURL(blobs[index]); }));
+"""
+"""Starts all films at once, when all are there: they have the same moments."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +160,8 @@ class ResultsView:
         with self._cards:
             for each in found:
                 self._card(each, threat)
+        if self._what == _FILM and len(found) > 1:
+            ui.run_javascript(_START_FILMS)
 
     def _card(self, found: _Found, threat: LoadCase) -> None:
         name = found.shown.name
@@ -166,6 +174,7 @@ class ResultsView:
             image = ui.element("img").props(f'alt="{self._what}, {title}"')
             if self._what in found.pictures:
                 image.props(f'src="{found.pictures[self._what]}"')
+                image.classes("be-film" if self._what == _FILM else "")
             elif self._what in found.damage:
                 building = found.damage[self._what]
                 background_tasks.create(self._draw(image, found.shown, threat, building))
