@@ -25,14 +25,14 @@ if TYPE_CHECKING:  # the same names as in `_PLACES`, for editors and type checke
     from blast_env.evaluation.evaluate import evaluate_layout
     from blast_env.layout import LayoutState, load_layout, write_layout
     from blast_env.site import Scenario, load_scenario, save_scenario
-    from blast_env.site.scene import Charge
+    from blast_env.site.blast_site import Charge
 
 _PLACES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "Blast": "blast_env.evaluation.engines.particles",
         "BlastResult": "blast_env.evaluation.engines.particles",
         "LoadCaseSet": "blast_env.evaluation.cases",
-        "Charge": "blast_env.site.scene",
+        "Charge": "blast_env.site.blast_site",
         "Engine": "blast_env.evaluation.engines.contract",
         "GasBlast": "blast_env.evaluation.engines.gas",
         "GasResult": "blast_env.evaluation.engines.gas",

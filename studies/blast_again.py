@@ -25,7 +25,7 @@ from blast_env.geometry import Layout
 from blast_env.particles.parquet import read_frame, write_table
 from blast_env.provenance import versions
 from blast_env.runner import run_all
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.tables import table_of
 from studies.blast_table import COLUMNS, load_row, scenario_of
 

@@ -20,7 +20,7 @@ from blast_env.files import make_folder
 from blast_env.particles.parquet import write_table
 from blast_env.provenance import versions
 from blast_env.site import Scenario, bundled_scenarios
-from blast_env.site.scene import OUTWARDS
+from blast_env.site.blast_site import OUTWARDS
 from blast_env.sites import (
     CLOSE_SIDES_M,
     FAMILIES,

@@ -19,7 +19,7 @@ from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import FaceLoads, Gauges, GroundMap
 from blast_env.gas.solver import GasSolver, Settling
 from blast_env.gas.source import GasCharge, set_charge
-from blast_env.layout.build_scene import draw_charge
+from blast_env.layout.build_site import draw_charge
 from blast_env.site import Scenario
 from tests.gas_sites import WALL, glazed_hut
 from tests.site.documents import driven_document

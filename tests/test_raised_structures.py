@@ -15,7 +15,7 @@ from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutState
 from blast_env.plots.plan import structure_features
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.sites import Visibility
 from tests.builders import block
 from tests.gas_sites import site_document

@@ -19,11 +19,11 @@ from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import drawing
 from blast_env.io.importing import ImportOptions, import_site
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import build_site, vehicle_drive
+from blast_env.layout.build_site import build_site, vehicle_drive
 from blast_env.plots.plan import Kinds, on_levels, site_features
 from blast_env.site import Scenario, ScenarioError
+from blast_env.site.blast_site import Charge
 from blast_env.site.heights import highest_top_m
-from blast_env.site.scene import Charge
 from blast_env.sites import Visibility
 from tests import builders
 from tests.builders import block, point, zone

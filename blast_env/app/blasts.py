@@ -34,7 +34,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.files import make_folder, write_atomically
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import charge_against
+from blast_env.layout.build_site import charge_against
 from blast_env.layout.placement import load_relevant
 from blast_env.plots.figures import save_figure
 from blast_env.plots.gas import Quantity, facades, full_load, gauge_history

@@ -14,6 +14,7 @@ from blast_env.app.editor import Ghost
 from blast_env.app.edits import SiteThing, ThingKind
 from blast_env.geometry import Cell, Layout, Rectangle
 from blast_env.layout import LayoutState
+from blast_env.particles.structure import Colour
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
     FAINT,
@@ -35,7 +36,6 @@ from blast_env.plots.plan import (
 )
 from blast_env.site import Scenario
 from blast_env.site.sections import PointM
-from blast_env.site.structure import Colour
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # needs the extra `maps`

@@ -23,7 +23,7 @@ from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.layout.placement import load_relevant
 from blast_env.site import ObjectiveSection, Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.statistics import counted_parts, reductions
 from blast_env.units import PA_PER_KPA
 

@@ -46,7 +46,7 @@ from blast_env.evaluation.probability import Uncertainty
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
-from blast_env.layout.build_scene import charge_against
+from blast_env.layout.build_site import charge_against
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario
 

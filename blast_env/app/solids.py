@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from blast_env.geometry import Layout, Rectangle
+from blast_env.particles.structure import Colour
 from blast_env.plots.plan import (
     EXPLOSIVE,
     STANDING,
@@ -14,7 +15,6 @@ from blast_env.plots.plan import (
     site_features,
 )
 from blast_env.site import Scenario
-from blast_env.site.structure import Colour
 
 _GROUND: Final[Colour] = (223, 228, 234)
 _ZONE: Final[Colour] = (185, 217, 195)

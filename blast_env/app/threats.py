@@ -12,7 +12,7 @@ from blast_env.site import (
     VehicleCharge,
     VehicleSource,
 )
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.site.sections import PointM
 from blast_env.site.worst_places import stand_off_m
 

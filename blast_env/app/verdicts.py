@@ -23,7 +23,7 @@ from blast_env.evaluation.consequences import (
 from blast_env.evaluation.probability import Uncertainty, level_probability, probability_text
 from blast_env.files import write_atomically
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import build_site
+from blast_env.layout.build_site import build_site
 from blast_env.layout.placement import load_relevant
 from blast_env.response.facade import peak_factor, respond
 from blast_env.site import AnyCharge, Scenario

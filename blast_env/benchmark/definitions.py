@@ -18,7 +18,7 @@ from blast_env.evaluation.cases import (
     search_set,
     visible_case,
 )
-from blast_env.layout.build_scene import draw_threat
+from blast_env.layout.build_site import draw_threat
 from blast_env.site import PointSource, Scenario, VehicleCharge, load_scenario
 from blast_env.sites import FAMILIES, generate_site
 from blast_env.values import whole_number

@@ -33,7 +33,7 @@ from blast_env.gas.settings import CELLS, UNIFORM, Cells
 from blast_env.layout import check_layout, load_layout
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.values import plain_number
 
 if TYPE_CHECKING:

@@ -38,10 +38,10 @@ from blast_env.evaluation.engines.contract import StructureLoad, on_buildings
 from blast_env.evaluation.engines.pieces import pieces_answer
 from blast_env.geometry import Layout, layout_counts
 from blast_env.layout import load_layout
-from blast_env.layout.build_scene import draw_threat
+from blast_env.layout.build_site import draw_threat
 from blast_env.plots.blast_files import BlastFiles
 from blast_env.site import load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.tables import table_records
 from blast_env.units import MS_PER_S, PA_PER_KPA
 

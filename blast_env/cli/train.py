@@ -31,7 +31,7 @@ from blast_env.envs.strategies import scenario_source
 from blast_env.errors import BlastEnvError, import_extra
 from blast_env.evaluation.engines import default_engine
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 if TYPE_CHECKING:
     from blast_agents.training.run_folder import RunFolder

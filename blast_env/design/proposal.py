@@ -25,7 +25,7 @@ from blast_env.evaluation.cases import one_of_each_charge, search_set
 from blast_env.evaluation.engines import JUDGE, Engine
 from blast_env.geometry import Element, Layout, Removal
 from blast_env.site import AnyCharge, AnyScenario, PointSource, find_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import reductions
 

@@ -13,7 +13,7 @@ from gymnasium.envs.registration import EnvSpec
 from blast_env.errors import BlastEnvError, UnknownArgumentError, UnknownNameError, value_text
 from blast_env.geometry import Element
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.values import MOST_SEED, finite_number, number_pair, whole_number
 
 _Parameters = ParamSpec("_Parameters")

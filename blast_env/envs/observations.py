@@ -16,7 +16,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Rectangle
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import vehicle_reach, worst_places
+from blast_env.layout.build_site import vehicle_reach, worst_places
 from blast_env.site import (
     AnySource,
     BuildZone,

@@ -20,12 +20,11 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult, Engine, find_engine
 from blast_env.geometry import Element
 from blast_env.layout import check_layout
-from blast_env.layout.build_scene import draw_threat
+from blast_env.layout.build_site import draw_threat
+from blast_env.particles.balls import CollisionType
 from blast_env.particles.run import BlastRun, EndReason
 from blast_env.site import AnyScenario, Scenario, find_scenario
-from blast_env.site.balls import CollisionType, lattice_capacity
-from blast_env.site.scene import BlastSite
-from blast_env.site.structure import BARRIER_NAME
+from blast_env.site.blast_site import BARRIER_NAME, BlastSite
 from blast_env.values import real_number
 
 if TYPE_CHECKING:  # drawing is an optional extra, and Numba takes half a second to import
@@ -197,7 +196,7 @@ class UnfoldingParticles(Unfolding):
         # A step of the engine can begin just before the time limit.
         latest_s = stepping.time_limit_s + stepping.longest_step_s
         most_impulse = scene.largest_exact_impulse
-        air_balls = lattice_capacity(scene.parameters.air, scene.site)
+        air_balls = scene.parameters.air.most_balls(scene.site_m)
         counts = np.array([scene.parameters.explosive.ball_count, air_balls])
         return spaces.Dict(
             {

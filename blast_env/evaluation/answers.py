@@ -6,7 +6,7 @@ from math import isnan, nan
 from typing import TYPE_CHECKING, Final, Self, TypeAlias
 
 from blast_env.site import ObjectiveSection, Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.statistics import Estimate
 
 if TYPE_CHECKING:  # takes a third of a second to import

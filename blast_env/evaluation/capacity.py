@@ -17,11 +17,11 @@ from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.evaluation.probability import MASS_RANGE, scaled_to
 from blast_env.evaluation.shared import consequences
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import charge_against
+from blast_env.layout.build_site import charge_against
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import Tell
 from blast_env.site import AnyCharge, Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.site.worst_places import nearest_point_m, stand_off_m
 
 RUNGS: Final = 5

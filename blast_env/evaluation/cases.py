@@ -13,7 +13,7 @@ from blast_env.arrays import FloatArray
 from blast_env.errors import BlastEnvError, value_text
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import charge_against, draw_threat
+from blast_env.layout.build_site import charge_against, draw_threat
 from blast_env.site import (
     AnyCharge,
     AnyScenario,
@@ -22,7 +22,7 @@ from blast_env.site import (
     VehicleCharge,
     find_scenario,
 )
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.site.vehicles import ranked
 from blast_env.statistics import MeanRisk, Risk
 from blast_env.values import checked_seed, generator

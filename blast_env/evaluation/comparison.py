@@ -25,10 +25,10 @@ from blast_env.evaluation.grid_error import GridError, LoadOf
 from blast_env.evaluation.standing import STANDING_COLUMNS, worst_standing
 from blast_env.files import write_text
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import build_site
+from blast_env.layout.build_site import build_site
 from blast_env.provenance import versions
 from blast_env.site import AnyScenario, Scenario, find_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.site.worst_places import stand_off_m
 from blast_env.statistics import (
     CVAR_LEVEL,
@@ -474,6 +474,7 @@ class Evaluation:
         barrier and without (of particles `impulse_sim`, the sum of m |v|; of gas `impulse_n_s`, the
         momentum on its walls), and its `reduction`.
         """
+        from blast_env.particles.structure import obstacle_of
         from blast_env.particles.tables import module_table
 
         threat = self.threats[0]
@@ -489,7 +490,8 @@ class Evaluation:
             "reduction": reductions(impulse, without),
         }
         names = ["module_id", "structure", "x_m", "y_m", *values]
-        return module_table(scene.obstacles()).assign(**values)[names]
+        obstacles = [obstacle_of(each) for each in scene.structures]
+        return module_table(obstacles).assign(**values)[names]
 
     @cached_property
     def threat_table(self) -> "pd.DataFrame":

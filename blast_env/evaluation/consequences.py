@@ -55,8 +55,8 @@ from blast_env.response.glass import LEAST_INTERLAYER_MM
 from blast_env.response.sdof import impulses
 from blast_env.response.walls import DamageLevel
 from blast_env.site import ObjectiveSection, Scenario
+from blast_env.site.blast_site import WALLS, BlastSite, Charge
 from blast_env.site.facade import with_glass
-from blast_env.site.scene import WALLS, BlastSite, Charge
 from blast_env.site.sections import buildings_of
 from blast_env.tables import Column, table_of
 

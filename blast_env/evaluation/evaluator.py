@@ -30,7 +30,7 @@ from blast_env.provenance import code_version
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.runner import as_completed, check_workers
 from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.statistics import reductions
 from blast_env.units import PA_PER_PSI
 

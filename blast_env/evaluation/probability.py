@@ -36,7 +36,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import Glazing, Wall
 from blast_env.response.facade import LoadDraws, drawn_levels, pushes, rescaled, respond
 from blast_env.response.sdof import impulses
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.values import generator
 
 MASS_RANGE: Final = 1.3

@@ -22,7 +22,7 @@ from blast_env.evaluation.consequences import Verdict
 from blast_env.evaluation.standing import bay_middles
 from blast_env.gas.settings import CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Element
-from blast_env.layout.build_scene import build_site, worst_places
+from blast_env.layout.build_site import build_site, worst_places
 from blast_env.particles.calibration.references import (
     CURVES_SCALED_M,
     Burst,
@@ -45,8 +45,8 @@ from blast_env.response.glass import Pane
 from blast_env.response.requirements import Requirement
 from blast_env.response.walls import Panel
 from blast_env.site import AnySource, RectangleSource, Scenario, VehicleSource
+from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.site.presets import NamedMass
-from blast_env.site.scene import BlastSite, Charge
 from blast_env.site.sections import PointM
 from blast_env.site.sight import in_sight
 from blast_env.units import MODULE_SIDE_M

@@ -28,7 +28,7 @@ from blast_env.evaluation.engines.contract import BlastLoads, StructureLoad
 from blast_env.evaluation.engines.pieces import PIECE_COLUMNS
 from blast_env.evaluation.evaluator import BlastEvaluator
 from blast_env.geometry import Element, Layout
-from blast_env.layout.build_scene import build_site, charge_against
+from blast_env.layout.build_site import build_site, charge_against
 from blast_env.response.facade import respond
 from blast_env.site import AnyCharge, Scenario
 from blast_env.tables import table_of

@@ -19,7 +19,7 @@ from blast_env.arrays import BoolArray, FloatArray
 from blast_env.gas.settings import CHECKED_CELLS, CHECKED_SCALED_DISTANCE
 from blast_env.geometry import Rectangle
 from blast_env.response.facade import Bay
-from blast_env.site.scene import OUTWARDS, BlastSite
+from blast_env.site.blast_site import OUTWARDS, BlastSite
 from blast_env.site.sight import in_sight
 from blast_env.tables import Column
 from blast_env.units import MODULE_SIDE_M

@@ -20,7 +20,7 @@ from blast_env.geometry import Layout
 from blast_env.particles.calibration.model import Calibration
 from blast_env.response.damage import BayDamage
 from blast_env.site import AnyScenario, find_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.store import Store
 
 T = TypeVar("T")

@@ -12,7 +12,7 @@ from typing import Final
 from blast_env.errors import BlastEnvError
 from blast_env.gas.ending import SOUND_M_S, corners_m, sound_s, watched_structures
 from blast_env.gas.settings import GasSettings
-from blast_env.site.scene import BlastSite
+from blast_env.site.blast_site import BlastSite
 
 MOST_BYTES: Final = 8 * 2**30
 MOST_S: Final = 6 * 3600.0

@@ -20,7 +20,7 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.site.scene import BlastSite
+from blast_env.site.blast_site import BlastSite
 
 FALLEN: Final = 0.1
 """Fall of a running impulse from its largest value, relative to it, for a known load."""

@@ -42,7 +42,7 @@ from blast_env.gas.source import (
 )
 from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.particles.run import EndReason
-from blast_env.site.scene import OUTWARDS, WALLS, BlastSite, StructureOutline
+from blast_env.site.blast_site import OUTWARDS, WALLS, BlastSite, StructureOutline
 from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:

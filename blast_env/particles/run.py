@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from blast_env.site.balls import distance_to_rectangle
-from blast_env.site.scene import Scene
-from blast_env.site.structure import ModularObstacle
+from blast_env.particles.balls import distance_to_rectangle
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import ModularObstacle
 from blast_env.units import UNITS_PER_M
 
 COLLISION_DTYPE = np.dtype(

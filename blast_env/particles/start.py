@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from blast_env.particles.run import BlastRun
-from blast_env.site.scene import Scene
+from blast_env.particles.scene import Scene
 
 if TYPE_CHECKING:
     from blast_env.particles.event.engine import EventRun

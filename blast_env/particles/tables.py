@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 
 from blast_env.arrays import FloatArray
+from blast_env.particles.balls import CollisionType
 from blast_env.particles.calibration.model import LoadUnit
 from blast_env.particles.run import CollisionArray, incidence_angle_rad
-from blast_env.site.balls import CollisionType
-from blast_env.site.structure import ModularObstacle
+from blast_env.particles.structure import ModularObstacle
 from blast_env.tables import Column, as_types, texts
 
 Columns = tuple[Column, ...]

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
+from blast_env.particles.structure import Colour
 from blast_env.plots.plan import BORDER, FAINT, INK, QUIET_INK, SITE
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
-from blast_env.site.structure import Colour
 from blast_env.units import MODULE_SIDE_M
 
 with render_extra():

@@ -11,7 +11,8 @@ from blast_env.evaluation.answers import points
 from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.geometry import Layout, layout_counts
-from blast_env.layout.build_scene import build_site, charge_against
+from blast_env.layout.build_site import build_site, charge_against
+from blast_env.particles.structure import obstacle_of
 from blast_env.plots.plan import (
     EXPLOSIVE,
     INK,
@@ -44,7 +45,7 @@ from blast_env.plots.style import (
     unit_interval,
 )
 from blast_env.site import Scenario
-from blast_env.site.scene import BlastSite, Charge
+from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.statistics import Estimate
 
 with render_extra():
@@ -298,7 +299,7 @@ def _draw_modules(panels: Sequence[Axes], evaluation: Evaluation, scene: BlastSi
     highest = float(own[list(columns)].to_numpy().max())
     scale = Normalize(0.0, nice_ceiling(highest) if highest > 0.0 else 1.0)
     for axes, column, words in zip(panels, columns, ("without", "with"), strict=True):
-        obstacles = [outline.build() for outline in outlines]
+        obstacles = [obstacle_of(outline) for outline in outlines]
         for obstacle in obstacles:
             impulses = own[own.structure == obstacle.name][column]
             for part, impulse in zip(obstacle.parts, impulses, strict=True):

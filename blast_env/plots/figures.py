@@ -9,6 +9,7 @@ import pandas as pd
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.files import write_atomically
+from blast_env.particles.structure import ModularObstacle
 from blast_env.particles.tables import faces_hit
 from blast_env.plots.heat_map import LoadScale, common_scale, heat_map
 from blast_env.plots.plan import (
@@ -26,7 +27,6 @@ from blast_env.plots.style import (
     shown_until_s,
     unit_interval,
 )
-from blast_env.site.structure import ModularObstacle
 from blast_env.units import MS_PER_S
 from blast_env.values import path_of
 

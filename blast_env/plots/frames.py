@@ -7,7 +7,10 @@ import numpy as np
 
 from blast_env.calibration import LoadUnit
 from blast_env.evaluation.engines import Blast
+from blast_env.particles.balls import CollisionType
 from blast_env.particles.run import BallStates
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import ModularObstacle
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.plan import (
     BARRIER,
@@ -36,9 +39,6 @@ from blast_env.plots.style import (
     render_extra,
     unit_interval,
 )
-from blast_env.site.balls import CollisionType
-from blast_env.site.scene import Scene
-from blast_env.site.structure import ModularObstacle
 from blast_env.units import MS_PER_S, UNITS_PER_M
 
 with render_extra():

@@ -43,7 +43,7 @@ from blast_env.plots.site_plan import (
 )
 from blast_env.plots.style import barrier_text, render_extra, short_number, unit_interval
 from blast_env.response.buildings import GroundThreshold, ground_thresholds
-from blast_env.site.scene import BlastSite, Charge
+from blast_env.site.blast_site import BlastSite, Charge
 from blast_env.units import PA_PER_KPA
 
 with render_extra():

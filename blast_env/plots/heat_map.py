@@ -8,6 +8,7 @@ from blast_env.calibration import LoadUnit
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
 from blast_env.geometry import Rectangle
+from blast_env.particles.structure import ModularObstacle, ModularPart
 from blast_env.plots.plan import (
     BARRIER,
     INK,
@@ -39,7 +40,6 @@ from blast_env.plots.style import (
     unit_interval,
 )
 from blast_env.site.sections import buildings_of
-from blast_env.site.structure import ModularObstacle, ModularPart
 from blast_env.units import MODULE_SIDE_M
 
 with render_extra():

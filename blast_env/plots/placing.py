@@ -8,7 +8,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import build_site
+from blast_env.layout.build_site import build_site
 from blast_env.plots.canvas import Frame, SiteSheet
 from blast_env.plots.frames import FramePainter
 from blast_env.plots.plan import (
@@ -26,7 +26,7 @@ from blast_env.plots.plan import (
 from blast_env.plots.site_plan import draw_features, legend_of, write_names
 from blast_env.plots.style import charge_text, nice_ceiling, render_extra
 from blast_env.site import AnySource, PointSource, Scenario, VehicleSource
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 with render_extra():
     from matplotlib.artist import Artist

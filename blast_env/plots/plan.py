@@ -19,12 +19,8 @@ import numpy as np
 
 from blast_env.arrays import BoolArray
 from blast_env.geometry import Element, Piece, Rectangle, outlines, stacked_runs, standing
-from blast_env.layout.build_scene import (
-    barrier_outline,
-    vehicle_drive,
-    vehicle_reach,
-    worst_places,
-)
+from blast_env.layout.build_site import barrier_outline, vehicle_drive, vehicle_reach, worst_places
+from blast_env.particles.structure import Colour
 from blast_env.site import (
     AnySource,
     AnyStructure,
@@ -34,11 +30,10 @@ from blast_env.site import (
     Scenario,
     VehicleSource,
 )
+from blast_env.site.blast_site import Charge
 from blast_env.site.driving import WayPoint
 from blast_env.site.reach import squares_of
-from blast_env.site.scene import Charge
 from blast_env.site.sections import PointM, buildings_of
-from blast_env.site.structure import Colour
 from blast_env.site.terraces import ground_below_m, is_open_below, levels_of
 from blast_env.site.vehicles import Impact
 from blast_env.site.worst_places import nearest_point_m
@@ -532,11 +527,12 @@ def barrier_features(scenario: Scenario, layout: Sequence[Element]) -> Iterator[
             )
             yield replace(feature, fill=colours[piece.item], words=words[piece.item])
         return
-    for part in barrier_outline(scenario, tuple(layout)).build().parts:
-        rectangle_m = zone.element_rectangle_m((part.row, part.column))
+    outline = barrier_outline(scenario, tuple(layout))
+    for row, column in outline.filled:
+        rectangle_m = zone.element_rectangle_m((row, column))
         ends = _ends_of(scenario, rectangle_m, zone.height_m)
-        cell = {"row": part.row, "column": part.column}
-        feature = area_feature(Kinds.BARRIER, rectangle_m, part.module_id, **cell, **ends)
+        name, cell = outline.module_name(row, column), {"row": row, "column": column}
+        feature = area_feature(Kinds.BARRIER, rectangle_m, name, **cell, **ends)
         yield replace(feature, fill=colours[""], words=words[""])
 
 

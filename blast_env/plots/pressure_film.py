@@ -38,7 +38,7 @@ from blast_env.plots.pressure_frames import (
 )
 from blast_env.plots.style import barrier_text, nice_ceiling
 from blast_env.runner import Tell, share_of
-from blast_env.site.scene import BlastSite
+from blast_env.site.blast_site import BlastSite
 from blast_env.units import PA_PER_KPA
 
 _EVERY_S: Final = 0.0002  # for 100 kg

@@ -46,7 +46,7 @@ from blast_env.plots.site_plan import (
     outline_path,
 )
 from blast_env.plots.style import barrier_text, render_extra, unit_interval
-from blast_env.site.scene import BlastSite, Block, StructureOutline
+from blast_env.site.blast_site import BlastSite, Block, StructureOutline
 from blast_env.units import MS_PER_S, PA_PER_KPA
 
 with render_extra():

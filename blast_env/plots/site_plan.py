@@ -6,6 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from blast_env.geometry import Rectangle, outlines
+from blast_env.particles.structure import LoadColours, ModularObstacle
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
     BARRIER,
@@ -22,9 +23,8 @@ from blast_env.plots.plan import (
     outlines_of,
 )
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
-from blast_env.site.scene import StructureOutline
+from blast_env.site.blast_site import StructureOutline
 from blast_env.site.sections import PointM
-from blast_env.site.structure import LoadColours, ModularObstacle
 
 with render_extra():
     from matplotlib import patheffects

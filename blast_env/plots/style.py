@@ -12,9 +12,10 @@ from blast_env.calibration import LoadUnit
 from blast_env.errors import import_extra
 from blast_env.evaluation.engines import Blast, BlastResult
 from blast_env.geometry import Element, layout_counts
-from blast_env.site.balls import CollisionType, distance_to_rectangle
-from blast_env.site.scene import Charge, Scene
-from blast_env.site.structure import Colour
+from blast_env.particles.balls import CollisionType, distance_to_rectangle
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import Colour
+from blast_env.site.blast_site import Charge
 from blast_env.units import MODULE_SIDE_M
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 
 from blast_env.particles.calibration.references import largest_reflected_peak_pa
 from blast_env.response.facade import peak_factor
-from blast_env.site.scene import BlastSite
+from blast_env.site.blast_site import BlastSite
 from blast_env.site.sight import in_sight
 
 

@@ -18,7 +18,7 @@ from blast_env.site import (
     VehicleCharge,
     VehicleSource,
 )
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 _STEPS: Final = 400
 """Number of parts of a segment in the search for its place nearest to a building."""

@@ -3,6 +3,7 @@
 from blast_env.bundled import bundled_scenarios
 from blast_env.geometry import Cell, Element, Layout, Piece
 from blast_env.site.access_way import AccessWay
+from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Catalogue, Item, PlacedModule, StockBarrier, stock_barriers
 from blast_env.site.content import SCHEMA_VERSION
 from blast_env.site.files import (
@@ -18,7 +19,6 @@ from blast_env.site.files import (
 from blast_env.site.models import Scenario
 from blast_env.site.objective import ObjectiveSection
 from blast_env.site.problems import Problem, ScenarioError
-from blast_env.site.scene import Charge
 from blast_env.site.sections import (
     AnySource,
     AnyStructure,

@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.arrays import BoolArray
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle, stacked_runs
-from blast_env.site.balls import lattice_capacity
+from blast_env.site.blast_site import BARRIER_NAME
 from blast_env.site.boxes import TOLERANCE_M
 from blast_env.site.content import Content
 from blast_env.site.driving import places_shape
@@ -29,7 +29,6 @@ from blast_env.site.sections import (
     Site,
     VehicleSource,
 )
-from blast_env.site.structure import BARRIER_NAME
 from blast_env.site.terraces import terrace_problems
 from blast_env.site.vehicles import MOST_PLACES, Obstacles, VehicleGround
 from blast_env.site.zone import (
@@ -40,7 +39,7 @@ from blast_env.site.zone import (
     source_bounds_m,
 )
 from blast_env.site.zone_checks import build_zone_problems, place_count_problems
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
+from blast_env.units import MODULE_SIDE_M
 
 MOST_AIR_BALLS: Final = 1_000_000
 """Most air balls, by the memory of a common computer."""
@@ -473,7 +472,7 @@ def particle_problems(scenario: Content) -> Iterator[Problem]:
 
 def _too_much_air(site: Site, air: AirParameters) -> Iterator[Problem]:
     """Check the number of air balls, which memory limits."""
-    balls = lattice_capacity(air, site.rectangle_m.scaled(UNITS_PER_M))
+    balls = air.most_balls(site.rectangle_m)
     if balls > MOST_AIR_BALLS:
         yield Problem(
             "simulation.overrides.air.spacing_units",

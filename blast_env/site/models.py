@@ -23,13 +23,13 @@ from blast_env.geometry import Element, Measure
 from blast_env.response.components import Glazing, Wall, catalogue
 from blast_env.response.damage import Alternatives
 from blast_env.response.facade import FilledBay
+from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import RIGID_KEYS, Hardening
 from blast_env.site.checks import check_sections, check_sources, particle_problems
 from blast_env.site.content import Content, Sources
 from blast_env.site.facade import NamedBay, named_bays
 from blast_env.site.heights import default_air_height_m, height_notes
 from blast_env.site.problems import Problem, ScenarioError, problems_from
-from blast_env.site.scene import Charge
 from blast_env.site.sections import (
     AnySource,
     PointSource,

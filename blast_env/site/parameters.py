@@ -7,7 +7,7 @@ default is the value of the preset `ballistic`.
 import json
 from collections.abc import Callable, Mapping
 from hashlib import sha256
-from math import sqrt
+from math import ceil, prod, sqrt
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
 
@@ -22,6 +22,7 @@ from pydantic import (
 )
 
 from blast_env.errors import BlastEnvError, UnknownNameError
+from blast_env.geometry import Rectangle
 from blast_env.units import UNITS_PER_M
 
 Fraction = Annotated[StrictFloat, Field(ge=0.0, le=1.0)]
@@ -107,6 +108,14 @@ class AirParameters(BallParameters):
     spacing_units: Annotated[StrictFloat, Field(ge=0.0, le=1e6)] = 11.5
     jitter: Fraction = 1.0
     lattice_offset: Literal["centred", "random"] = "random"
+
+    def most_balls(self, site_m: Rectangle) -> int:
+        """Return the number of air balls on an empty site, the maximum for all its scenes."""
+        if self.spacing_units == 0.0:
+            return 0
+        site = site_m.scaled(UNITS_PER_M)
+        lengths = site.right - site.left, site.top - site.bottom
+        return prod(ceil(length / self.spacing_units) for length in lengths)
 
 
 class ContactParameters(Parameters):

@@ -29,6 +29,7 @@ from blast_env.errors import type_word
 from blast_env.geometry import Cell, Rectangle
 from blast_env.response.components import PaneSide
 from blast_env.response.facade import BAY_M, STOREY_M, Bay
+from blast_env.site.blast_site import WALLS, Charge, WallName
 from blast_env.site.parameters import PRESETS, SimulationParameters, preset, with_overrides
 from blast_env.site.presets import CHARGE_PRESETS, TNT_EQUIVALENTS, tnt_equivalent_kg
 from blast_env.site.problems import (
@@ -38,7 +39,6 @@ from blast_env.site.problems import (
     unknown_key,
     unknown_name,
 )
-from blast_env.site.scene import WALLS, Charge, WallName
 from blast_env.units import MODULE_SIDE_M
 from blast_env.values import plain_text
 

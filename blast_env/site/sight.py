@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
-from blast_env.site.scene import BlastSite
+from blast_env.site.blast_site import BlastSite
 
 _TOUCH: Final = 1e-6  # share of a line, within which contact with a block does not cut it
 

@@ -23,11 +23,11 @@ import numpy as np
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Element, Rectangle, stacked_runs, standing
+from blast_env.site.blast_site import Charge, WallName
 from blast_env.site.catalogue import element_text
 from blast_env.site.crash_rating import CrashRating
 from blast_env.site.driving import STEP_M, SpeedField, WayPoint, places_in, places_shape
 from blast_env.site.reach import Reach, ReachQuery, steps_of
-from blast_env.site.scene import Charge, WallName
 from blast_env.site.sections import (
     AnySource,
     AnyStructure,

@@ -12,8 +12,8 @@ import numpy as np
 
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle, WallLine
+from blast_env.site.blast_site import Charge, WallName
 from blast_env.site.boxes import box_distances_m
-from blast_env.site.scene import Charge, WallName
 from blast_env.site.sections import AnyStructure, PointM, VehicleSource
 
 _EQUAL_M: Final = 1e-6

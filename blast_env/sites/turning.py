@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from blast_env.site import AnyScenario, Scenario, find_scenario
-from blast_env.site.scene import WallName
+from blast_env.site.blast_site import WallName
 from blast_env.site.sections import PointM
 from blast_env.units import MODULE_SIDE_M
 

@@ -16,11 +16,11 @@ from blast_env.design.rules import random_layout, wall_near_building, wall_near_
 from blast_env.evaluation import BlastStore
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import draw_charge
+from blast_env.layout.build_site import draw_charge
 from blast_env.particles.run import EndReason
 from blast_env.runner import run_all
 from blast_env.site import Scenario, load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.tables import markdown_table
 from blast_env.units import MS_PER_S, PA_PER_KPA
 from studies.gas.cells import CellLoads, cell_loads, difference, engine_with

@@ -14,7 +14,7 @@ from blast_env.gas.settings import CELLS
 from blast_env.geometry import Layout
 from blast_env.runner import run_all
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.statistics import reductions
 from studies.gas.loads import impulse_until, protected_impulse_pa_s
 

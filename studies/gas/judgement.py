@@ -12,7 +12,7 @@ from blast_env.arrays import FloatArray
 from blast_env.evaluation import BlastEvaluator, LoadCase, SeedRange
 from blast_env.geometry import Layout
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.statistics import Estimate, mean_estimate, reductions
 
 PRESETS: Final[Mapping[str, str]] = MappingProxyType(

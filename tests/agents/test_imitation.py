@@ -33,7 +33,7 @@ from blast_env.evaluation import BlastEvaluator, Evaluators, LoadCaseSet
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, VehicleCharge, save_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 from tests.catalogue_sites import wide_yard
 from tests.vehicle_sites import gate_site

@@ -28,7 +28,7 @@ from blast_env.evaluation.cases import visible_case
 from blast_env.geometry import Piece
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.agents.sites import site
 from tests.catalogue_sites import ITEMS, item, yard
 from tests.design.search_cases import CALIBRATION

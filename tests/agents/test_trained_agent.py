@@ -21,7 +21,7 @@ from blast_env.envs.observations import GridObservation, Observable
 from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.layout import LayoutState
 from blast_env.site import PointSource, Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.agents.training_runs import hyperparameters, scenario_file, settings, small_scenario
 
 CHARGES = (Charge((2.0, 5.5), 100.0), Charge((2.0, 8.5), 100.0), None)

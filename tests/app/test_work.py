@@ -38,7 +38,7 @@ from blast_env.geometry import Layout
 from blast_env.report import StudyOptions
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import Scenario, load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.app.here import Here, rows_of
 from tests.gas_sites import WALL, glazed_hut, hut, site_document
 from tests.vehicle_sites import gate_site, vehicle_document

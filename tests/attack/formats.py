@@ -36,7 +36,7 @@ from blast_env.layout import LayoutFile, write_layout
 from blast_env.particles.calibration.model import load_calibration, save_calibration
 from blast_env.particles.parquet import _run_record, checked_table, write_parquet
 from blast_env.site import Scenario, load_scenario, save_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.agents.training_runs import SMALL, hyperparameters, settings, small_scenario
 from tests.io.importing.maps import BLOCK, LAYERS
 from tests.site.documents import full_document

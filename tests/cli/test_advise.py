@@ -26,7 +26,7 @@ from blast_env.evaluation.probability import LevelProbability
 from blast_env.geometry import Layout, Measure, standing
 from blast_env.layout import LayoutState, load_layout
 from blast_env.plots.cost_level import PricedDamage, cheapest
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.evaluation.test_response_objective import THREAT
 from tests.site.test_hardening import glazed_yard
 

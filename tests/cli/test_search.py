@@ -17,7 +17,7 @@ from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import SegmentSource
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.catalogue_sites import wide_yard
 from tests.design.search_cases import small_scenario
 

@@ -10,7 +10,7 @@ from blast_env.envs.strategies import SingleScenario
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation import Evaluators, compare, draw_threats, evaluate_layout
 from blast_env.site import PointSource
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.sites import HELD_OUT_SITES, SiteSource
 from tests.agents.training_runs import small_scenario
 

@@ -23,9 +23,9 @@ from blast_env.design.rules import (
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Layout, Piece
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import worst_places
+from blast_env.layout.build_site import worst_places
 from blast_env.site import PointSource, RectangleSource, Scenario, load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.agents.sites import site
 from tests.vehicle_sites import POSTS, gate_site, site_document, vehicle_document, vehicle_of
 

@@ -24,7 +24,7 @@ from blast_env.evaluation import BlastEvaluator, LoadCase
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.design.search_cases import (
     WatchedEvaluator,
     ballistic,

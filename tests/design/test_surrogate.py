@@ -51,7 +51,7 @@ from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, Scenario, load_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from studies.blast_table import COLUMNS
 from studies.surrogate import HeldOut, Recipe, verdict
 from tests.catalogue_sites import wide_yard

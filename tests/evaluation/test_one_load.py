@@ -16,7 +16,7 @@ from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.gas.oblique_walls import stepped_buildings
 from blast_env.report.loads import measure, targets_of
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.app.here import rows_of
 from tests.gas_sites import site_document
 

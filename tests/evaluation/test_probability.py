@@ -19,7 +19,7 @@ from blast_env.evaluation.probability import (
 from blast_env.evaluation.shared import consequences
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.sdof import impulses
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.gas_sites import WALL, glazed_hut
 
 CHARGE = Charge((2.0, 4.0), 0.1)

@@ -12,8 +12,8 @@ from blast_env.response.damage import damage_number, level_of, under_triangle
 from blast_env.response.facade import Bay, FilledBay, respond
 from blast_env.response.requirements import Requirement
 from blast_env.site import Scenario
+from blast_env.site.blast_site import Charge
 from blast_env.site.presets import NamedMass, tnt_equivalent_kg
-from blast_env.site.scene import Charge
 from tests.gas_sites import hut, site_document
 
 

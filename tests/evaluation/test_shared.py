@@ -11,7 +11,7 @@ from blast_env.evaluation.consequences import Consequences, bay_table
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.shared import consequences
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.report.sites import LAYOUT, glazed_hut
 
 CHARGE = Charge((2.0, 4.0), 5.0)

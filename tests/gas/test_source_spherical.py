@@ -15,7 +15,7 @@ from blast_env.gas.source import TNT, GasCharge, largest_radius_m, set_charge
 from blast_env.gas.spherical import DENSITY, ENERGY, PRODUCTS, SphericalBlast
 from blast_env.gas.spherical_stage import spherical_stage
 from blast_env.geometry import Rectangle
-from blast_env.site.scene import BlastSite, Charge, Gauge
+from blast_env.site.blast_site import BlastSite, Charge, Gauge
 
 Z = np.array([1.7, 2.2, 2.7, 3.5, 4.3, 5.4])
 

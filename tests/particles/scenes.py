@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 from blast_env.evaluation.engines import ParticleEngine
 from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
+from blast_env.particles.balls import Balls, CollisionType
 from blast_env.particles.pymunk.engine import PymunkRun
 from blast_env.particles.run import BallStates, BlastRun
-from blast_env.site.balls import Balls, CollisionType
+from blast_env.particles.scene import Scene
+from blast_env.site.blast_site import Charge, StructureOutline
 from blast_env.site.parameters import SimulationParameters, with_overrides
-from blast_env.site.scene import Charge, Scene, StructureOutline
-from blast_env.site.structure import ModularObstacle
 from blast_env.units import UNITS_PER_M
 
 EXPLOSIVE, AIR = CollisionType.ExplosionBall, CollisionType.AirBall
@@ -58,7 +58,7 @@ def wall(
 ) -> StructureOutline:
     """Return a protected structure with its lower left corner at `corner`, units."""
     return StructureOutline(
-        kind=ModularObstacle,
+        kind="ModularObstacle",
         name=name,
         corner_m=(corner[0] / UNITS_PER_M, corner[1] / UNITS_PER_M),
         rows=rows,

@@ -22,11 +22,11 @@ from scipy.ndimage import gaussian_filter1d
 from blast_env.arrays import FloatArray
 from blast_env.evaluation.engines.particles import EventEngine
 from blast_env.geometry import Rectangle
+from blast_env.particles.balls import Balls, air_lattice, explosion_fan
 from blast_env.particles.run import BallStates
-from blast_env.site.balls import Balls, air_lattice, explosion_fan
+from blast_env.particles.scene import Scene
+from blast_env.site.blast_site import Charge, StructureOutline
 from blast_env.site.parameters import SimulationParameters, with_overrides
-from blast_env.site.scene import Charge, Scene, StructureOutline
-from blast_env.site.structure import ModularObstacle
 from blast_env.units import UNITS_PER_M
 
 SPACING_UNITS: Final = 10.0
@@ -91,7 +91,7 @@ class FrontCase:
         air = air_lattice(parameters.air, site, [], centre, SPACING_UNITS + radius, rng)
         fan = explosion_fan(parameters.explosive, centre, rng)
         # A run ends when no structure can be reached: this one is in a corner.
-        far = StructureOutline(ModularObstacle, "far", (0.5, 0.5), 1, 1, True, 1.0, None, None)
+        far = StructureOutline("ModularObstacle", "far", (0.5, 0.5), 1, 1, True, 1.0, None, None)
         balls = Balls.concatenate((air, fan))
         return Scene(
             site_m=site.scaled(1.0 / UNITS_PER_M),

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env import load_scenario, simulate
+from blast_env.particles.balls import Balls
 from blast_env.particles.event import engine as event_engine
 from blast_env.particles.run import EndReason
-from blast_env.site.balls import Balls
+from blast_env.particles.scene import Scene
+from blast_env.site.blast_site import StructureOutline
 from blast_env.site.parameters import SimulationParameters
-from blast_env.site.scene import Scene, StructureOutline
 from tests.particles.scenes import (
     AIR,
     EVENT,

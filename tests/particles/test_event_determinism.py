@@ -15,11 +15,11 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, ParticleEngine
 from blast_env.evaluation.engines.particles import EventEngine, PymunkEngine
 from blast_env.geometry import Rectangle
+from blast_env.particles.balls import Balls, air_lattice, explosion_fan
 from blast_env.particles.event.engine import EventRun
 from blast_env.particles.run import BlastRun
-from blast_env.site.balls import Balls, air_lattice, explosion_fan
-from blast_env.site.scene import Scene
-from blast_env.site.structure import ModularObstacle
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import ModularObstacle, obstacle_of
 from blast_env.units import MODULE_SIDE_UNITS
 from tests.builders import point, site, square
 from tests.particles.scenes import AIR, EVENT, EXPLOSIVE, balls, finished, parameters, scene, wall
@@ -51,7 +51,7 @@ def blast(kind: str) -> Scene:
     settings = parameters(air=of_air, explosive=of_charge, contact=contact, stepping=stepping)
     rng = np.random.default_rng(11)
     facade, site = wall((46.0, 10.0), 20, 2, capacity=2000.0), Rectangle(0.0, 0.0, 64.0, 60.0)
-    air = air_lattice(settings.air, site, [facade.build().rectangle], (30.0, 30.0), 2.0, rng)
+    air = air_lattice(settings.air, site, [obstacle_of(facade).rectangle], (30.0, 30.0), 2.0, rng)
     fan = explosion_fan(settings.explosive, (30.0, 30.0), rng)
     return replace(
         scene(Balls.concatenate((air, fan)), [facade], settings), site_m=site.scaled(0.25)
@@ -202,7 +202,7 @@ def turned_blast(turn: Turn | None, air: dict[str, object], contact: dict[str, o
     rng = np.random.default_rng(5)
     corner, rows, columns = (20.0, -9.0), 10, 4
     cells = tuple((r, c) for r in range(rows) for c in range(columns) if (r, c) != (3, 0))
-    rectangle = wall(corner, rows, columns).build().rectangle
+    rectangle = obstacle_of(wall(corner, rows, columns)).rectangle
     lattice = air_lattice(of_parameters.air, SITE, [rectangle], (-7.3, 1.7), 2.0, rng)
     fan = explosion_fan(of_parameters.explosive, (-7.3, 1.7), rng)
     of_balls = Balls.concatenate((lattice, fan))
@@ -213,7 +213,7 @@ def turned_blast(turn: Turn | None, air: dict[str, object], contact: dict[str, o
             velocity=turn.points(of_balls.velocity),
         )
     # Single modules: a grid would number them in an order of its own.
-    parts = wall(corner, rows, columns, cells=cells).build().parts
+    parts = obstacle_of(wall(corner, rows, columns, cells=cells)).parts
     centres = np.array([(part.x, part.y) for part in parts])
     corners = (centres if turn is None else turn.points(centres)) - MODULE_SIDE_UNITS / 2.0
     modules = [

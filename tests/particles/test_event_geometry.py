@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.arrays import FloatArray
+from blast_env.particles.balls import Balls, distance_to_rectangle
 from blast_env.particles.run import BallStates, EndReason
-from blast_env.site.balls import Balls, distance_to_rectangle
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import obstacle_of
+from blast_env.site.blast_site import StructureOutline
 from blast_env.site.parameters import SimulationParameters
-from blast_env.site.scene import Scene, StructureOutline
 from tests.particles.scenes import (
     AIR,
     EVENT,
@@ -237,7 +239,7 @@ def clear_balls(draw: st.DrawFn, structure: StructureOutline, masses: st.SearchS
     places, speeds = st.tuples(PLACES, PLACES), st.tuples(SPEEDS, SPEEDS)
     ball = st.tuples(kinds, places, speeds, masses, RADII)
     drawn = draw(st.lists(ball, max_size=11))
-    rectangles = [part.rectangle for part in structure.build().parts]
+    rectangles = [part.rectangle for part in obstacle_of(structure).parts]
     kept = [(draw(kinds), (84.0, 84.0), (300.0, 0.5 + draw(SPEEDS)), draw(masses), draw(RADII))]
     for one in drawn:
         place = np.array([one[1]])

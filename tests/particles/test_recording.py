@@ -13,8 +13,10 @@ import pytest
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult, simulate
+from blast_env.particles.balls import CollisionType
 from blast_env.particles.parquet import METADATA_KEY, read_parquet, write_parquet
 from blast_env.particles.run import COLLISION_DTYPE, CollisionArray
+from blast_env.particles.structure import ModularObstacle
 from blast_env.particles.tables import (
     COLLISION_COLUMNS,
     MODULE_COLUMNS,
@@ -31,8 +33,6 @@ from blast_env.particles.workbook import (
 from blast_env.site import (
     Scenario,
 )
-from blast_env.site.balls import CollisionType
-from blast_env.site.structure import ModularObstacle
 from blast_env.tables import Column
 from tests.builders import block, point, site, square, zone
 from tests.design.search_cases import small_scenario

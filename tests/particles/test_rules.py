@@ -6,10 +6,10 @@ import pytest
 from blast_env import simulate
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine
 from blast_env.evaluation.engines.particles import PymunkEngine
+from blast_env.particles.balls import CollisionType
 from blast_env.particles.run import COLLISION_DTYPE, EndReason, incidence_angle_rad
-from blast_env.site.balls import CollisionType
+from blast_env.particles.scene import Scene
 from blast_env.site.parameters import SimulationParameters
-from blast_env.site.scene import Scene
 from tests.particles.scenes import (
     AIR,
     EVENT,

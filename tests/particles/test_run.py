@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from blast_env.evaluation.engines import CALIBRATED_ENGINES, ParticleEngine, simulate
 from blast_env.evaluation.engines.particles import PymunkEngine, find_particle_engine
 from blast_env.geometry import Rectangle
+from blast_env.particles.balls import CollisionType, air_lattice, explosion_fan
 from blast_env.particles.run import EndReason
+from blast_env.particles.scene import Scene
 from blast_env.site import Scenario
-from blast_env.site.balls import CollisionType, air_lattice, explosion_fan, lattice_capacity
-from blast_env.site.scene import Scene
-from blast_env.units import MODULE_SIDE_M
+from blast_env.units import MODULE_SIDE_M, UNITS_PER_M
 from tests.builders import block, point, site
 from tests.particles.scenes import AIR, EXPLOSIVE, balls, finished, parameters, scene, step_s, wall
 
@@ -65,7 +65,7 @@ def test_no_scene_has_more_air_than_its_capacity(seed: int, spacing: float, widt
     air, site = parameters(air={"spacing_units": spacing}).air, Rectangle(0.0, 0.0, width, 50.0)
     rng = np.random.default_rng(seed)
     lattice = air_lattice(air, site, [], (-99.0, -99.0), 1.0, rng)
-    assert len(lattice) <= lattice_capacity(air, site)
+    assert len(lattice) <= air.most_balls(site.scaled(1.0 / UNITS_PER_M))
 
 
 @pytest.mark.slow

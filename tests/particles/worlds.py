@@ -5,7 +5,7 @@ import numpy as np
 from blast_env.arrays import FloatArray
 from blast_env.particles.event.engine import run_world
 from blast_env.particles.event.state import RECORD_COLUMNS, RecordArray, World, world_of
-from blast_env.site.scene import Scene
+from blast_env.particles.scene import Scene
 
 
 class WorldRun:

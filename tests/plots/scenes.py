@@ -2,8 +2,8 @@ import numpy as np
 
 from blast_env.evaluation.engines import Blast
 from blast_env.particles.run import BallStates
+from blast_env.particles.scene import Scene
 from blast_env.site import Scenario
-from blast_env.site.scene import Scene
 from tests.builders import block, point, site, square, zone
 
 LAYOUT = tuple((row, 1) for row in range(2, 9))

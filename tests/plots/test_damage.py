@@ -17,7 +17,7 @@ from blast_env.response.buildings import LevelOfProtection, ground_thresholds
 from blast_env.response.components import Glazing, find_component
 from blast_env.response.facade import FacadeResponse, respond
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.catalogue_sites import WALL, yard_document
 
 CHARGE = Charge((2.0, 6.0), 5.0)

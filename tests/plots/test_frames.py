@@ -13,6 +13,8 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
+from blast_env.particles.balls import CollisionType
+from blast_env.particles.structure import load_colour
 from blast_env.plots.canvas import Frame
 from blast_env.plots.frames import FramePainter
 from blast_env.plots.placing import PlacingPainter, sources_text
@@ -20,8 +22,6 @@ from blast_env.plots.plan import BARRIER, EXPLOSIVE, FREE_CELL, PROTECTED
 from blast_env.plots.style import AIR
 from blast_env.plots.window import Window
 from blast_env.site import RectangleSource, SegmentSource
-from blast_env.site.balls import CollisionType
-from blast_env.site.structure import load_colour
 from blast_env.units import UNITS_PER_M
 from tests.plots.scenes import LAYOUT, balls_at_start, small_scenario
 

@@ -23,7 +23,7 @@ from blast_env.io.export import LayoutPlan
 from blast_env.io.export.dxf import drawing
 from blast_env.io.export.files import feature_collection
 from blast_env.layout import LayoutState, write_layout
-from blast_env.layout.build_scene import build_site, vehicle_reach
+from blast_env.layout.build_site import build_site, vehicle_reach
 from blast_env.plots.labels import Label, labels_of, settled_labels
 from blast_env.plots.placing import PlacingPainter, sources_text
 from blast_env.plots.plan import (

@@ -5,7 +5,7 @@ import pytest
 
 from blast_env.calibration import kingery_bulmash
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import build_site
+from blast_env.layout.build_site import build_site
 from blast_env.report.outcomes import Limit
 from blast_env.report.page import report_html
 from blast_env.report.peaks import CountedPeak, PeakSource, counted_peak

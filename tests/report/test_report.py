@@ -34,8 +34,8 @@ from blast_env.report.verdict import StudyVerdict
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.components import catalogue
 from blast_env.site import Scenario, save_scenario
+from blast_env.site.blast_site import Charge
 from blast_env.site.catalogue import Hardening
-from blast_env.site.scene import Charge
 from tests.catalogue_sites import WALL, yard
 from tests.report.sites import LAYOUT, glazed_hut, small_hut
 from tests.site.test_hardening import TAKEN, glazed_yard

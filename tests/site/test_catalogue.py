@@ -14,7 +14,9 @@ from blast_env.errors import LayoutError
 from blast_env.evaluation.engines import simulate
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutFile, LayoutState, load_layout, write_layout
-from blast_env.layout.build_scene import build_scene, build_site
+from blast_env.layout.build_site import build_site
+from blast_env.particles.scene import build_scene
+from blast_env.particles.structure import obstacle_of
 from blast_env.site import Scenario, ScenarioError, load_scenario, save_scenario, stock_barriers
 from tests.catalogue_sites import ITEMS, WALL, item, yard, yard_document
 from tests.site.documents import Document
@@ -279,7 +281,7 @@ def test_the_barrier_of_a_site_has_the_heights_of_its_pieces() -> None:
     assert barrier.cells == LayoutState.of(yard(), WALL).cells
     assert barrier.heights_m == (2.0,) * 6 + (1.0,)
     assert barrier.height_m == 2.0
-    pieces = [part.piece for part in barrier.build().parts]
+    pieces = [part.piece for part in obstacle_of(barrier).parts]
     assert pieces == ["wall_x4.250_y5.750"] * 3 + ["wall_x4.250_y7.250"] * 3 + [
         "post_x4.250_y4.750"
     ]

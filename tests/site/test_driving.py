@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from blast_env.design.bollards import line_of_posts
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import vehicle_drive, worst_places
+from blast_env.layout.build_site import vehicle_drive, worst_places
 from blast_env.site import Scenario, ScenarioError
 from blast_env.site.crash_rating import CrashRating
 from blast_env.site.driving import KM_H_PER_M_S, STEP_M, SpeedField

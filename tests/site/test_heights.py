@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blast_env.layout import usable_cells
-from blast_env.layout.build_scene import build_scene, build_site, draw_charge
+from blast_env.layout.build_site import build_site, draw_charge
+from blast_env.particles.scene import build_scene
 from blast_env.site import Scenario, ScenarioError, bundled_scenarios, load_scenario
-from blast_env.site.scene import WALLS, Charge, Gauge
+from blast_env.site.blast_site import WALLS, Charge, Gauge
 from tests.site.documents import (
     Document,
     KeyPath,

@@ -14,8 +14,8 @@ from blast_env.site import (
     SegmentSource,
     load_scenario,
 )
+from blast_env.site.blast_site import Charge
 from blast_env.site.parameters import preset
-from blast_env.site.scene import Charge
 from tests.site.documents import Document, changed, full_document, minimal_document
 
 

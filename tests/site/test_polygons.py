@@ -20,11 +20,12 @@ from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.dxf import clearance_outlines
 from blast_env.layout import LayoutState, usable_cells
-from blast_env.layout.build_scene import build_scene, vehicle_reach, worst_places
+from blast_env.layout.build_site import vehicle_reach, worst_places
+from blast_env.particles.scene import build_scene
 from blast_env.plots.plan import Kinds, site_features
 from blast_env.plots.site_picture import site_picture
 from blast_env.site import Scenario, ScenarioError
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from blast_env.site.worst_places import stand_off_m
 from blast_env.sites.turning import turned
 from tests.builders import block

@@ -3,8 +3,8 @@
 import numpy as np
 
 from blast_env.geometry import Layout
-from blast_env.layout.build_scene import build_site
-from blast_env.site.scene import OUTWARDS, Charge
+from blast_env.layout.build_site import build_site
+from blast_env.site.blast_site import OUTWARDS, Charge
 from blast_env.site.sight import in_sight
 from tests.gas_sites import WALL, hut
 

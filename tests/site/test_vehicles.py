@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from blast_env.arrays import FloatArray
 from blast_env.geometry import Rectangle
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import charge_against, vehicle_reach, worst_places
+from blast_env.layout.build_site import charge_against, vehicle_reach, worst_places
 from blast_env.site import AnyCharge, VehicleCharge
+from blast_env.site.blast_site import Charge
 from blast_env.site.reach import Reach
-from blast_env.site.scene import Charge
 from blast_env.site.sections import Entry, Site, VehicleSource
 from blast_env.site.vehicles import Obstacles, VehicleGround, ranked
 from tests.vehicle_sites import POSTS, gate_site, vehicle_document, vehicle_of

@@ -13,7 +13,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.evaluation import draw_threats
 from blast_env.geometry import Piece, Rectangle
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import worst_places
+from blast_env.layout.build_site import worst_places
 from blast_env.site import Scenario
 from blast_env.sites import (
     FAMILIES,

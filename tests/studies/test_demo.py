@@ -13,7 +13,7 @@ from blast_env.evaluation.engines import find_engine
 from blast_env.io.export import SUFFIXES
 from blast_env.layout import LayoutState
 from blast_env.site import Scenario, save_scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from studies.demo import (
     AGENT,
     NOTHING,

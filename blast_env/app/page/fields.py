@@ -5,7 +5,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 from blast_env.app.edits import Document, SiteThing, ThingKind, section_of
 from blast_env.site import Scenario
-from blast_env.site.scene import WALLS, WallName
+from blast_env.site.blast_site import WALLS, WallName
 from blast_env.site.sections import FacadeSection
 
 Form = Literal["number", "integer", "text", "switch", "walls", "side", "of", "glazing", "wall"]

@@ -15,7 +15,7 @@ from blast_env.evaluation.engines import BlastLoads, Engine, StructureLoad, find
 from blast_env.evaluation.engines.contract import EngineBlast
 from blast_env.evaluation.standing import LoadStanding, Stood
 from blast_env.geometry import Element
-from blast_env.layout.build_scene import charge_against
+from blast_env.layout.build_site import charge_against
 from blast_env.site import AnyCharge, Scenario
 
 SURROGATE: Final = "surrogate"

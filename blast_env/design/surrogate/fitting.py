@@ -33,7 +33,7 @@ from blast_env.design.surrogate.walls import FEATURES, INPUTS, site_of
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Element, Piece
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 MEMBERS: Final = 5
 _BATCH: Final = 6

@@ -25,7 +25,7 @@ from blast_env.errors import BlastEnvError
 from blast_env.files import write_atomically
 from blast_env.geometry import Element
 from blast_env.response.damage import BayDamage
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 IntArray = NDArray[np.int64]
 AnyFloats = NDArray[np.floating[Any]]

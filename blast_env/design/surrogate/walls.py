@@ -17,8 +17,8 @@ from blast_env.evaluation.engines.contract import structure_response
 from blast_env.geometry import Element, Measure, Rectangle, WallLine, standing
 from blast_env.response.damage import BayDamage, TriangularLoads
 from blast_env.site import AnyStructure, Scenario
+from blast_env.site.blast_site import OUTWARDS, Charge
 from blast_env.site.facade import NamedBay
-from blast_env.site.scene import OUTWARDS, Charge
 from blast_env.site.terraces import ground_below_m, is_open_below
 from blast_env.units import MODULE_SIDE_M
 

@@ -58,7 +58,7 @@ from blast_env.gas.tables import (
     wall_table,
 )
 from blast_env.geometry import Element, layout_text
-from blast_env.layout.build_scene import build_site, draw_threat, outlines
+from blast_env.layout.build_site import build_site, draw_threat, outlines
 from blast_env.particles.calibration.model import ScaledImpulse
 from blast_env.particles.run import EndReason
 from blast_env.provenance import versions
@@ -72,7 +72,7 @@ from blast_env.site import (
     VehicleCharge,
     find_scenario,
 )
-from blast_env.site.scene import WALLS, BlastSite, Charge
+from blast_env.site.blast_site import WALLS, BlastSite, Charge
 from blast_env.site.sight import in_sight
 from blast_env.site.zone import source_bounds_m
 from blast_env.statistics import counted_parts, mean_over_area

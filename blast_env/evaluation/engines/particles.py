@@ -23,7 +23,6 @@ from blast_env.evaluation.engines.contract import (
 )
 from blast_env.evaluation.standing import LoadStanding, Stood
 from blast_env.geometry import Element, layout_text
-from blast_env.layout.build_scene import build_scene
 from blast_env.particles.calibration.model import (
     Calibration,
     CalibrationError,
@@ -32,11 +31,11 @@ from blast_env.particles.calibration.model import (
     scenario_calibration,
 )
 from blast_env.particles.run import BallStates, BlastRun, CollisionArray, EndReason
+from blast_env.particles.scene import Scene, build_scene
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
+from blast_env.particles.structure import ModularObstacle
 from blast_env.provenance import versions
 from blast_env.site import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
-from blast_env.site.scene import Scene
-from blast_env.site.structure import ModularObstacle
 from blast_env.values import path_of
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import

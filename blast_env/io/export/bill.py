@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from blast_env.geometry import Element, Layout, Measure, Piece
 from blast_env.layout import LayoutState, check_layout
-from blast_env.layout.build_scene import barrier_outline
+from blast_env.layout.build_site import barrier_outline
+from blast_env.particles.structure import ModularPart, obstacle_of
 from blast_env.plots.plan import Feature, rounded_m, site_features
 from blast_env.provenance import package_version
 from blast_env.site import ScenarioField
-from blast_env.site.scene import Charge
-from blast_env.site.structure import ModularPart
+from blast_env.site.blast_site import Charge
 from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M
 
@@ -51,7 +51,7 @@ class LayoutPlan:
         """The modules, in the order of the layout, with their names in the tables of a blast."""
         if self.scenario.build_zone is None:
             return ()
-        return tuple(barrier_outline(self.scenario, self.layout).build().parts)
+        return tuple(obstacle_of(barrier_outline(self.scenario, self.layout)).parts)
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:

@@ -13,7 +13,6 @@ from pydantic import ConfigDict, Field, TypeAdapter
 from scipy.special import stdtrit
 
 from blast_env.errors import BlastEnvError, UnknownNameError
-from blast_env.layout.build_scene import build_scene
 from blast_env.particles.calibration.laws import (
     Fit,
     FitMetrics,
@@ -33,6 +32,7 @@ from blast_env.particles.calibration.model import (
     SimulatedQuantity,
 )
 from blast_env.particles.calibration.references import kingery_bulmash, paper_ufc_column
+from blast_env.particles.scene import build_scene
 from blast_env.particles.start import STARTS, VERSIONS
 from blast_env.provenance import package_version
 from blast_env.runner import as_completed

@@ -21,12 +21,12 @@ from blast_env.documents import DocumentError, checked_as, parse_json, read_text
 from blast_env.errors import BlastEnvError, UnknownNameError, alternatives, type_word, value_text
 from blast_env.files import write_text
 from blast_env.geometry import Rectangle
+from blast_env.particles.balls import distance_to_rectangle
 from blast_env.particles.calibration.laws import LinearLaw, PowerLaw, ProportionalLaw, ScalingLaw
+from blast_env.particles.structure import ModularObstacle
 from blast_env.site import Scenario
-from blast_env.site.balls import distance_to_rectangle
+from blast_env.site.blast_site import Charge
 from blast_env.site.parameters import SimulationParameters, parameters_digest
-from blast_env.site.scene import Charge
-from blast_env.site.structure import ModularObstacle
 from blast_env.units import MODULE_SIDE_M, PA_PER_PSI
 from blast_env.values import path_of
 

@@ -38,7 +38,7 @@ from blast_env.particles.event.state import (
     world_of,
 )
 from blast_env.particles.run import COLLISION_DTYPE, BallStates, CollisionLog, EndReason
-from blast_env.site.scene import Scene
+from blast_env.particles.scene import Scene
 
 # Reasons why the loop returns.
 UNTIL: Final = 0

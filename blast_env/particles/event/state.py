@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from blast_env.errors import BlastEnvError
 from blast_env.geometry import Rectangle
-from blast_env.site.balls import Balls, CollisionType
-from blast_env.site.scene import Scene
-from blast_env.site.structure import ModularPart, wall_surface
+from blast_env.particles.balls import Balls, CollisionType
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import ModularPart, wall_surface
 from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
 
 RecordArray = NDArray[np.void]

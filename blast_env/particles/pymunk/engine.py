@@ -10,6 +10,7 @@ import pymunk
 from numpy.typing import NDArray
 
 from blast_env.arrays import IntArray
+from blast_env.particles.balls import CollisionType
 from blast_env.particles.pymunk.space import (
     HALF,
     OUTWARD,
@@ -23,8 +24,7 @@ from blast_env.particles.pymunk.space import (
     height_above,
 )
 from blast_env.particles.run import BallStates, CollisionLog, EndReason, can_reach
-from blast_env.site.balls import CollisionType
-from blast_env.site.scene import Scene
+from blast_env.particles.scene import Scene
 
 _TOO_FAST: Final = 2.0
 """Ratio of a speed to the design speed of the step up to which the step is kept.

@@ -14,10 +14,10 @@ import pymunk.batch
 from numpy.typing import NDArray
 
 from blast_env.arrays import FloatArray, IntArray
-from blast_env.site.balls import Balls, CollisionType
+from blast_env.particles.balls import Balls, CollisionType
+from blast_env.particles.scene import Scene
+from blast_env.particles.structure import Border, ModularObstacle, ModularPart, wall_surface
 from blast_env.site.parameters import BallParameters, SimulationParameters
-from blast_env.site.scene import Scene
-from blast_env.site.structure import Border, ModularObstacle, ModularPart, wall_surface
 from blast_env.units import MODULE_SIDE_UNITS
 
 CHARGE_GROUP: Final = 1

@@ -19,7 +19,7 @@ from blast_env.io.export.dxf import key_of, note_lines, texts_of
 from blast_env.layout import LayoutState
 from blast_env.plots.plan import Kinds
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 GATE = load_scenario("perimeter_gate")  # a clearance and an access way
 JUNCTION = load_scenario("street_junction")  # a budget

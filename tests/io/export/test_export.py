@@ -18,10 +18,10 @@ from blast_env.errors import BlastEnvError
 from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout, export_layouts
 from blast_env.io.export.bill import MODULE_COLUMNS
 from blast_env.layout import LayoutFile, load_layout
-from blast_env.layout.build_scene import build_scene
+from blast_env.particles.scene import build_scene
 from blast_env.plots.plan import SITE_KINDS
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 
 COURTYARD = load_scenario("courtyard")
 LAYOUT = ((12, 3), (10, 0), (11, 0))  # not sorted: the order of placing is kept

@@ -14,9 +14,10 @@ from blast_env import load_scenario
 from blast_env.io.export import LayoutPlan, export_layout
 from blast_env.io.export.bill import BILL_COLUMNS, PIECE_COLUMNS
 from blast_env.layout import LayoutState
-from blast_env.layout.build_scene import build_site
+from blast_env.layout.build_site import build_site
+from blast_env.particles.structure import obstacle_of
 from blast_env.site import Scenario
-from blast_env.site.scene import Charge
+from blast_env.site.blast_site import Charge
 from tests.catalogue_sites import WALL, yard
 
 DUCT: dict[str, Any] = {
@@ -50,7 +51,7 @@ def test_csv_has_every_piece_in_metres(tmp_path: Path) -> None:
 
 
 def test_pieces_have_the_names_of_the_blast_s_tables(tmp_path: Path) -> None:
-    parts = build_site(yard(), WALL).obstacles()[-1].parts
+    parts = obstacle_of(build_site(yard(), WALL).structures[-1]).parts
     table = read(export_layout(plan(), tmp_path / "layout.csv"))
     assert list(table["piece"]) == list(dict.fromkeys(part.piece for part in parts))
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import ceil, prod
 from typing import Final
 
 import numpy as np
@@ -168,16 +167,6 @@ def distance_to_rectangle(position: FloatArray, rectangle: Rectangle) -> FloatAr
     outside = np.maximum(np.maximum(low - position, position - high), 0.0)
     distance: FloatArray = np.hypot(outside[:, 0], outside[:, 1])
     return distance
-
-
-def lattice_capacity(parameters: AirParameters, site: Rectangle) -> int:
-    """Return the number of air balls on an empty site, the maximum for all its scenes."""
-    if parameters.spacing_units == 0.0:
-        return 0
-    return prod(
-        ceil(length / parameters.spacing_units)
-        for length in (site.right - site.left, site.top - site.bottom)
-    )
 
 
 def _centring_share(length: float, spacing: float) -> float:

@@ -1,17 +1,11 @@
-"""Scenes: all input of an engine for one blast, as plain arrays."""
+"""The site of one blast: the input common to all engines, in metres."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-import numpy as np
-
 from blast_env.geometry import Cell, Rectangle, WallLine
-from blast_env.site.balls import Balls
-from blast_env.site.parameters import SimulationParameters
-from blast_env.site.structure import BARRIER_NAME, ModularObstacle, module_name
-from blast_env.units import MODULE_SIDE_M, UNITS_PER_M, in_units
+from blast_env.units import MODULE_SIDE_M
 
 if TYPE_CHECKING:  # shapely takes a tenth of a second to import
     from blast_env.site.footprint import Footprint
@@ -28,6 +22,15 @@ OUTWARDS: Final[Mapping[str, tuple[float, float]]] = {
     "north": (0.0, 1.0),
 }
 """Outward normal of each wall."""
+
+
+BARRIER_NAME: Final = "barrier"
+"""Name of the structure formed by the modules of a layout."""
+
+
+def module_name(x_m: float, y_m: float) -> str:
+    """Return the identifier of the module with this centre."""
+    return f"x{x_m:.3f}_y{y_m:.3f}"
 
 
 class Charge(NamedTuple):
@@ -55,7 +58,7 @@ class BlastSite:
     Attributes:
         site_m: The simulated area.
         charge: The charge.
-        structures: The structures and, if there is one, the barrier; see `obstacles`.
+        structures: The structures and, if there is one, the barrier.
         gauges: Virtual gauges; the particle engines ignore them.
         air_height_m: Height of the simulated air; the particle engines ignore it.
         build_zone: The whole build zone as if full of modules, independent of the layout; `None`
@@ -68,53 +71,6 @@ class BlastSite:
     gauges: tuple[Gauge, ...] = ()
     air_height_m: float = 12.0
     build_zone: "StructureOutline | None" = None
-
-    def obstacles(self) -> tuple[ModularObstacle, ...]:
-        """Return new obstacles without hits, in the order of `structures`."""
-        return tuple(outline.build() for outline in self.structures)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Scene(BlastSite):
-    """The initial state of one blast of particles; the balls are in simulation units.
-
-    Attributes:
-        balls: All balls; air first, then the charge.
-        parameters: Parameters of the blast model for this charge.
-    """
-
-    balls: Balls
-    parameters: SimulationParameters
-
-    @cached_property
-    def site(self) -> Rectangle:
-        """The simulated area, units."""
-        return self.site_m.scaled(UNITS_PER_M)
-
-    @cached_property
-    def charge_centre(self) -> tuple[float, float]:
-        """Centre of the charge, units."""
-        return in_units(self.charge.position_m)
-
-    @cached_property
-    def impulse_quantum(self) -> float:
-        """The power of two, simulation units, of which every recorded impulse is a multiple.
-
-        It is about 2^-36 of the largest initial momentum, which is negligible. Sums of recorded
-        impulses, up to 2^17 such momenta, are then exact in any order and partition: the rewards
-        of an episode add up to the impulse of the blast.
-        """
-        momentum = self.balls.mass * np.hypot(*self.balls.velocity.T)
-        return float(2.0 ** (np.ceil(np.log2(momentum.max())) - 36))
-
-    @property
-    def largest_exact_impulse(self) -> float:
-        """Bound below which sums of recorded impulses are exact, simulation units."""
-        return self.impulse_quantum * 2.0**53
-
-    def round_impulse(self, impulse: float) -> float:
-        """Return an impulse rounded to a multiple of the quantum."""
-        return round(impulse / self.impulse_quantum) * self.impulse_quantum
 
 
 class Block(NamedTuple):
@@ -135,8 +91,9 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class StructureOutline:
-    """A structure before any blast, in metres; attributes as in `ModularObstacle`.
+    """A structure before any blast; attributes as in `particles.structure.ModularObstacle`.
 
+    `kind` is the name of its class in the particle model.
     `footprint` is its polygon, `None` for a rectangle and for a barrier.
 
     Six more are for gas dynamics: `height_m`, the height of its top, `None` for as high as the air;
@@ -145,7 +102,7 @@ class StructureOutline:
     `is_lasting`, whether it is present in every layout.
     """
 
-    kind: type[ModularObstacle]
+    kind: Literal["ModularObstacle", "ConcreteSquare"]
     name: str
     corner_m: tuple[float, float]
     rows: int
@@ -228,18 +185,4 @@ class StructureOutline:
             bottom + min(rows) * side,
             left + (max(columns) + 1) * side,
             bottom + (max(rows) + 1) * side,
-        )
-
-    def build(self) -> ModularObstacle:
-        """Return the obstacle with unloaded parts."""
-        return self.kind(
-            name=self.name,
-            corner=in_units(self.corner_m),
-            rows=self.rows,
-            columns=self.columns,
-            protected=self.protected,
-            weight=self.weight,
-            cells=self.cells,
-            capacity=self.capacity,
-            pieces=self.pieces,
         )

@@ -1,35 +1,25 @@
-"""Conversion of a scenario to the site of one blast, and to the scene of a particle engine."""
+"""The site of one blast, from a scenario, a layout and a charge."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from blast_env.errors import BlastEnvError
-from blast_env.geometry import Element, Layout, Rectangle, standing
+from blast_env.geometry import Element, Layout, standing
 from blast_env.layout import LayoutState, check_layout, usable_cells
 from blast_env.site import (
     AnyCharge,
-    PointSource,
-    Problem,
     Scenario,
-    ScenarioError,
     VehicleCharge,
     VehicleSource,
 )
-from blast_env.site.balls import Balls, air_lattice, explosion_fan
-from blast_env.site.boxes import TOLERANCE_M
+from blast_env.site.blast_site import BARRIER_NAME, BlastSite, Charge, Gauge, StructureOutline
 from blast_env.site.heights import highest_top_m
-from blast_env.site.parameters import SimulationParameters, for_charge
 from blast_env.site.reach import Reach
-from blast_env.site.scene import BlastSite, Charge, Gauge, Scene, StructureOutline
 from blast_env.site.sections import AnyStructure, ConcreteSquareSection
-from blast_env.site.structure import BARRIER_NAME, ConcreteSquare, ModularObstacle
 from blast_env.site.terraces import ground_below_m
 from blast_env.site.vehicles import NOTHING, Drive, Obstacles, obstacles_of
 from blast_env.site.worst_places import WorstPlaces
-from blast_env.site.zone import distance_m
-from blast_env.units import UNITS_PER_M, in_units
 from blast_env.values import checked_seed
 
 
@@ -152,57 +142,6 @@ def build_site(
     )
 
 
-def build_scene(
-    scenario: Scenario,
-    layout: Sequence[Element] = (),
-    seed: int = 0,
-    charge: AnyCharge | None = None,
-) -> Scene:
-    """Return the scene of one blast of particles, which is two-dimensional.
-
-    Args:
-        scenario: The scenario.
-        layout: (row, column) of the build-zone cells with a barrier module, or pieces.
-        seed: Seed of the charge (if the scenario has several), the fan's phase and the air's
-            jitter. None of them depends on the barrier.
-        charge: The charge, instead of one drawn from the scenario.
-
-    Raises:
-        LayoutError: If the layout does not fit the build zone, or the charge.
-        ScenarioError: If the charge is not clear of a structure or the border, or is over a roof:
-            without heights it would be inside the structure; or a structure begins above the
-            ground, or is a terrace.
-        BlastEnvError: If the mass of the charge is out of bounds of the parameters.
-        ValueError: If the seed is negative.
-    """
-    base = build_site(scenario, layout, seed, charge)
-    if any(each.base_m or each.carries for each in scenario.structures):
-        scenario.check_for_particles()
-    _check_not_over_a_roof(scenario, base.charge)
-    parameters = _parameters_for(scenario, base.charge)
-    _, fan_rng, air_rng = random_streams(seed)
-    centre = in_units(base.charge.position_m)
-    air = air_lattice(
-        parameters.air,
-        base.site_m.scaled(UNITS_PER_M),
-        _solid_rectangles(base.structures),
-        centre,
-        parameters.explosive.offset_units + parameters.explosive.radius_units,
-        air_rng,
-    )
-    fan = explosion_fan(parameters.explosive, centre, fan_rng)
-    return Scene(
-        site_m=base.site_m,
-        charge=base.charge,
-        balls=Balls.concatenate((air, fan)),
-        structures=base.structures,
-        gauges=base.gauges,
-        air_height_m=base.air_height_m,
-        build_zone=base.build_zone,
-        parameters=parameters,
-    )
-
-
 def _check_clear(scenario: Scenario, placement: LayoutState) -> None:
     """Refuse a layout with a module on the charge, the only condition that a charge can break.
 
@@ -212,48 +151,6 @@ def _check_clear(scenario: Scenario, placement: LayoutState) -> None:
     usable = usable_cells(scenario)
     if not all(usable[cell] for cell in placement.cells):
         check_layout(scenario, placement.layout)
-
-
-def _parameters_for(scenario: Scenario, charge: AnyCharge) -> SimulationParameters:
-    """Return the particles' parameters for a charge, whose mass has bounds."""
-    try:
-        return for_charge(scenario.parameters, charge.tnt_kg)
-    except BlastEnvError as error:
-        raise BlastEnvError(
-            f"{scenario.name}: charge: {error}; engine 'gas' takes this charge"
-        ) from error
-
-
-def _check_not_over_a_roof(scenario: Scenario, charge: Charge) -> None:
-    """Refuse a raised charge that is inside a structure in plan.
-
-    Raises:
-        ScenarioError: If it is.
-    """
-    if charge.height_m == 0.0:
-        return
-    x_m, y_m = charge.position_m
-    place = PointSource.at(charge)
-    for structure in scenario.structures:
-        away_m = min(distance_m(place, box) for box in structure.boxes_m)
-        if away_m < scenario.charge_radius_m - TOLERANCE_M:
-            message = (
-                f"is at ({x_m:g}, {y_m:g}) m, {charge.height_m:g} m high, over {structure.name!r}"
-                f" of {structure.height_m:g} m: the particle engines know no heights and would put"
-                " it inside, must be clear of it in plan, or the engine one with heights"
-            )
-            raise ScenarioError(scenario.name, [Problem("charge", message)])
-
-
-def _solid_rectangles(structures: Sequence[StructureOutline]) -> list[Rectangle]:
-    """Return rectangles that cover the modules, in simulation units."""
-    rectangles: list[Rectangle] = []
-    for outline in structures:
-        if not outline.is_barrier:
-            rectangles.extend(box.scaled(UNITS_PER_M) for box in outline.boxes_m)
-        else:
-            rectangles.extend(part.rectangle for part in outline.build().parts)
-    return rectangles
 
 
 def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[StructureOutline, ...]:
@@ -269,7 +166,7 @@ def outlines(scenario: Scenario, layout: Iterable[Element] = ()) -> tuple[Struct
 def _outline(section: AnyStructure, *, is_lasting: bool) -> StructureOutline:
     is_square = isinstance(section, ConcreteSquareSection)
     return StructureOutline(
-        kind=ConcreteSquare if is_square else ModularObstacle,
+        kind="ConcreteSquare" if is_square else "ModularObstacle",
         name=section.name,
         corner_m=section.corner_m,
         rows=section.rows,
@@ -307,7 +204,7 @@ def barrier_outline(scenario: Scenario, layout: Layout) -> StructureOutline:
         for module, base_m in zip(modules, bases_m, strict=True)
     ]
     return StructureOutline(
-        kind=ModularObstacle,
+        kind="ModularObstacle",
         name=BARRIER_NAME,
         corner_m=zone.corner_m,
         rows=zone.rows,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 
 from blast_env.arrays import BoolArray, FloatArray
 from blast_env.geometry import Rectangle
-from blast_env.site.balls import CollisionType
-from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M
+from blast_env.particles.balls import CollisionType
+from blast_env.site.blast_site import BARRIER_NAME, StructureOutline, module_name
+from blast_env.units import MODULE_SIDE_UNITS, UNITS_PER_M, in_units
 
 _HALF: Final = MODULE_SIDE_UNITS / 2.0
 _BEYOND: Final = 1e-6  # distance beyond an edge at which modules are looked up, units
@@ -107,9 +109,6 @@ def _lattices(centres: FloatArray) -> Iterator[_Lattice]:
 
 Colour = tuple[int, int, int]
 
-BARRIER_NAME: Final = "barrier"
-"""Name of the structure formed by the modules of a layout."""
-
 
 class LoadColours(NamedTuple):
     """Colours of a module at no, half and full load, for interpolation."""
@@ -117,11 +116,6 @@ class LoadColours(NamedTuple):
     unloaded: Colour = (236, 226, 198)
     half: Colour = (240, 128, 48)
     full: Colour = (122, 4, 46)
-
-
-def module_name(x_m: float, y_m: float) -> str:
-    """Return the identifier of the module with this centre."""
-    return f"x{x_m:.3f}_y{y_m:.3f}"
 
 
 @dataclass(slots=True)
@@ -320,6 +314,26 @@ class ConcreteSquare(ModularObstacle):
                 "must have as many rows as columns"
             )
         super().__post_init__()
+
+
+_CLASSES: Final = MappingProxyType(
+    {each.__name__: each for each in (ModularObstacle, ConcreteSquare)}
+)
+
+
+def obstacle_of(outline: StructureOutline) -> ModularObstacle:
+    """Return the obstacle of a structure, with unloaded parts."""
+    return _CLASSES[outline.kind](
+        name=outline.name,
+        corner=in_units(outline.corner_m),
+        rows=outline.rows,
+        columns=outline.columns,
+        protected=outline.protected,
+        weight=outline.weight,
+        cells=outline.cells,
+        capacity=outline.capacity,
+        pieces=outline.pieces,
+    )
 
 
 @dataclass(frozen=True)
