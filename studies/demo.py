@@ -44,7 +44,7 @@ from blast_env.evaluation.engines import JUDGE
 from blast_env.evaluation.engines.gas import GasBlast
 from blast_env.files import make_folder
 from blast_env.geometry import Layout
-from blast_env.io.export import LayoutPlan, export_layouts
+from blast_env.io.export import LayoutPlan, export_to
 from blast_env.layout import LayoutState
 from blast_env.plots.figures import save_figure
 from blast_env.plots.gas import facades
@@ -440,7 +440,7 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
         save_figure(facades(protected, beside=unprotected), out / "facade.png"),
         save_figure(site_picture(scenario, layout), out / "site.png"),
         protected.to_excel(out / "loads.xlsx"),
-        *export_layouts({"layout": plan}, out),
+        *export_to(plan, out),
     ]
 
 

@@ -43,8 +43,8 @@ _JUDGED_UNSEEN: Final = 2
 _DRAWS: Final = 16
 """Draws that find every place where the site has only a few."""
 
-_GENERATED: Final = "site_"
-"""Prefix of the names of generated sites, before the seed."""
+_GENERATED: Final = MappingProxyType({"site": ITEM_SITES, **{each: each for each in FAMILIES}})
+"""The family of generated sites by the first part of their names; the seed follows."""
 
 MOST_PLACES: Final = 1000
 """Most known charges of one site."""
@@ -60,7 +60,8 @@ class Definition:
     """Definition of a problem. It never changes; a changed problem is a new version.
 
     Attributes:
-        site: Bundled name, path, or `site_SEED` for a generated site with heights and a catalogue.
+        site: Bundled name, path, or FAMILY_SEED for a generated site, such as `sites_3`;
+            `site_SEED` is one with heights and a catalogue.
         family: Knowledge of the charge.
         place: Number of the charge in the family `known`, from 1: one of each of the site's sources
             in turn, then another of each.
@@ -81,8 +82,9 @@ class Definition:
     @cached_property
     def scenario(self) -> Scenario:
         """The site."""
-        if self.site.startswith(_GENERATED):
-            return generate_site(int(self.site.removeprefix(_GENERATED)), FAMILIES[ITEM_SITES])
+        family, _, seed = self.site.rpartition("_")
+        if family in _GENERATED and seed.isdecimal():
+            return generate_site(int(seed), FAMILIES[_GENERATED[family]])
         return load_scenario(self.site)
 
     @cached_property
@@ -144,9 +146,9 @@ _PROBLEMS: Final = (
     Definition("school_and_clinic", "known"),
     Definition("school_and_clinic", "known", 3),
     Definition("hotel_forecourt", "known"),
-    *(Definition(f"{_GENERATED}{seed}", "known") for seed in (6117, 6124, 6127, 6143, 6226)),
+    *(Definition(f"site_{seed}", "known") for seed in (6117, 6124, 6127, 6143, 6226)),
     Definition("hotel_forecourt", "vehicle"),
-    Definition(f"{_GENERATED}6103", "unseen"),
+    Definition("site_6103", "unseen"),
     Definition("guard_post", "response"),
 )
 
@@ -171,22 +173,26 @@ def find_definition(name: str) -> Definition:
 def site_problems(
     scenario: str | Path, most: int = 16, *, is_hidden: bool = False
 ) -> tuple[Definition, ...]:
-    """Return problems on a site of any scenario file.
+    """Return problems on a site of any scenario file, or on generated sites.
 
     Args:
-        scenario: Bundled name or path.
-        most: Largest number of charges, each a problem. Fixed charges count once each.
-        is_hidden: Whether one problem has all charges instead.
+        scenario: Bundled name or path, or a family of generated sites, for a problem on each of the
+            first sites held out from training.
+        most: Largest number of charges, each a problem, or of sites. Fixed charges count once each.
+        is_hidden: Whether one problem has all charges of a site instead.
 
     Raises:
         BlastEnvError: If the file is invalid, it has no build zone, or `most` is out of bounds.
     """
     site = str(scenario)
+    count = whole_number("cases", most, 1, MOST_PLACES)
+    if site in FAMILIES:
+        kind: Family = "unseen" if is_hidden else "known"
+        return tuple(Definition(f"{site}_{seed}", kind) for seed in range(count))
     found = Definition(site, "vehicle" if is_hidden else "known")
     found.scenario.zone  # noqa: B018  # refuses a scenario without one
     if is_hidden:
         return (found if found.scenario.vehicles else Definition(site, "hidden"),)
-    count = whole_number("cases", most, 1, MOST_PLACES)
     count = min(count, len(fixed_charges(found.scenario)) or count)
     return tuple(Definition(site, "known", place) for place in range(1, count + 1))
 
@@ -211,4 +217,4 @@ def secret_sites(secret: str, count: int) -> tuple[Definition, ...]:
         drawn = sha256(f"{secret}/{index}".encode()).digest()
         # Beyond the seeds of training and of the public problems.
         seeds.append(2**_SECRET_BITS + int.from_bytes(drawn, "big") % 2**_SECRET_BITS)
-    return tuple(Definition(f"{_GENERATED}{seed}", "unseen") for seed in seeds)
+    return tuple(Definition(f"site_{seed}", "unseen") for seed in seeds)

@@ -16,7 +16,7 @@ class _Commands(LazyGroup):
         "calibrate": (
             "Run blasts at many distances, fit the three laws, and store one as a calibration."
         ),
-        "evaluate": "Compare layouts with no barrier, both exposed to the same threats.",
+        "evaluate": "Compare a layout with no barrier, both exposed to the same threats.",
         "assess": "Assess the damage of buildings by charges: panes, panels, level of protection.",
         "advise": (
             "Compare the protection for a budget: stand-off, shielding, hardening, and all "

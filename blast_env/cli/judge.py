@@ -61,13 +61,16 @@ def judge(
     ),
     scenario: list[str] = typer.Option(
         [],
-        help="Your own site in the place of problems: a file or bundled name; may be given again.",
+        help="Your own site in the place of problems: a file, a bundled name, or sites, item_sites "
+        "or large_sites for generated ones; may be given again.",
     ),
     threat: str = typer.Option(
         "visible",
         help="Of --scenario. visible: a problem for each charge. hidden: one for all charges.",
     ),
-    cases: int = typer.Option(16, help="Most visible charges of a --scenario.", min=1),
+    cases: int = typer.Option(
+        16, help="Most visible charges of a --scenario, or how many generated sites.", min=1
+    ),
     budget: list[int] = typer.Option(
         [],
         help="Blasts of a method; may be given again; else 50, and 0 for those that need none.",

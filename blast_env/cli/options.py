@@ -17,7 +17,6 @@ from blast_env.envs.arguments import ResetOptions
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.cases import LoadCase, draw_threats, in_turn, one_of_each_charge
 from blast_env.evaluation.engines.contract import CALIBRATED_ENGINES, ENGINE_NAMES, JUDGE, Engine
-from blast_env.evaluation.grid_error import final_engine
 from blast_env.response.buildings import LevelOfProtection
 from blast_env.site import AnyCharge, Scenario, VehicleCharge
 from blast_env.site.sections import PointM
@@ -230,35 +229,14 @@ class GivenCharge:
         fixed = (replace(each, charge=self.fixed(scenario, each.charge)) for each in drawn)
         return one_of_each_charge(fixed)
 
-
-@dataclass(frozen=True, kw_only=True)
-class EvaluateOptions:
-    """The options of an evaluation common to a layout file and a run; see `evaluate`."""
-
-    given: GivenCharge
-    seeds: range
-    engine: str
-    cell_m: float | None
-    cells: str | None
-    cvar_level: float
-    processes: int
-    cache: Path | None
-    export: Path | None
-    out: Path | None
-    is_json: bool
-
-    def engine_for(self, engine: str | Engine, sites: Sequence[Scenario]) -> Engine:
-        """Return an engine with the requested cells, for final statements on sites."""
-        return final_engine(engine, sites, self.cell_m, self.cells)
-
-    def threats(self, scenario: Scenario, engine: Engine) -> tuple[LoadCase, ...]:
-        """Return the threats drawn by the seeds, with the user's place and mass of the charge.
+    def drawn_by(
+        self, scenario: Scenario, seeds: Sequence[int], engine: Engine
+    ) -> tuple[LoadCase, ...]:
+        """Return the threats drawn by seeds, with the given place and mass.
 
         Fixed charges come in turn, each once before any repeats. Without noise a charge has one
         realisation: repeated ones are dropped.
         """
-        drawn = in_turn(scenario, draw_threats(scenario, self.seeds))
-        threats = tuple(
-            LoadCase(self.given.fixed(scenario, threat.charge), threat.seed) for threat in drawn
-        )
+        drawn = in_turn(scenario, draw_threats(scenario, seeds))
+        threats = tuple(LoadCase(self.fixed(scenario, each.charge), each.seed) for each in drawn)
         return threats if engine.has_noise else one_of_each_charge(threats)

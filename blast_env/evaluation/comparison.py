@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from blast_env.arrays import BoolArray, FloatArray
+from blast_env.arrays import FloatArray
 from blast_env.evaluation.cases import LoadCase, LoadCaseSet, check_something_arrives
 from blast_env.evaluation.engines.contract import (
     BlastLoads,
@@ -51,19 +51,6 @@ CHARGE_COLUMNS: Final = (
     Column("charge_height_m", "m", "height of its centre; 0: it lies on the ground"),
     Column("tnt_kg", "kg", "TNT-equivalent mass of the charge"),
 )
-
-CASE_COLUMNS: Final = (
-    Column("scenario", "", "name of the scenario"),
-    Column("seed", "", "seed of the first threat's fan and air; the charge is that threat's"),
-    *CHARGE_COLUMNS,
-    Column("modules", "", "modules, or pieces, of the layout"),
-    Column("load", "", "protected structures, with the layout, over the threats"),
-    Column("unprotected_load", "", "the same without a barrier"),
-    Column("unit", "", "of that load; empty where impulse and peak count together"),
-    Column("reduction", "", "of that load"),
-    Column("in_range", "", "whether the calibration was made for every threat"),
-)
-
 
 STRUCTURE_COLUMNS: Final = (
     Column("structure", "", "name of the structure"),
@@ -215,8 +202,8 @@ class Evaluation:
     if its risk measure is not the mean, or its objective has a target. Intervals are 95 %
     confidence intervals; they do not include the error of the model.
 
-    Impulses are weighted sums of impulses per area of the protected buildings. Attributes and
-    tables below `outcomes` are those of a single case.
+    Impulses are weighted sums of impulses per area of the protected buildings. Means, tails,
+    outcomes, tables and records are those of the first case.
 
     Attributes:
         cases: The cases, all with the same number of threats.
@@ -259,15 +246,10 @@ class Evaluation:
         """The same without a barrier (cases, threats)."""
         return self._counted(self.unprotected_blasts)
 
-    @cached_property
-    def within(self) -> BoolArray:
-        """Whether each blast is in the range of the calibration (cases, threats)."""
-        return np.array([[each.in_range for each in of_case] for of_case in self.blasts])
-
     @property
     def in_range(self) -> bool:
         """Whether all blasts are in the range of the calibration."""
-        return bool(self.within.all())
+        return all(each.in_range for of_case in self.blasts for each in of_case)
 
     @property
     def _is_mean(self) -> bool:
@@ -304,13 +286,13 @@ class Evaluation:
 
     @property
     def mean(self) -> Estimate:
-        """Mean load with the layouts, in the unit of the objective."""
-        return mean_estimate(self._samples(self.loads))
+        """Mean load with the layout, in the unit of the objective."""
+        return mean_estimate(self.loads[0])
 
     @property
     def unprotected_mean(self) -> Estimate:
-        """Mean load without a barrier, over the same samples."""
-        return mean_estimate(self._samples(self.unprotected))
+        """Mean load without a barrier."""
+        return mean_estimate(self.unprotected[0])
 
     @property
     def reduction_error(self) -> float:
@@ -344,19 +326,13 @@ class Evaluation:
 
     @property
     def cvar(self) -> float:
-        """Mean load of the worst cases (of the worst threats of a single case)."""
-        return conditional_value_at_risk(self._samples(self.loads), self.cvar_level)
+        """Mean load of the worst threats."""
+        return conditional_value_at_risk(self.loads[0], self.cvar_level)
 
     @property
     def unprotected_cvar(self) -> float:
         """The same without a barrier."""
-        return conditional_value_at_risk(self._samples(self.unprotected), self.cvar_level)
-
-    def _samples(self, loads: FloatArray) -> FloatArray:
-        """Return the samples of means and tails: the cases, or the threats of a single one."""
-        combined = [case.combined(row) for case, row in zip(self.cases, loads, strict=True)]
-        samples: FloatArray = loads[0] if self.has_one_case else np.array(combined)
-        return samples
+        return conditional_value_at_risk(self.unprotected[0], self.cvar_level)
 
     def _of_cases(self, loads: FloatArray, layouts: Sequence[Layout]) -> FloatArray:
         """Return the objective values of layouts in each case (cases,)."""
@@ -504,27 +480,6 @@ class Evaluation:
         return table_of(rows, THREAT_COLUMNS)
 
     @cached_property
-    def case_table(self) -> "pd.DataFrame":
-        """One row per case; see `CASE_COLUMNS`."""
-        rows = []
-        for index, (case, layout) in enumerate(zip(self.cases, self.layouts, strict=True)):
-            threat = case.threats[0]
-            rows.append(
-                {
-                    "scenario": case.scenario.name,
-                    "seed": threat.seed,
-                    **charge_values(threat.charge_against(case.scenario, layout)),
-                    "modules": len(layout),
-                    "load": case.objective_value(self.loads[index], layout),
-                    "unprotected_load": case.objective_value(self.unprotected[index]),
-                    "unit": case.scenario.objective.unit,
-                    "reduction": float(self.case_reductions[index]),
-                    "in_range": bool(self.within[index].all()),
-                }
-            )
-        return table_of(rows, CASE_COLUMNS)
-
-    @cached_property
     def notes(self) -> tuple[str, ...]:
         """The caveats of the engine, and the threats outside its checked or calibrated range."""
         notes = [*self.engine.caveats(self.scenario)]
@@ -541,13 +496,12 @@ class Evaluation:
         return tuple(notes)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the inputs, the versions and the results as plain data.
+        """Return the inputs, the versions, the results and the tables as plain data.
 
-        The same arguments and versions give the same data; NaN becomes `None`. Of a single case it
-        has the scenario, the threats and the tables of structures and modules as well.
+        The same arguments and versions give the same data; NaN becomes `None`.
         """
-        objective = self.scenario.objective
-        record: dict[str, Any] = {
+        objective, threats = self.scenario.objective, table_records(self.threat_table)
+        return {
             "schema_version": SCHEMA_VERSION,
             "engine": self.engine.name,
             "versions": versions(self.engine.version),
@@ -561,33 +515,6 @@ class Evaluation:
                 "unprotected_cvar": self.unprotected_cvar,
                 "grid_error": self._grid_error_record(),
                 "in_range": self.in_range,
-            },
-            "cases": [
-                {
-                    **row,
-                    "scenario_hash": case.scenario.content_hash,
-                    "calibration": case.scenario.calibration,
-                    "layout": [list(cell) for cell in layout],
-                }
-                for row, case, layout in zip(
-                    table_records(self.case_table), self.cases, self.layouts, strict=True
-                )
-            ],
-        }
-        if self.has_one_case:
-            record |= {
-                "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
-                "scenario_hash": self.scenario.content_hash,
-                "layout": [list(cell) for cell in self.layout],
-                "calibration": self.calibration,
-                "notes": list(self.notes),
-                "threats": table_records(self.threat_table),
-                "structures": table_records(self.table),
-                "buildings": table_records(self.building_table),
-                "modules": table_records(self.module_table),
-            }
-            worst = self.outcomes.index(self.worst)
-            record["result"] |= {
                 "objective": {
                     **objective.model_dump(mode="json", exclude_none=True),
                     "load": self.load,
@@ -595,9 +522,18 @@ class Evaluation:
                 },
                 "impulse_pa_s": estimate_record(self.impulse_pa_s),
                 "unprotected_impulse_pa_s": estimate_record(self.unprotected_impulse_pa_s),
-                "worst": record["threats"][worst],
-            }
-        return record
+                "worst": threats[self.outcomes.index(self.worst)],
+            },
+            "scenario": self.scenario.model_dump(mode="json", exclude_none=True),
+            "scenario_hash": self.scenario.content_hash,
+            "layout": [list(cell) for cell in self.layout],
+            "calibration": self.calibration,
+            "notes": list(self.notes),
+            "threats": threats,
+            "structures": table_records(self.table),
+            "buildings": table_records(self.building_table),
+            "modules": table_records(self.module_table),
+        }
 
     def _grid_error_record(self) -> dict[str, Any] | None:
         """Return the errors of the cells as JSON-compatible data; `None` without any."""
@@ -618,7 +554,7 @@ class Evaluation:
         return write_text(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
 
-SCHEMA_VERSION: Final = 2
+SCHEMA_VERSION: Final = 3
 """Version of the file written by `Evaluation.to_json`."""
 
 

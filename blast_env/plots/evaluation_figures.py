@@ -1,17 +1,14 @@
 """Figures of evaluations."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import ceil, isnan
-from typing import Final
+from math import isnan
 
 import numpy as np
 
 from blast_env.evaluation.answers import points
-from blast_env.evaluation.cases import LoadCaseSet
 from blast_env.evaluation.comparison import Evaluation
 from blast_env.geometry import Layout, layout_counts
-from blast_env.layout.build_site import build_site, charge_against
+from blast_env.layout.build_site import build_site
 from blast_env.particles.structure import obstacle_of
 from blast_env.plots.plan import (
     EXPLOSIVE,
@@ -25,7 +22,6 @@ from blast_env.plots.plan import (
     stand_off_text,
     vehicle_features,
     without,
-    without_counts,
 )
 from blast_env.plots.site_plan import (
     add_bar,
@@ -317,152 +313,3 @@ def _draw_modules(panels: Sequence[Axes], evaluation: Evaluation, scene: BlastSi
     words = "impulse per module\n(simulation units)" if is_scaled else "momentum per module\n(N·s)"
     label = f"mean {words}; white: not hit"
     add_bar(figure, panels, ScalarMappable(scale, load_colours()), label, shrink=0.9, pad=0.03)
-
-
-MOST_SHOWN: Final = 12
-"""Most cases in a figure: the first ones."""
-
-_COLUMNS: Final = 4
-_PANEL_IN: Final = 3.2
-_LEAST_WIDTH_IN: Final = 9.6  # for the heading
-_PANEL_HEIGHTS_IN: Final = (2.0, 4.8)
-_THREAT_PT: Final = 29.0  # of the lines between title and panel
-_TITLE_IN: Final = 0.95  # of a panel, with the numbers along x
-_NUMBERS_IN: Final = 0.4  # along y
-_FRAME_IN: Final = 1.8  # heading and legend
-_OUT_OF_RANGE: Final = " ~"
-
-
-@dataclass(frozen=True, eq=False)
-class _Panel:
-    """One case of a comparison.
-
-    Attributes:
-        case: The case.
-        layout: Its layout.
-        reduction: Its reduction, as a share; NaN if there is no load without it.
-        in_range: Whether all threats are within the checked range.
-    """
-
-    case: LoadCaseSet
-    layout: Layout
-    reduction: float
-    in_range: bool
-
-    @property
-    def charge(self) -> Charge:
-        """The first charge, at the place of its detonation."""
-        return charge_against(self.case.scenario, self.layout, self.case.threats[0].charge)
-
-    def features(self) -> list[Feature]:
-        """Return the site with the layout and the first charge."""
-        charge = charge_feature(self.charge, "charge")
-        return [*_shown(self.case.scenario, self.layout), charge]
-
-
-def comparison_figure(comparison: Evaluation) -> Figure:
-    """Return a picture of layouts with their reductions, four in a row.
-
-    The first `MOST_SHOWN` cases are drawn, numbered from 1; a note mentions further ones.
-
-    Args:
-        comparison: The comparison, with one layout per case.
-    """
-    panels = [
-        _Panel(case, layout, float(reduction), bool(in_range.all()))
-        for case, layout, reduction, in_range in zip(
-            comparison.cases,
-            comparison.layouts,
-            comparison.case_reductions,
-            comparison.within,
-            strict=True,
-        )
-    ]
-    shown = panels[:MOST_SHOWN]
-    columns = min(len(shown), _COLUMNS)
-    figure, all_axes = _empty_panels(shown, columns)
-    is_one_site = len({panel.case.scenario.content_hash for panel in panels}) == 1
-    features: list[Feature] = []
-    for number, (axes, panel) in enumerate(zip(all_axes, shown, strict=True), start=1):
-        of_panel = panel.features()
-        features += of_panel
-        _draw_case(axes, panel, of_panel, f"case {number}")
-        _write_threat(axes, panel, "" if is_one_site else f"{panel.case.scenario.name}, ")
-        axes.set_xlabel("x (m)" if number > len(shown) - columns else "")
-        axes.set_ylabel("y (m)" if number % columns == 1 or columns == 1 else "")
-    write_legend(figure, legend_of(without_counts(features)))
-    place = panels[0].case.scenario.name if is_one_site else "different sites"
-    write_heading(
-        figure,
-        f"{place}: {_headline(comparison)}",
-        _cases_subtitle(panels),
-    )
-    return figure
-
-
-def _empty_panels(shown: Sequence[_Panel], columns: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one panel per case, high enough for the highest site."""
-    rows = ceil(len(shown) / columns)
-    width_in = max(columns * _PANEL_IN, _LEAST_WIDTH_IN)
-    sites = [panel.case.scenario.site for panel in shown]
-    slenderness = max(site.height_m / site.width_m for site in sites)
-    least_in, most_in = _PANEL_HEIGHTS_IN
-    plan_in = slenderness * (width_in / columns - _NUMBERS_IN)
-    panel_in = min(max(plan_in, least_in), most_in) + _TITLE_IN
-    figure = Figure(figsize=(width_in, rows * panel_in + _FRAME_IN), layout="constrained")
-    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in panels[len(shown) :]:
-        axes.set_visible(False)
-    return figure, panels[: len(shown)]
-
-
-def _draw_case(axes: Axes, panel: _Panel, features: Sequence[Feature], name: str) -> None:
-    draw_plan(axes, features)
-    axes.tick_params(labelsize=7.5)
-    mark = "" if panel.in_range else _OUT_OF_RANGE
-    axes.set_title(
-        f"{name}: reduction {_percent(panel.reduction)}{mark}",
-        fontsize=10.5,
-        fontweight="bold",
-        color=unit_interval(INK),
-        pad=_THREAT_PT,
-    )
-
-
-def _write_threat(axes: Axes, panel: _Panel, site: str) -> None:
-    (x_m, y_m), tnt_kg = panel.charge.position_m, panel.charge.tnt_kg
-    charge = f"{tnt_kg:g} kg TNT at ({x_m:.1f}, {y_m:.1f}) m"
-    axes.annotate(
-        f"{site}{layout_counts(panel.layout)}\n{charge}",
-        (0.5, 1.0),
-        xycoords="axes fraction",
-        xytext=(0.0, 2.0),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        fontsize=9,
-        color=unit_interval(QUIET_INK),
-    )
-
-
-def _headline(comparison: Evaluation) -> str:
-    reduction, error = comparison.reduction, comparison.reduction_error
-    if comparison.has_one_case:
-        return f"reduction {_with_error(reduction.value, error)}"
-    mean = f"a layout for each case, mean reduction {_with_error(reduction.value, error)}"
-    return f"{mean}{_interval(reduction)}"
-
-
-def _cases_subtitle(panels: Sequence[_Panel]) -> str:
-    """Return the meaning of the numbers, the count of cases, and the mark of unchecked ones."""
-    noun = panels[0].case.scenario.objective.noun
-    parts = [f"reduction of the {noun} on the protected structures"]
-    if len(panels) > MOST_SHOWN:
-        parts.append(
-            f"mean over all {len(panels)} cases, of which the first {MOST_SHOWN} are shown"
-        )
-    else:
-        parts.append(count_of("case", len(panels)))
-    if not all(panel.in_range for panel in panels):
-        parts.append("~ outside the validated range")
-    return "; ".join(parts)

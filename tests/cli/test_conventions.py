@@ -263,6 +263,6 @@ def test_an_interrupted_training_says_how_to_go_on(
     assert result.exit_code == 130, result.output
     assert f"blast-env train --resume {folder} continues the run" in result.stderr
     monkeypatch.undo()
-    result = run("evaluate", "--run", folder, "--engine", "event", "--seeds", 1)
+    result = run("judge", "--run", folder, "--scenario", site)
     assert result.exit_code == 2
     assert "has no weights yet, before its first evaluation" in " ".join(result.stderr.split())

@@ -10,6 +10,8 @@ import pytest
 
 from blast_env import load_scenario, save_scenario
 from blast_env.evaluation import evaluate_layout
+from blast_env.io.export import SUFFIXES
+from blast_env.layout import LayoutFile, write_layout
 from blast_env.particles.event.engine import EventRun
 from blast_env.site import PointSource
 from tests.cli.running import run
@@ -117,3 +119,19 @@ def test_fixed_charges_count_once_each_and_are_named(tmp_path: Path) -> None:
     met = pd.read_csv(tmp_path / "out" / "threats.csv")[["charge_x_m", "charge_y_m"]]
     assert {*met.itertuples(index=False, name=None)} == {*places}
     assert "note: the site has 3 fixed charges" in result.stdout
+
+
+def test_a_layout_is_exported_with_its_provenance(tmp_path: Path) -> None:
+    site, path = small_scenario(), tmp_path / "layout.json"
+    save_scenario(site, tmp_path / "small.toml")
+    write_layout(path, site, CELLS[:0], {"method": "by hand"})
+    given = ("--layout", path, "--scenario", tmp_path / "small.toml", "--seeds", 1)
+    for export, files in (
+        (tmp_path / "copy.json", [tmp_path / "copy.json"]),
+        (tmp_path / "all", [tmp_path / "all" / f"layout{suffix}" for suffix in SUFFIXES]),
+    ):
+        result = evaluate(*given, "--export", export)
+        assert result.exit_code == 0, result.output
+        assert all(f"wrote {file}" in result.stdout and file.exists() for file in files)
+    for copy in (tmp_path / "copy.json", tmp_path / "all" / "layout.json"):
+        assert LayoutFile.load(copy) == LayoutFile.load(path)

@@ -170,9 +170,8 @@ SMALLER: Final[dict[str, str]] = {
     "blast-env train --algo maskable_ppo --scenario courtyard --run runs/courtyard": _TRAIN,
     "blast-env train --scenario visitor_entrance --engine surrogate --set imitation_updates=200"
     " --run runs/warm": f"{_TRAIN} {_WARM}",
-    "blast-env evaluate --run runs/courtyard --seeds 64 --processes 2 --export out/layouts": (
-        "--seeds 4"
-    ),
+    "blast-env judge --run runs/courtyard --scenario courtyard --cases 64 --budget 0"
+    " --method rules --out out/agent": "--cases 1 --cell 0.5",
     "blast-env evaluate --layout layout.json --export layout.dxf": "--seeds 2",
     "python -m studies.check_sites --sites 16 --random-layouts 12 --threats 4": (
         "--sites 2 --random-layouts 2 --threats 1"

@@ -1,4 +1,4 @@
-"""Cases for agents: for training, for the selection of the best weights, and for the judgement."""
+"""Cases for agents: for training, and for the selection of the best weights."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ import numpy as np
 from blast_agents.training.run_folder import TrainingSettings
 from blast_env.design.search import LayoutAgent
 from blast_env.envs.strategies import ScenarioSource, SingleScenario
-from blast_env.errors import BlastEnvError
 from blast_env.evaluation import (
     Evaluation,
     Evaluators,
@@ -21,7 +20,6 @@ from blast_env.evaluation import (
 from blast_env.evaluation.cases import in_turn
 from blast_env.site import Scenario
 from blast_env.sites import FAMILIES, HELD_OUT_SITES, SITES, SiteSource
-from blast_env.sites.ranges import Ranges
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +54,8 @@ class Selection:
         if isinstance(source, SingleScenario):
             scenarios: Sequence[Scenario] = (source.scenario,) * count
         else:
-            sites = SiteSource(HELD_OUT_SITES - count, count, _ranges_of(source))
-            scenarios = tuple(sites)
+            ranges = source.ranges if isinstance(source, SiteSource) else FAMILIES[SITES]
+            scenarios = tuple(SiteSource(HELD_OUT_SITES - count, count, ranges))
         evaluators = Evaluators(settings.judge, most=count)
         evaluators.of(scenarios[0])  # refuses an unknown engine before anything is written
         return cls(_cases(settings, scenarios, seeds), evaluators)
@@ -108,47 +106,13 @@ def training_cases(
     return tuple(cases.values())
 
 
-def unseen_cases(
-    settings: TrainingSettings, source: ScenarioSource, seeds: Sequence[int]
-) -> tuple[LoadCaseSet, ...]:
-    """Return one case per seed: threats of the run's scenario, or each of a held-out site.
-
-    Fixed charges of a scenario come in turn, each once before any repeats.
-
-    Args:
-        settings: Settings of the run.
-        source: Source of the run: its scenario, or generated sites. The sites are the first ones
-            of the held-out sites; the last ones selected the weights.
-        seeds: At least one, all distinct, usually of `SeedRange.TEST`; each draws the charge,
-            the fan and the air.
-
-    Raises:
-        BlastEnvError: If there are no seeds, a seed is repeated or negative, or there are fewer
-            sites than seeds.
-    """
-    if isinstance(source, SingleScenario):
-        return _cases(settings, (source.scenario,) * len(seeds), seeds)
-    most = HELD_OUT_SITES - settings.evaluation_cases
-    if not 1 <= len(seeds) <= most:
-        raise BlastEnvError(f"seeds: there are {len(seeds)}, must be 1 to {most}, a site each")
-    sites = SiteSource.held_out(len(seeds), _ranges_of(source))
-    return _cases(settings, tuple(sites), seeds)
-
-
-def _ranges_of(source: ScenarioSource) -> Ranges:
-    """Return the family of a source's sites."""
-    return source.ranges if isinstance(source, SiteSource) else FAMILIES[SITES]
-
-
 def _cases(
     settings: TrainingSettings, scenarios: Sequence[Scenario], seeds: Sequence[int]
 ) -> tuple[LoadCaseSet, ...]:
     """Return one case with one threat per scenario and seed."""
-    if len(set(seeds)) < len(seeds):
-        raise BlastEnvError("seeds: one appears twice, must be unique")
     pairs = zip(scenarios, seeds, strict=True)
     threats = [draw_threats(scenario, [seed])[0] for scenario, seed in pairs]
-    if threats and all(each is scenarios[0] for each in scenarios):
+    if all(each is scenarios[0] for each in scenarios):
         threats = [*in_turn(scenarios[0], threats)]
     cases = []
     for number, (scenario, threat) in enumerate(zip(scenarios, threats, strict=True), start=1):

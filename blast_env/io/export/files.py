@@ -162,7 +162,7 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
             is not installed.
     """
     path = path_of(path)
-    check_target(path, 1)
+    check_target(path)
     suffix = _suffix(path)
     if suffix not in _WRITERS:
         raise BlastEnvError(f"{path}: has no suffix, must be {_named_suffixes()}")
@@ -170,13 +170,12 @@ def export_layout(plan: LayoutPlan, path: str | Path) -> Path:
     return path
 
 
-def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[Path]:
-    """Write layouts to a folder in all formats, or a single one to a file.
+def export_to(plan: LayoutPlan, target: str | Path) -> list[Path]:
+    """Write a layout to a file, or to a folder in all formats.
 
     Args:
-        plans: The layouts by the names of their files.
-        target: A file as for `export_layout`, if there is one layout; otherwise a folder, created
-            if it is missing.
+        plan: The layout on its site.
+        target: A file as for `export_layout`; otherwise a folder, created if it is missing.
 
     Returns:
         The files.
@@ -185,27 +184,18 @@ def export_layouts(plans: Mapping[str, LayoutPlan], target: str | Path) -> list[
         BlastEnvError: As for `export_layout`.
     """
     target = Path(target)
-    check_target(target, len(plans))
+    check_target(target)
     if is_file(target):
-        return [export_layout(plan, target) for plan in plans.values()]
+        return [export_layout(plan, target)]
     make_folder(target)
-    return [
-        export_layout(plan, target / f"{name}{suffix}")
-        for name, plan in plans.items()
-        for suffix in SUFFIXES
-    ]
+    return [export_layout(plan, target / f"layout{suffix}") for suffix in SUFFIXES]
 
 
-def check_target(target: str | Path, count: int) -> None:
-    """Refuse an unusable target before any work is done for it.
-
-    Args:
-        target: As for `export_layouts`.
-        count: Number of layouts to write.
+def check_target(target: str | Path) -> None:
+    """Refuse an unusable target of `export_to` before any work is done for it.
 
     Raises:
-        BlastEnvError: If the suffix is unknown, a file would hold more than one layout, or a
-            required package is not installed.
+        BlastEnvError: If the suffix is unknown, or a required package is not installed.
     """
     target = Path(target)
     suffix = _suffix(target)
@@ -213,10 +203,6 @@ def check_target(target: str | Path, count: int) -> None:
         raise BlastEnvError(
             f"{target}: suffix is {suffix!r}{suggestion(suffix, SUFFIXES)}, must be "
             f"{_named_suffixes()}, or nothing for a folder"
-        )
-    if is_file(target) and count != 1:
-        raise BlastEnvError(
-            f"{target}: is one file, but there are {count} layouts: name a folder, without a suffix"
         )
     if suffix == ".dxf" or not is_file(target):
         import_module("blast_env.io.export.dxf")  # its error names the missing extra

@@ -15,7 +15,7 @@ from ezdxf.layouts.layout import Modelspace
 
 from blast_env import load_scenario
 from blast_env.errors import BlastEnvError
-from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout, export_layouts
+from blast_env.io.export import SUFFIXES, LayoutPlan, export_layout, export_to
 from blast_env.io.export.bill import MODULE_COLUMNS
 from blast_env.layout import LayoutFile, load_layout
 from blast_env.particles.scene import build_scene
@@ -161,14 +161,11 @@ def test_a_reason_with_a_line_break_leaves_the_drawing_whole(tmp_path: Path) -> 
     assert "A: a door and 0 EOF, {größer}" in lines
 
 
-def test_a_folder_gets_every_layout_in_every_form(tmp_path: Path) -> None:
-    plans = {"one": plan(), "two": plan(layout=((0, 0),))}
-    written = export_layouts(plans, tmp_path / "a" / "b")
-    assert {path.name for path in written} == {
-        f"{name}{suffix}" for name in plans for suffix in SUFFIXES
-    }
+def test_a_folder_gets_a_layout_in_every_form(tmp_path: Path) -> None:
+    written = export_to(plan(layout=((0, 0),)), tmp_path / "a" / "b")
+    assert {path.name for path in written} == {f"layout{suffix}" for suffix in SUFFIXES}
     assert all(path.stat().st_size > 0 for path in written)
-    assert load_layout(tmp_path / "a" / "b" / "two.json", COURTYARD) == ((0, 0),)
+    assert load_layout(tmp_path / "a" / "b" / "layout.json", COURTYARD) == ((0, 0),)
 
 
 @pytest.mark.parametrize(
@@ -179,14 +176,13 @@ def test_a_folder_gets_every_layout_in_every_form(tmp_path: Path) -> None:
             "layout.dwg",
             "must be .json, .csv, .bill.csv, .xlsx, .geojson or .dxf, or nothing for a folder",
         ),
-        ("two.dxf", "is one file, but there are 2 layouts"),
         ("file", "cannot be a folder"),
     ],
 )
 def test_a_target_of_no_use_is_refused(name: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("taken")
     with pytest.raises(BlastEnvError, match=words):
-        export_layouts({"one": plan(), "two": plan()}, tmp_path / name)
+        export_to(plan(), tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 

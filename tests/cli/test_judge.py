@@ -1,0 +1,42 @@
+"""`blast-env judge --run`, the score of a trained agent, run in this process."""
+
+from pathlib import Path
+from typing import Any
+
+from blast_agents.training import load_agent, train
+
+from blast_env.benchmark import JudgedSubmission, site_problems
+from blast_env.layout import check_layout
+from tests.agents.training_runs import hyperparameters, scenario_file, settings
+from tests.cli.running import run
+
+
+def judged_agent(folder: Path, site: Path, *given: Any, **changes: Any) -> JudgedSubmission:
+    """Train an agent and judge it by gas dynamics, without a search; return its runs."""
+    train(settings(site, steps=16, **changes), hyperparameters(), folder / "run")
+    options = ("--run", folder / "run", "--scenario", site, "--budget", 0, "--cell", 0.5)
+    result = run("judge", *options, *given, "--out", folder / "out")
+    assert result.exit_code == 0, result.output
+    assert "best rule" in result.stdout
+    found = JudgedSubmission.load(folder / "out" / "judged_agent_run.json")
+    assert found.reduction(0).low <= found.reduction(0).value <= found.reduction(0).high
+    return found
+
+
+def test_an_agent_of_visible_charges_gets_each_charge_as_a_problem(tmp_path: Path) -> None:
+    site = scenario_file(tmp_path)
+    found = judged_agent(tmp_path, site, "--cases", 3)
+    agent, problems = load_agent(tmp_path / "run"), site_problems(site, 3)
+    assert [each.problem for each in found.runs] == [each.name for each in problems]
+    for each, problem in zip(found.runs, problems, strict=True):
+        proposed = agent.propose(problem.scenario, problem.case.charge)
+        assert each.layout == tuple(sorted(proposed))
+        assert each.blasts == 0
+
+
+def test_generated_sites_are_held_out_from_training(tmp_path: Path) -> None:
+    found = judged_agent(tmp_path, Path("sites"), "--cases", 2)
+    problems = {each.name: each for each in site_problems("sites", 2)}
+    assert [*found.problems] == [*problems]
+    for each in found.runs:
+        assert check_layout(problems[each.problem].scenario, each.layout)
