@@ -1,7 +1,7 @@
 """Axis-parallel rectangles, walls in plan; cells, pieces and layouts."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Final, Literal, NamedTuple
@@ -141,79 +141,6 @@ class Rectangle(NamedTuple):
 
 Place = tuple[float, float]
 """x and y."""
-
-_DIGITS = 9  # of a coordinate; further digits are rounding errors
-
-
-def _open_sides(own: Rectangle, all_of_them: Sequence[Rectangle]) -> Iterator[tuple[Place, Place]]:
-    """Yield the parts of a rectangle's sides that no other one touches, counterclockwise."""
-    left, bottom, right, top = own
-    along_x = [(each.left, each.right, each) for each in all_of_them]
-    along_y = [(each.bottom, each.top, each) for each in all_of_them]
-    for low, high in _gaps(left, right, [(a, b) for a, b, each in along_x if each.top == bottom]):
-        yield (low, bottom), (high, bottom)
-    for low, high in _gaps(bottom, top, [(a, b) for a, b, each in along_y if each.left == right]):
-        yield (right, low), (right, high)
-    for low, high in _gaps(left, right, [(a, b) for a, b, each in along_x if each.bottom == top]):
-        yield (high, top), (low, top)
-    for low, high in _gaps(bottom, top, [(a, b) for a, b, each in along_y if each.right == left]):
-        yield (left, high), (left, low)
-
-
-def _gaps(low: float, high: float, taken: Iterable[Place]) -> Iterator[Place]:
-    """Yield the parts of an interval that no other covers, the lowest first."""
-    for begin, end in sorted(taken):
-        if begin > low:
-            yield low, min(begin, high)
-        low = max(low, end)
-        if low >= high:
-            return
-    yield low, high
-
-
-def outlines(rectangles: Sequence[Rectangle]) -> list[tuple[Place, ...]]:
-    """Return the corners of the outlines of all rectangles together.
-
-    Outer ones run counterclockwise, those of holes clockwise.
-
-    Args:
-        rectangles: Rectangles that do not overlap.
-    """
-    ends: dict[Place, list[Place]] = defaultdict(list)
-    exact = [Rectangle(*(round(value, _DIGITS) for value in each)) for each in rectangles]
-    for own in exact:
-        for start, end in _open_sides(own, exact):
-            ends[start].append(end)
-    found = []
-    while ends:
-        first = here = next(iter(ends))
-        ring: list[Place] = []
-        way = (0.0, 0.0)
-        while not ring or here != first:
-            there = max(ends[here], key=lambda end: _turn(way, here, end))
-            ends[here].remove(there)
-            if not ends[here]:
-                del ends[here]
-            new = _way(here, there)
-            if new != way:
-                ring.append(here)
-            here, way = there, new
-        if _way(*ring[:2]) == way:
-            del ring[0]  # in the middle of a side
-        found.append(tuple(ring))
-    return found
-
-
-def _way(start: Place, end: Place) -> Place:
-    """Return the direction of a side along one of the axes."""
-    return float(np.sign(end[0] - start[0])), float(np.sign(end[1] - start[1]))
-
-
-def _turn(way: Place, here: Place, there: Place) -> float:
-    """Return 1 for a side to the left of a direction, -1 for one to its right."""
-    x, y = _way(here, there)
-    return way[0] * y - way[1] * x
-
 
 _ALIGNED_COSINE: Final = 1e-9
 

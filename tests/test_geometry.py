@@ -1,8 +1,8 @@
-"""Rectangles: against points along segments, and their outlines against cells of a grid."""
+"""Rectangles against points along segments."""
 
 import numpy as np
 
-from blast_env.geometry import Rectangle, outlines, stacked_runs
+from blast_env.geometry import Rectangle
 
 ROOM = Rectangle(2.0, 1.0, 5.0, 3.0)
 LEAST = 1e-6
@@ -25,33 +25,3 @@ def test_a_segment_meets_a_rectangle_if_a_point_of_it_is_inside() -> None:
         assert [ROOM.meets_segment(start, end) for end in starts] == met.tolist()
         seen |= set(met.tolist())
     assert seen == {True, False}
-
-
-def windings(ring: tuple[tuple[float, float], ...], x: float, y: float) -> int:
-    """How often a ring runs counterclockwise round a place: its sides right of it that go up."""
-    sides = zip(ring, (*ring[1:], ring[0]), strict=True)
-    beside = [(a[1], b[1]) for a, b in sides if a[0] == b[0] > x]
-    return sum((low < y < high) - (high < y < low) for low, high in beside)
-
-
-def test_outlines_are_round_what_is_filled_and_have_no_corner_too_many() -> None:
-    """Of cells at random, with holes, islands in these, and cells that meet in a corner."""
-    generator = np.random.default_rng(3)
-    for share in (0.1, 0.3, 0.5, 0.7, 0.9) * 12:
-        cells = generator.random((6, 7)) < share
-        runs = stacked_runs(cells).tolist()
-        plans = [Rectangle(0.5 * b, 0.5 * a, 0.5 * (b + d), 0.5 * (a + c)) for a, b, c, d in runs]
-        rings = outlines(plans)
-        found = [
-            [
-                sum(windings(ring, 0.5 * x + 0.25, 0.5 * y + 0.25) for ring in rings)
-                for x in range(7)
-            ]
-            for y in range(6)
-        ]
-        assert (np.array(found) == cells).all()
-        around = np.pad(cells, 1).astype(int)
-        fours = around[1:, 1:] + around[:-1, 1:] + around[1:, :-1] + around[:-1, :-1]
-        crossed = (around[1:, 1:] == around[:-1, :-1]) & (fours == 2)
-        corners = (fours % 2 == 1).sum() + 2 * crossed.sum()
-        assert sum(map(len, rings)) == corners

@@ -29,7 +29,6 @@ from blast_env.plots.plan import (
     Look,
     cell_features,
     in_order,
-    outlines_of,
     site_features,
     vehicle_features,
     without,
@@ -200,7 +199,7 @@ def draw_features(view: PixelView, features: Iterable[Feature]) -> Iterator[str]
         features, key=lambda each: (each.kind, each.look, each.colour, min(len(each.places_m), 3))
     ):
         alike = list(group)
-        shapes = outlines_of(alike) if corners == 3 else (each.places_m for each in alike)
+        shapes = (ring for each in alike for ring in each.rings_m)
         places = [[view.pixel(*place) for place in shape] for shape in shapes]
         if corners == 3:
             yield from _areas(kind, look, colour, places)

@@ -18,7 +18,7 @@ from typing import Final, Literal
 import numpy as np
 
 from blast_env.arrays import BoolArray
-from blast_env.geometry import Element, Piece, Rectangle, outlines, stacked_runs, standing
+from blast_env.geometry import Element, Piece, Rectangle, stacked_runs, standing
 from blast_env.layout.build_site import barrier_outline, vehicle_drive, vehicle_reach, worst_places
 from blast_env.particles.structure import Colour
 from blast_env.site import (
@@ -241,8 +241,6 @@ class Feature:
         label: Text beside it in pictures.
         fill: The colour of its area, if it differs from that of its kind.
         is_raised: Whether there is air below it.
-        part_of: Identifier of the area of which it is one rectangle; such parts are drawn without
-            lines between them.
         holes_m: Corners of the holes of an area, clockwise.
         boxes_m: The modules of a polygon in rectangles; empty for other areas.
     """
@@ -255,7 +253,6 @@ class Feature:
     label: str = ""
     fill: Colour | None = None
     is_raised: bool = False
-    part_of: str = ""
     holes_m: tuple[tuple[PointM, ...], ...] = ()
     boxes_m: tuple[Rectangle, ...] = ()
 
@@ -274,6 +271,11 @@ class Feature:
     def colour(self) -> Colour | None:
         """The colour of its area."""
         return self.fill or self.kind.look.fill
+
+    @property
+    def rings_m(self) -> tuple[tuple[PointM, ...], ...]:
+        """The corners of an area, and those of its holes."""
+        return self.places_m, *self.holes_m
 
     @property
     def bounds_m(self) -> Rectangle:
@@ -346,19 +348,6 @@ def without(features: Iterable[Feature], *kinds: FeatureKind) -> tuple[Feature, 
     return tuple(each for each in features if each.kind not in kinds)
 
 
-def outlines_of(areas: Iterable[Feature]) -> Iterator[tuple[PointM, ...]]:
-    """Yield the outlines of areas of one look; the parts of one area have a common outline."""
-    wholes: dict[str, list[Rectangle]] = {}
-    for area in areas:
-        if area.part_of:
-            wholes.setdefault(area.part_of, []).append(area.bounds_m)
-        else:
-            yield area.places_m
-            yield from area.holes_m
-    for parts in wholes.values():
-        yield from outlines(parts)
-
-
 def in_boxes(features: Iterable[Feature]) -> Iterator[Feature]:
     """Yield features, polygons as the rectangles of their modules."""
     for each in features:
@@ -367,14 +356,7 @@ def in_boxes(features: Iterable[Feature]) -> Iterator[Feature]:
         for number, box in enumerate(each.boxes_m):
             area = area_feature(each.kind, box, each.name)
             label = "" if number else each.label
-            yield replace(
-                each,
-                places_m=area.places_m,
-                holes_m=(),
-                boxes_m=(),
-                label=label,
-                part_of=each.part_of or each.name,
-            )
+            yield replace(each, places_m=area.places_m, holes_m=(), boxes_m=(), label=label)
 
 
 def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -> Iterator[Feature]:
@@ -386,7 +368,7 @@ def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -
         features: The features.
         structures: Those of the site, terraces among them.
     """
-    for number, feature in enumerate(features):
+    for feature in features:
         if feature.kind not in _ON_LEVELS:
             yield feature
             continue
@@ -394,7 +376,7 @@ def on_levels(features: Iterable[Feature], structures: Sequence[AnyStructure]) -
             said = {**feature.properties, **({"base_m": height_m} if height_m else {})}
             for part in parts:
                 area = area_feature(feature.kind, part, feature.name, **said)
-                yield replace(area, label=feature.label, part_of=f"{number} {height_m:g}")
+                yield replace(area, label=feature.label)
 
 
 def without_counts(features: Iterable[Feature]) -> tuple[Feature, ...]:

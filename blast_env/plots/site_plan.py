@@ -4,8 +4,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
-from blast_env.geometry import Rectangle, outlines
+from blast_env.geometry import Rectangle
 from blast_env.particles.structure import LoadColours, ModularObstacle
 from blast_env.plots.labels import labels_of, settled_labels
 from blast_env.plots.plan import (
@@ -20,7 +21,6 @@ from blast_env.plots.plan import (
     Kinds,
     Look,
     area_feature,
-    outlines_of,
 )
 from blast_env.plots.style import number_on_axis, render_extra, unit_interval
 from blast_env.site.blast_site import StructureOutline
@@ -119,7 +119,7 @@ def draw_features(axes: Axes, features: Iterable[Feature]) -> list[Artist]:
             drawn.append(_sign(feature))
     for (kind, look, fill), alike in areas.items():
         # One patch, so that there is no seam between neighbours.
-        patch = PathPatch(_path_of(outlines_of(alike)))
+        patch = PathPatch(_path_of(ring for each in alike for ring in each.rings_m))
         patch.set(**area_style(look, fill), zorder=kind.level)
         drawn.append(patch)
     drawn.sort(key=lambda artist: artist.get_zorder())
@@ -213,9 +213,14 @@ def write_legend(figure: Figure, handles: Sequence[Artist]) -> int:
     return lines
 
 
+_GRID_M: Final = 1e-9  # finer differences of coordinates are rounding errors
+
+
 def outline_path(rectangles: Sequence[Rectangle]) -> Path:
-    """Return the common outline of rectangles that do not overlap."""
-    return _path_of(outlines(rectangles))
+    """Return the common outline of rectangles."""
+    joined = shapely.union_all([shapely.box(*each) for each in rectangles], grid_size=_GRID_M)
+    rings = shapely.get_rings(shapely.get_parts(joined.simplify(0.0)))
+    return _path_of(shapely.get_coordinates(ring)[:-1].tolist() for ring in rings)
 
 
 def _path_of(rings: Iterable[Sequence[PointM]]) -> Path:

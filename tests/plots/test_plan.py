@@ -38,7 +38,7 @@ from blast_env.plots.plan import (
     vehicle_features,
 )
 from blast_env.plots.site_picture import site_picture
-from blast_env.plots.site_plan import draw_outlines
+from blast_env.plots.site_plan import draw_outlines, outline_path
 from blast_env.site import BuildZone, Scenario, load_scenario, save_scenario
 from tests.catalogue_sites import WALL, yard, yard_document
 from tests.gas_sites import column
@@ -217,6 +217,34 @@ def test_the_words_have_both_stand_offs() -> None:
 
 
 # ---
+
+
+def windings(ring: Any, x: float, y: float) -> int:
+    """How often a ring runs counterclockwise round a place: its sides right of it that go up."""
+    sides = zip(ring[:-1].tolist(), ring[1:].tolist(), strict=True)
+    beside = [(a[1], b[1]) for a, b in sides if a[0] == b[0] > x]
+    return sum(int(low < y < high) - int(high < y < low) for low, high in beside)
+
+
+def test_outlines_are_round_what_is_filled_and_have_no_corner_too_many() -> None:
+    """Of cells at random, with holes, islands in these, and cells that meet in a corner."""
+    generator = np.random.default_rng(3)
+    for share in (0.1, 0.3, 0.5, 0.7, 0.9) * 12:
+        cells = generator.random((6, 7)) < share
+        rings: list[Any] = outline_path(rectangles_of(cells)).to_polygons()
+        found = [
+            [
+                abs(sum(windings(ring, 0.5 * x + 0.25, 0.5 * y + 0.25) for ring in rings))
+                for x in range(7)
+            ]
+            for y in range(6)
+        ]
+        assert (np.array(found) == cells).all()
+        around = np.pad(cells, 1).astype(int)
+        fours = around[1:, 1:] + around[:-1, 1:] + around[1:, :-1] + around[:-1, :-1]
+        crossed = (around[1:, 1:] == around[:-1, :-1]) & (fours == 2)
+        corners = (fours % 2 == 1).sum() + 2 * crossed.sum()
+        assert sum(len(ring) - 1 for ring in rings) == corners
 
 
 SILO = column("silo", 8.5, 2.0, 2.0)

@@ -309,7 +309,7 @@ def _draw(space: Modelspace, feature: Feature) -> None:
     elif len(places) == 2:
         space.add_line(*places, attributes)
     else:
-        for ring in (places, *feature.holes_m):
+        for ring in feature.rings_m:
             outline = space.add_lwpolyline(ring, close=True, dxfattribs=attributes)
             outline.dxf.elevation = feature.base_m
             height_m = feature.properties.get("height_m")
