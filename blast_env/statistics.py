@@ -1,7 +1,6 @@
 """Means, reductions and tails over threats, with their uncertainty, and means over areas."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -145,53 +144,6 @@ def _half_width(deviation: FloatArray) -> float:
 
     standard_error = np.sqrt(float(deviation @ deviation) / (count - 1) / count)
     return float(stdtrit(count - 1, 0.975) * standard_error)
-
-
-class Risk(Protocol):
-    """Reduces the loads of several threats to one."""
-
-    def __call__(self, loads: NDArray[np.float64]) -> float:
-        """Return one load; `loads` has one value per threat (n,), n >= 1."""
-
-
-@dataclass(frozen=True)
-class MeanRisk:
-    """All threats have equal weights."""
-
-    def __call__(self, loads: NDArray[np.float64]) -> float:
-        """Return the mean."""
-        return float(loads.sum()) / len(loads)
-
-
-@dataclass(frozen=True)
-class WorstRisk:
-    """Only the worst threat counts."""
-
-    def __call__(self, loads: NDArray[np.float64]) -> float:
-        """Return the largest load."""
-        return float(loads.max())
-
-
-@dataclass(frozen=True)
-class ConditionalValueAtRisk:
-    """Only the worst threats count; see `conditional_value_at_risk`.
-
-    Attributes:
-        level: At least 0 (the mean of all) and below 1 (the worst one alone, in the limit).
-
-    Raises:
-        BlastEnvError: If the level is out of bounds.
-    """
-
-    level: float
-
-    def __post_init__(self) -> None:
-        """Check the level."""
-        check_cvar_level(self.level)
-
-    def __call__(self, loads: NDArray[np.float64]) -> float:
-        """Return the mean of the worst share 1 - `level`."""
-        return conditional_value_at_risk(loads, self.level)
 
 
 class _Part(Protocol):

@@ -77,14 +77,9 @@ from blast_env.layout import LayoutState, load_layout, write_layout
 from blast_env.provenance import command, versions
 from blast_env.runner import share_of
 from blast_env.site import AnyCharge, Scenario, load_scenario
+from blast_env.site.objective import ConditionalValueAtRisk, WorstRisk
 from blast_env.site.zone import source_bounds_m
-from blast_env.statistics import (
-    CVAR_LEVEL,
-    ConditionalValueAtRisk,
-    Estimate,
-    WorstRisk,
-    reductions,
-)
+from blast_env.statistics import CVAR_LEVEL, Estimate, reductions
 from blast_env.tables import write_csv
 from blast_env.units import MS_PER_S
 

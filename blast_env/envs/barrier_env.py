@@ -42,7 +42,8 @@ from blast_env.evaluation.store import BlastStore
 from blast_env.geometry import Element
 from blast_env.layout import LayoutState
 from blast_env.site import AnyScenario
-from blast_env.statistics import CVAR_LEVEL, Risk
+from blast_env.site.objective import Risk
+from blast_env.statistics import CVAR_LEVEL
 from blast_env.values import real_number, whole_number
 
 

@@ -33,7 +33,7 @@ from blast_env.evaluation.evaluator import Assessment, BlastEvaluator, DesignPro
 from blast_env.geometry import Layout
 from blast_env.layout import LayoutState
 from blast_env.site import AnyCharge, AnySource, Scenario
-from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
+from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, Risk, WorstRisk
 from blast_env.values import real_number, whole_number
 
 ILLEGAL_TERM: Final = "invalid_actions"

@@ -11,7 +11,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.evaluator import DesignProblem
 from blast_env.geometry import Layout
-from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, ScenarioField
+from blast_env.site import AnyCharge, AnyScenario, AnySource, Scenario, find_scenario
 from blast_env.site.vehicles import source_of
 from blast_env.sites import FAMILIES, training_sites
 
@@ -87,10 +87,10 @@ class SingleScenario:
     """Provides the same scenario for every episode.
 
     Attributes:
-        scenario: The scenario, also given by its bundled name or path.
+        scenario: The scenario.
     """
 
-    scenario: ScenarioField = ScenarioField()
+    scenario: Scenario
 
     @property
     def representative(self) -> Scenario:
@@ -117,7 +117,7 @@ def scenario_source(scenario: AnyScenario | ScenarioSource) -> ScenarioSource:
     if isinstance(scenario, str) and scenario in FAMILIES:
         source = training_sites(scenario)
     elif isinstance(scenario, str | Path | Mapping | Scenario):
-        source = SingleScenario(scenario)
+        source = SingleScenario(find_scenario(scenario))
     else:
         source = scenario
     if not (hasattr(source, "sample") and hasattr(source, "representative")):

@@ -18,13 +18,13 @@ from blast_env.site import (
     AnyCharge,
     AnyScenario,
     PointSource,
-    ScenarioField,
+    Scenario,
     VehicleCharge,
     find_scenario,
 )
 from blast_env.site.blast_site import Charge
+from blast_env.site.objective import MeanRisk, Risk
 from blast_env.site.vehicles import ranked
-from blast_env.statistics import MeanRisk, Risk
 from blast_env.values import checked_seed, generator
 
 
@@ -190,8 +190,8 @@ class LoadCaseSet:
             `search_set` is among them.
     """
 
-    scenario: ScenarioField = ScenarioField()
-    threats: tuple[LoadCase, ...]  # type: ignore[misc]  # a scenario has no default
+    scenario: Scenario
+    threats: tuple[LoadCase, ...]
     realisations: int = 1
     risk: Risk | None = None
     charge: AnyCharge | None = None
@@ -200,6 +200,7 @@ class LoadCaseSet:
     search_set: "LoadCaseSet | None" = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "scenario", find_scenario(self.scenario))
         if not self.threats:
             raise BlastEnvError("threats: there are none, must be at least one")
         charges = self.charges
@@ -266,8 +267,8 @@ def visible_case(
     scenario: AnyScenario, charge: AnyCharge, seeds: Sequence[int], risk: Risk | None = None
 ) -> LoadCaseSet:
     """Return the case of a known charge, with one realisation of fan and air per seed."""
-    threats = tuple(LoadCase(charge, seed) for seed in seeds)
-    return LoadCaseSet(scenario, threats, realisations=len(threats), risk=risk, charge=charge)
+    found, threats = find_scenario(scenario), tuple(LoadCase(charge, seed) for seed in seeds)
+    return LoadCaseSet(found, threats, realisations=len(threats), risk=risk, charge=charge)
 
 
 def search_set(

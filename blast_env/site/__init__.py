@@ -8,7 +8,6 @@ from blast_env.site.catalogue import Catalogue, Item, PlacedModule, StockBarrier
 from blast_env.site.content import SCHEMA_VERSION
 from blast_env.site.files import (
     AnyScenario,
-    ScenarioField,
     find_problems,
     find_scenario,
     load_scenario,
@@ -62,7 +61,6 @@ __all__ = [
     "RectangleSource",
     "Scenario",
     "ScenarioError",
-    "ScenarioField",
     "SegmentSource",
     "SimulationSection",
     "Site",

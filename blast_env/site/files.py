@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, Self, overload
+from typing import Any, Final
 
 import tomli_w
 
@@ -58,34 +58,6 @@ def find_scenario(scenario: AnyScenario) -> Scenario:
     if not isinstance(scenario, str | Path):
         raise BlastEnvError(f"scenario is {scenario!r}, must be a name, a path or a Scenario")
     return load_scenario(scenario)
-
-
-class ScenarioField:
-    """A field of a dataclass that accepts `AnyScenario` and holds a `Scenario`.
-
-    Setting it raises the errors of `find_scenario`.
-    """
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        """Store the name of the field."""
-        self._name = name
-
-    @overload
-    def __get__(self, instance: None, owner: type) -> Self: ...
-
-    @overload
-    def __get__(self, instance: object, owner: type) -> Scenario: ...
-
-    def __get__(self, instance: object | None, owner: type) -> "Scenario | Self":
-        """Return the scenario; the class has none, so that the field is required."""
-        if instance is None:
-            raise AttributeError(self._name)
-        found: Scenario = instance.__dict__[self._name]
-        return found
-
-    def __set__(self, instance: object, scenario: AnyScenario) -> None:
-        """Set the scenario, loaded if it is a name or a path."""
-        instance.__dict__[self._name] = find_scenario(scenario)
 
 
 def parse_scenario(text: str, source: str) -> Scenario:

@@ -1,6 +1,7 @@
 """The objective of a layout: a load, or the response of the facades."""
 
-from typing import Annotated, Final, Literal, Self
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal, Protocol, Self
 
 import numpy as np
 from pydantic import Field, StrictFloat, model_validator
@@ -10,13 +11,7 @@ from blast_env.response.buildings import LevelOfProtection
 from blast_env.response.damage import fails_from
 from blast_env.site.problems import Problem, ScenarioError
 from blast_env.site.sections import Section
-from blast_env.statistics import (
-    CVAR_LEVEL,
-    ConditionalValueAtRisk,
-    MeanRisk,
-    Risk,
-    WorstRisk,
-)
+from blast_env.statistics import CVAR_LEVEL, check_cvar_level, conditional_value_at_risk
 from blast_env.units import PA_PER_PSI
 
 Reference = Annotated[StrictFloat, Field(ge=1e-3, le=1e12)]
@@ -25,6 +20,53 @@ Level = Annotated[StrictFloat, Field(ge=0.0, lt=1.0)]
 _UNITS: Final = {"impulse": "Pa s", "peak": "Pa", "both": ""}
 _NOUNS: Final = {"impulse": "impulse", "peak": "peak overpressure", "both": "load"}
 _TERMS: Final = {"impulse": "impulse", "peak": "peak", "both": "load"}
+
+
+class Risk(Protocol):
+    """Reduces the loads of several threats to one."""
+
+    def __call__(self, loads: FloatArray) -> float:
+        """Return one load; `loads` has one value per threat (n,), n >= 1."""
+
+
+@dataclass(frozen=True)
+class MeanRisk:
+    """All threats have equal weights."""
+
+    def __call__(self, loads: FloatArray) -> float:
+        """Return the mean."""
+        return float(loads.sum()) / len(loads)
+
+
+@dataclass(frozen=True)
+class WorstRisk:
+    """Only the worst threat counts."""
+
+    def __call__(self, loads: FloatArray) -> float:
+        """Return the largest load."""
+        return float(loads.max())
+
+
+@dataclass(frozen=True)
+class ConditionalValueAtRisk:
+    """Only the worst threats count; see `conditional_value_at_risk`.
+
+    Attributes:
+        level: At least 0 (the mean of all) and below 1 (the worst one alone, in the limit).
+
+    Raises:
+        BlastEnvError: If the level is out of bounds.
+    """
+
+    level: float
+
+    def __post_init__(self) -> None:
+        """Check the level."""
+        check_cvar_level(self.level)
+
+    def __call__(self, loads: FloatArray) -> float:
+        """Return the mean of the worst share 1 - `level`."""
+        return conditional_value_at_risk(loads, self.level)
 
 
 class ObjectiveSection(Section):

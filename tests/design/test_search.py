@@ -18,7 +18,7 @@ from blast_env.evaluation import BlastEvaluator, DesignProblem, LoadCase, LoadCa
 from blast_env.evaluation.cases import search_set
 from blast_env.layout import LayoutState
 from blast_env.site.blast_site import Charge
-from blast_env.statistics import ConditionalValueAtRisk, MeanRisk
+from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk
 from tests.agents.sites import site
 from tests.design.search_cases import ballistic, small_problem, small_scenario
 

@@ -17,7 +17,7 @@ from blast_env.evaluation import (
 )
 from blast_env.site import ObjectiveSection, Scenario, ScenarioError
 from blast_env.site.blast_site import Charge
-from blast_env.statistics import ConditionalValueAtRisk, MeanRisk, WorstRisk
+from blast_env.site.objective import ConditionalValueAtRisk, MeanRisk, WorstRisk
 from blast_env.units import PA_PER_PSI
 from tests.evaluation.cases import evaluate_against
 from tests.gas_sites import WALL, hut, site_document

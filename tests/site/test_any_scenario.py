@@ -67,7 +67,7 @@ def test_name_path_and_scenario_mean_the_same(call: Callable[[Any], Any], tmp_pa
 
 
 def test_a_blast_stays_as_it_was_made() -> None:
-    blast = blast_env.Blast(NAME)
+    blast = blast_env.Blast(COURTYARD)
     assert replace(blast, seed=2).scenario is blast.scenario
     with pytest.raises(FrozenInstanceError):
         blast.scenario = COURTYARD  # type: ignore[misc]

@@ -34,7 +34,6 @@ from blast_env.site import (
     AnyScenario,
     ObjectiveSection,
     Scenario,
-    ScenarioField,
     find_scenario,
 )
 from blast_env.site.facade import NamedBay
@@ -312,11 +311,15 @@ class RunnableBlast(ABC):
         charge: The charge, instead of one drawn from the scenario.
     """
 
-    scenario: ScenarioField = ScenarioField()
+    scenario: Scenario
     layout: Sequence[Element] = ()
     seed: int = 0
     engine: Any = None
     charge: AnyCharge | None = None
+
+    def __post_init__(self) -> None:
+        """Find the scenario of a name, a path or plain data."""
+        object.__setattr__(self, "scenario", find_scenario(self.scenario))
 
     @abstractmethod
     def run(self, progress: Callable[[float], None] | None = None) -> BlastOutcome:

@@ -68,7 +68,6 @@ from blast_env.site import (
     AnyCharge,
     AnyScenario,
     Scenario,
-    ScenarioField,
     VehicleCharge,
     find_scenario,
 )
@@ -196,7 +195,6 @@ class GasEngine(GasSettings, Engine):
 class GasBlast(RunnableBlast):
     """One blast of the gas engine, ready to run."""
 
-    scenario: ScenarioField = ScenarioField()  # again, because mypy takes it for no field here
     engine: GasEngine = field(default_factory=GasEngine)
 
     @cached_property

@@ -35,7 +35,7 @@ from blast_env.particles.scene import Scene, build_scene
 from blast_env.particles.start import VERSIONS, start_event, start_pymunk
 from blast_env.particles.structure import ModularObstacle
 from blast_env.provenance import versions
-from blast_env.site import AnyCharge, AnyScenario, Scenario, ScenarioField, find_scenario
+from blast_env.site import AnyCharge, AnyScenario, Scenario, find_scenario
 from blast_env.values import path_of
 
 if TYPE_CHECKING:  # pandas takes a third of a second to import
@@ -146,7 +146,6 @@ def find_particle_engine(engine: str | Engine) -> ParticleEngine:
 class Blast(RunnableBlast):
     """One blast of a particle engine, which may be given by its name."""
 
-    scenario: ScenarioField = ScenarioField()  # again, because mypy takes it for no field here
     engine: str | Engine = "pymunk"
 
     @cached_property

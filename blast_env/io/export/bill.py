@@ -13,7 +13,7 @@ from blast_env.layout.build_site import barrier_outline
 from blast_env.particles.structure import ModularPart, obstacle_of
 from blast_env.plots.plan import Feature, rounded_m, site_features
 from blast_env.provenance import package_version
-from blast_env.site import ScenarioField
+from blast_env.site import Scenario, find_scenario
 from blast_env.site.blast_site import Charge
 from blast_env.tables import Column, as_types, table_of
 from blast_env.units import MODULE_SIDE_M
@@ -37,13 +37,14 @@ class LayoutPlan:
         LayoutError: If the layout is not legal in the scenario.
     """
 
-    scenario: ScenarioField = ScenarioField()
-    layout: Layout  # type: ignore[misc]  # a scenario has no default
+    scenario: Scenario
+    layout: Layout
     charge: Charge | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the layout."""
+        """Find the scenario, and check the layout."""
+        object.__setattr__(self, "scenario", find_scenario(self.scenario))
         object.__setattr__(self, "layout", check_layout(self.scenario, self.layout))
 
     @property
