@@ -12,7 +12,7 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation import BlastEvaluator, evaluate_layout
 from blast_env.evaluation.cases import LoadCase
 from blast_env.evaluation.engines.gas import NOT_KNOWN, GasBlast, GasEngine, GasResult
-from blast_env.gas.engine import scaled_distance
+from blast_env.gas.engine import GasRun, scaled_distance
 from blast_env.particles.run import EndReason
 from blast_env.site.blast_site import Charge
 from tests.builders import block
@@ -77,8 +77,7 @@ def test_a_run_is_a_function_of_its_arguments(unprotected: GasResult) -> None:
     again = blast_env.simulate(HUT, seed=5, engine="gas")
     assert again.digest == unprotected.digest
     assert (
-        replace(GasEngine(), threads=2).start_on(unprotected.run.site).grid.shape
-        == unprotected.run.grid.shape
+        GasRun(GasEngine(threads=2), unprotected.run.site).grid.shape == unprotected.run.grid.shape
     )
     finer = GasBlast(HUT, engine=GasEngine(cell_m=0.25, until=0.03)).run()
     coarse = GasBlast(HUT, engine=GasEngine(until=0.03)).run()
@@ -173,7 +172,7 @@ def test_all_layouts_take_a_charge_over_at_one_radius(charge: Charge, radius_m: 
     runs = []
     for layout in layouts:
         blast = GasBlast(HUT, layout, charge=charge)
-        runs.append(blast.engine.start_on(blast.site))
+        runs.append(blast.start().run)
     assert runs[0].remap_radius_m == pytest.approx(radius_m)
     assert len({(run.remap_radius_m, run.time_s) for run in runs}) == 1
 
@@ -226,11 +225,11 @@ def test_bad_input_is_named(unprotected: GasResult) -> None:
     with pytest.raises(BlastEnvError, match=r"cell_m is 0\.5, but engine 'event' has no cells"):
         evaluate_layout(HUT, WALL, engine="event", cell_m=0.5)
     with pytest.raises(BlastEnvError, match="inside a solid cell"):
-        GasEngine().start_on(replace(unprotected.run.site, charge=Charge((7.0, 4.0), 5.0)))
+        GasRun(GasEngine(), replace(unprotected.run.site, charge=Charge((7.0, 4.0), 5.0)))
     with pytest.raises(BlastEnvError, match=r"would need .* GiB, must be at most 8"):
-        GasEngine(cell_m=0.5 / 64).start_on(unprotected.run.site)
+        GasRun(GasEngine(cell_m=0.5 / 64), unprotected.run.site)
     with pytest.raises(BlastEnvError, match=r"would take .* h of a core, must be at most 6: take"):
-        GasEngine(until=1e5).start_on(unprotected.run.site)
+        GasRun(GasEngine(until=1e5), unprotected.run.site)
     with pytest.raises(BlastEnvError, match=r"cells is 'large', must be one of 'uniform', 'coarse"):
         blast_env.simulate(HUT, engine="gas", cells="large")
 

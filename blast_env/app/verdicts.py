@@ -45,7 +45,7 @@ def keep_histories(result: Any, folder: Path) -> None:
         BlastEnvError: If they cannot be written.
     """
     loads = result.bay_loads
-    if loads is None or not loads.bays:
+    if not loads.bays:
         return
     with write_atomically(folder / _BAYS) as temporary:
         np.savez(

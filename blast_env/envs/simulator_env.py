@@ -222,10 +222,8 @@ class UnfoldingGas(Unfolding):
 
     def __init__(self, blast: "GasBlast") -> None:
         self.blast = blast
-        from blast_env.gas.oblique_walls import ObliqueLoads
-
-        self.run = blast.engine.start_on(blast.site)
-        self._oblique = ObliqueLoads.begin(self.run, blast.scenario.structures_with(blast.layout))
+        self._result = blast.start()
+        self.run = self._result.run
         grid = self.run.grid
         margin = round(-grid.origin_m[0] / grid.cell_m)
         rows, columns = _plan_shape(blast.scenario, grid.cell_m)
@@ -240,7 +238,7 @@ class UnfoldingGas(Unfolding):
     @property
     def impulse(self) -> float:
         """Impulse on the protected structures so far, by weight, Pa s."""
-        return self._so_far().loads().protected_impulse_pa_s
+        return self._result.now().loads().protected_impulse_pa_s
 
     def advance(self, until_s: float) -> dict[str, Any]:
         """Advance to a time, or the end; return the impulse so far."""
@@ -249,7 +247,7 @@ class UnfoldingGas(Unfolding):
 
     def observe(self) -> Observation:
         """Return loads, the plan of overpressure, gauges and the time."""
-        so_far = self._so_far()
+        so_far = self._result.now()
         solid = self.run.grid.solid[:, :, self._layer]
         plane = np.where(solid, 0.0, self.run.solver.overpressure_in(2, self._layer))
         gauges = self.run.gauges
@@ -271,21 +269,15 @@ class UnfoldingGas(Unfolding):
         """
         if self.run.end_reason is None:
             raise ValueError(f"the run is at {self.time_s} s and has not ended: advance it first")
-        return self._so_far()
+        return self._result.now()
 
     def frame(self) -> NDArray[np.uint8]:
         """Return the overpressure in plan and in a section."""
         from blast_env.plots.pressure_film import PressureNow
 
         if self._painter is None:
-            self._painter = PressureNow(self.blast, self.run)
+            self._painter = PressureNow(self._result)
         return self._painter.frame()
-
-    def _so_far(self) -> "GasResult":
-        """Return the loads so far, as a result."""
-        from blast_env.evaluation.engines.gas import GasResult
-
-        return GasResult(self.blast, self.run, oblique=self._oblique)
 
     @staticmethod
     def space(scenario: Scenario, engine: "GasEngine") -> spaces.Dict:

@@ -517,7 +517,7 @@ def consequences_of(
     `taken_away` are the pieces that were removed for the blast.
     """
     responses: list[BuildingResponse] = []
-    if result.bay_loads is not None and result.bay_loads.bays:
+    if result.bay_loads.bays:
         factor = peak_factor(result.run.grid.cell_m, charge.tnt_kg)
         known = result.bay_loads.known(result.run)
         responses = by_building(scenario, result.bay_loads.response, result.run.site, factor, known)

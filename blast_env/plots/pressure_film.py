@@ -10,7 +10,7 @@ import numpy as np
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasBlast, GasResult
 from blast_env.files import write_atomically
-from blast_env.gas.engine import GasRun, Recorders
+from blast_env.gas.engine import Recorders
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import Snapshots
 from blast_env.gas.solver import Recorder
@@ -118,12 +118,12 @@ class PressureNow:
     structure that counts, so that all layouts of a site have the same one.
 
     Args:
-        blast: The blast.
-        run: Its run.
+        result: The blast, whose run is advanced between the frames.
         width_px: Width of the frames.
     """
 
-    def __init__(self, blast: GasBlast, run: GasRun, width_px: int = 960) -> None:
+    def __init__(self, result: GasResult, width_px: int = 960) -> None:
+        blast, run = result.blast, result.run
         section = default_section(blast.site)
         cell = _cell_of(run.grid, blast.site, PLAN_HEIGHT_M, section)
         planes = (
@@ -131,7 +131,7 @@ class PressureNow:
             PlaneNow(run, section.normal, cell[section.normal]),
         )
         opening = spherical_stage(run.charge, run.remap_radius_m)
-        shot = PressureShot(GasResult(blast, run), section, opening, planes)
+        shot = PressureShot(result, section, opening, planes)
         self._run = run
         self._painter = PressurePainter([shot], _free_field_peak_kpa(blast.site), width_px)
 

@@ -68,9 +68,7 @@ def _ending(blast: GasBlast, times: float) -> Ending:
     cpu_s, time_s, reason = process_time() - start, result.time_s, result.end_reason
     now = _Loads.of(result)
     result.run.solver.advance(times * time_s)
-    later = _Loads.of(
-        GasResult(blast, result.run, result.bay_loads, result.piece_loads, result.oblique)
-    )
+    later = _Loads.of(result.now())
     return Ending(
         time_s,
         cpu_s,
@@ -96,7 +94,7 @@ class _Loads:
         chosen = walls[walls["counts"] & walls["structure"].isin(protected)]
         bays = result.bay_loads
         level = None
-        if bays is not None and bays.bays:
+        if bays.bays:
             level = respond(bays.bays, *bays.histories).level_of_protection
         impulse = chosen["impulse_pa_s"].to_numpy(dtype=np.float64)
         return cls(impulse, result.loads().protected_impulse_pa_s, level)

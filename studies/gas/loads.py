@@ -20,9 +20,9 @@ def impulse_until(blast: GasBlast, until_s: float) -> float:
 
     The run continues to that time even if its loads are known before.
     """
-    run = blast.engine.start_on(blast.site)
-    run.solver.advance(until_s)
-    return protected_impulse_pa_s(GasResult(blast, run))
+    result = blast.start()
+    result.run.solver.advance(until_s)
+    return protected_impulse_pa_s(result)
 
 
 BUILDING_M: Final = 6.0

@@ -1,12 +1,13 @@
 """`--cell` and `--cells`: they reach the environments and what judges."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from blast_agents.training.run_folder import RunFolder
 
-from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.evaluation.engines.gas import GasBlast, GasEngine
 from blast_env.site import save_scenario
 from tests.cli.running import run
 from tests.gas_sites import glazed_hut, hut
@@ -25,14 +26,14 @@ def site(tmp_path: Path) -> Path:
 def cells(monkeypatch: pytest.MonkeyPatch) -> set[float]:
     """The sides of cells of all blasts that are run."""
     used: set[float] = set()
-    start_on = GasEngine.start_on
+    start = GasBlast.start
 
-    def watched(self: GasEngine, *arguments: Any) -> Any:
-        used.add(self.cell_m)
+    def watched(self: GasBlast, *arguments: Any) -> Any:
+        used.add(self.engine.cell_m)
         # As fast as it gets; what comes out does not matter here.
-        return start_on(GasEngine(COARSE), *arguments)
+        return start(replace(self, engine=GasEngine(COARSE)), *arguments)
 
-    monkeypatch.setattr(GasEngine, "start_on", watched)
+    monkeypatch.setattr(GasBlast, "start", watched)
     return used
 
 
@@ -56,13 +57,13 @@ def test_growing_cells_are_those_of_commands_that_run_gas(
     site = tmp_path / "glazed.toml"
     save_scenario(glazed_hut(), site)
     used: set[str] = set()
-    start_on = GasEngine.start_on
+    start = GasBlast.start
 
-    def watched(self: GasEngine, *arguments: Any) -> Any:
-        used.add(self.cells)
-        return start_on(GasEngine(COARSE), *arguments)
+    def watched(self: GasBlast, *arguments: Any) -> Any:
+        used.add(self.engine.cells)
+        return start(replace(self, engine=GasEngine(COARSE)), *arguments)
 
-    monkeypatch.setattr(GasEngine, "start_on", watched)
+    monkeypatch.setattr(GasBlast, "start", watched)
     searched = ("--scenario", site, "--engine", "gas", "--method", "random", "--budget", 1)
     commands: tuple[tuple[str | Path | float, ...], ...] = (
         ("simulate", site, "--engine", "gas"),

@@ -16,9 +16,10 @@ import blast_env
 from blast_env.envs.simulator_env import BlastSimulatorEnv
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import BlastResult
+from blast_env.evaluation.engines.gas import GasResult
 from blast_env.site import Scenario, ScenarioError
 from tests.envs.small import watch
-from tests.gas_sites import WALL, hut
+from tests.gas_sites import WALL, glazed_hut, hut
 from tests.scenarios import BALLISTIC_COURTYARD
 
 pytestmark = pytest.mark.slow
@@ -214,6 +215,16 @@ def test_an_episode_adds_up_to_the_blast(gas_episode: tuple[list[Any], list[floa
     ends = [result.history(name)["overpressure_pa"].iloc[-1] for name in ("front", "behind")]
     assert last["gauges"] == pytest.approx(ends)
     assert last["time_s"] == [result.time_s]
+
+
+def test_a_facade_has_the_time_to_respond_and_its_bays_are_recorded() -> None:
+    env = gas(scenario=glazed_hut(), step_s=0.1)
+    info = watch(env, 3, layout=WALL)[2]
+    result = blast_env.simulate(glazed_hut(), WALL, 3, engine="gas")
+    assert info["digest"] == result.digest
+    watched = env.result()
+    assert isinstance(watched, GasResult)
+    pd.testing.assert_frame_equal(watched.bays, result.bays)
 
 
 def test_what_is_seen_spreads_from_the_charge(

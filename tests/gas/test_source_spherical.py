@@ -8,6 +8,7 @@ import pytest
 from blast_env.calibration import kingery_bulmash
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines.gas import GasEngine
+from blast_env.gas.engine import GasRun
 from blast_env.gas.grid import GasGrid
 from blast_env.gas.probes import Gauges
 from blast_env.gas.solver import AIR_DENSITY_KG_M3, GasSolver
@@ -154,7 +155,7 @@ def test_gauges_nearer_than_the_first_obstacle_miss_nothing() -> None:
         gauges=(Gauge("near", (5.25, 5.25, 0.25)),),
         air_height_m=6.0,
     )
-    run = GasEngine(margin_m=0.0, border_m=0.0, until=0.03).start_on(site)
+    run = GasRun(GasEngine(margin_m=0.0, border_m=0.0, until=0.03), site)
     run.advance(0.03)
     gauges = run.gauges
     assert gauges is not None

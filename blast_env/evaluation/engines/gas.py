@@ -125,22 +125,6 @@ class GasEngine(GasSettings, Engine):
     name: str = "gas"
     version: str = f"gas 6 (numba {version('numba')})"
 
-    def start_on(
-        self, site: BlastSite, recorders: "Recorders" = lambda _: (), response_s: float = 0.0
-    ) -> "GasRun":
-        """Return a run at time 0, independent of every other run.
-
-        `recorders` makes further recorders for the grid: maps, pictures. The run goes on for
-        `response_s` after the last load has arrived.
-
-        Raises:
-            BlastEnvError: If the grid does not fit into memory, or the charge or a gauge is in a
-                solid.
-        """
-        from blast_env.gas.engine import GasRun  # Numba takes half a second to import
-
-        return GasRun(self, site, recorders, response_s)
-
     def blast(
         self,
         scenario: AnyScenario,
@@ -207,17 +191,19 @@ class GasBlast(RunnableBlast):
         """The charge before the layout is known, or the vehicle that carries it."""
         return draw_threat(self.scenario, self.seed) if self.charge is None else self.charge
 
-    def run(
-        self,
-        progress: Callable[[float], None] | None = None,
-        recorders: "Recorders" = lambda _: (),
-    ) -> "GasResult":
-        """Run the blast to its end.
+    def start(self, recorders: "Recorders" = lambda _: ()) -> "GasResult":
+        """Return the result at time 0, whose run is to be advanced to its end.
 
         `recorders` makes further recorders for the grid: maps, pictures. The result keeps them in
-        `run.solver.recorders`. Progress is the elapsed share of the time limit.
+        `run.solver.recorders`.
+
+        Raises:
+            BlastEnvError: If the grid does not fit into memory, or the charge or a gauge is in a
+                solid.
         """
-        run = self.engine.start_on(self.site, recorders, response_time_s(self.scenario))
+        from blast_env.gas.engine import GasRun  # Numba takes half a second to import
+
+        run = GasRun(self.engine, self.site, recorders, response_time_s(self.scenario))
         oblique = ObliqueLoads.begin(run, self.scenario.structures_with(self.layout))
         bays = BayLoads.begin(run, self.scenario.bays_with(self.layout))
         if bays.bays:
@@ -225,11 +211,21 @@ class GasBlast(RunnableBlast):
         pieces = PieceLoads.begin(run, self.scenario, self.layout)
         if pieces is not None:
             run.record(pieces.recorder)
+        return GasResult(self, run, bays, pieces, oblique)
+
+    def run(
+        self,
+        progress: Callable[[float], None] | None = None,
+        recorders: "Recorders" = lambda _: (),
+    ) -> "GasResult":
+        """Run the blast to its end; see `start`. Progress is the elapsed share of the limit."""
+        result = self.start(recorders)
+        run = result.run
         while run.end_reason is None:
             run.advance(run.time_s + run.limit_s / _PROGRESS_CALLS)
             if progress is not None:
                 progress(min(run.time_s / run.limit_s, 1.0))
-        return GasResult(self, run, bays, pieces, oblique)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,17 +235,21 @@ class GasResult:
     Attributes:
         blast: The blast.
         run: The run, at its end.
-        bay_loads: Histories of the bays of facades; `None` if not recorded.
-        piece_loads: Histories on both sides of the barrier's pieces; `None` if not recorded or if
-            no piece has a height.
+        bay_loads: Histories of the bays of facades.
+        piece_loads: Histories on both sides of the barrier's pieces; `None` if no piece has a
+            height.
         oblique: Loads on oblique walls along the normal of the wall; `None` without such a wall.
     """
 
     blast: GasBlast
     run: "GasRun"
-    bay_loads: BayLoads | None = None
-    piece_loads: PieceLoads | None = None
-    oblique: ObliqueLoads | None = None
+    bay_loads: BayLoads
+    piece_loads: PieceLoads | None
+    oblique: ObliqueLoads | None
+
+    def now(self) -> "GasResult":
+        """Return the result of a run that was advanced since, without the earlier tables."""
+        return replace(self)
 
     @property
     def engine_name(self) -> str:
@@ -363,8 +363,6 @@ class GasResult:
     @cached_property
     def bays(self) -> "pd.DataFrame":
         """One row per bay, with its load and response; see `LOADED_BAY_COLUMNS`."""
-        if self.bay_loads is None:
-            return table_of([], LOADED_BAY_COLUMNS)
         return self.bay_loads.table(self.run)
 
     @cached_property
@@ -381,8 +379,6 @@ class GasResult:
 
     def bay_history(self, name: str) -> "pd.DataFrame":
         """Return the mean overpressure on a bay over time: `time_s`, `overpressure_pa`."""
-        if self.bay_loads is None:
-            raise UnknownNameError("bay", name, ())
         return self.bay_loads.history(name)
 
     @cached_property
@@ -464,7 +460,7 @@ class GasResult:
     def loads(self) -> BlastLoads:
         """Return the loads on all structures and, for a response, the damage of all bays."""
         bays: tuple[BayDamage, ...] = ()
-        if self.bay_loads is not None and self.blast.scenario.objective.is_response:
+        if self.blast.scenario.objective.is_response:
             factor = peak_factor(self.run.grid.cell_m, self.run.site.charge.tnt_kg)
             bays = self.bay_loads.damages(self.blast.scenario.alternatives, factor)
         return BlastLoads(self.structure_loads, self.module_impulse_n_s, bays)
