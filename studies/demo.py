@@ -47,8 +47,8 @@ from blast_env.geometry import Layout
 from blast_env.io.export import LayoutPlan, export_to
 from blast_env.layout import LayoutState
 from blast_env.plots.figures import save_figure
+from blast_env.plots.film import write_film
 from blast_env.plots.gas import facades
-from blast_env.plots.pressure_film import write_pressure_film
 from blast_env.plots.site_picture import site_picture
 from blast_env.site import Scenario, load_scenario
 from blast_env.values import generator
@@ -425,7 +425,7 @@ def write_pictures(settings: DemoSettings, comparison: AgentComparison) -> list[
     blasts = [GasBlast(scenario, each, threat.seed, charge=threat.charge) for each in ((), layout)]
     film = out / "side_by_side.mp4"
     with progress_bar("film") as progress:
-        unprotected, protected = write_pressure_film(
+        unprotected, protected = write_film(
             blasts[1],
             film,
             beside=blasts[0],

@@ -12,7 +12,7 @@ import typer
 from blast_env.cli.output import print_line, progress_bar, user_errors
 from blast_env.design.rules import wall_near_building
 from blast_env.evaluation.engines.gas import GasBlast
-from blast_env.plots.pressure_film import write_pressure_film
+from blast_env.plots.film import write_film
 from blast_env.plots.pressure_frames import VerticalSection
 from blast_env.site import Charge, load_scenario
 
@@ -34,7 +34,7 @@ def main(
         scenario = load_scenario(SITE)
         wall = wall_near_building(scenario, CHARGE)
         with progress_bar("film") as progress:
-            results = write_pressure_film(
+            results = write_film(
                 GasBlast(scenario, wall, charge=CHARGE),
                 film,
                 beside=GasBlast(scenario, charge=CHARGE),

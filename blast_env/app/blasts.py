@@ -40,11 +40,7 @@ from blast_env.plots.figures import save_figure
 from blast_env.plots.gas import Quantity, facades, full_load, gauge_history
 from blast_env.plots.ground_map import ground_map, ground_recorders, map_levels
 from blast_env.plots.pressure_film import record_planes, scale_end_kpa
-from blast_env.plots.pressure_frames import (
-    PressurePainter,
-    PressureShot,
-    default_section,
-)
+from blast_env.plots.pressure_frames import PressurePainter, PressureShot
 from blast_env.plots.style import render_extra
 from blast_env.provenance import versions
 from blast_env.runner import Tell, share_of
@@ -58,7 +54,6 @@ FRAMES: Final = 48
 _FRAME_MS: Final = 95
 _FILM_PX: Final = 640
 _FILM: Final = "film.webp"
-_PLAN_HEIGHT_M: Final = 1.5
 _LEAST_SHOWN: Final = 0.05  # of the end of a film's scale
 _QUALITY: Final = 82
 
@@ -140,9 +135,8 @@ class BlastTask:
         make_folder(folder)
         began_s, engine = perf_counter(), GasEngine.with_cells(self.cells)
         blast = GasBlast(site, layout, 0, engine, threat.charge)
-        height_m = min(_PLAN_HEIGHT_M, 0.5 * blast.site.air_height_m)
-        section, recording = default_section(blast.site), share_of(tell, 0, 100, 60)
-        shot = record_planes(blast, height_m, section, recording, ground_recorders)
+        recording = share_of(tell, 0, 100, 60)
+        shot = record_planes(blast, progress=recording, recorders=ground_recorders)
         result = shot.result
         scale = _scale(shot, self._folder_of((), threat) / _SCALE)
         if not layout:

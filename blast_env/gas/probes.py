@@ -382,6 +382,10 @@ class Snapshots:
             due += 1
         if due:
             del self._times[:due]
-            plane = solver.overpressure_in(self.axis, self.layer)
-            pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
-            self.frames.append(Snapshot(solver.time_s, pressure))
+            self.frames.append(self.now(solver))
+
+    def now(self, solver: Gas) -> Snapshot:
+        """Return the snapshot of the present state."""
+        plane = solver.overpressure_in(self.axis, self.layer)
+        pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
+        return Snapshot(solver.time_s, pressure)

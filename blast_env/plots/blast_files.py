@@ -72,29 +72,23 @@ class BlastFiles:
             progress: Called with the finished share.
         """
         *beside, blast = blasts
-        unprotected = beside[0] if beside else None
-        is_gas = not isinstance(blast, Blast)
         if self.film is None:
-            recorders = (self._recorders(),) if is_gas else ()
+            recorders = () if isinstance(blast, Blast) else (self._recorders(),)
             count = len(blasts)
             return tuple(
                 each.run(share_of(progress, number, count), *recorders)
                 for number, each in enumerate(blasts)
             )
         # Here, because films need the extra `render`.
-        if is_gas:
-            from blast_env.plots.pressure_film import write_pressure_film
-
-            return write_pressure_film(
-                blast,
-                self.film,
-                beside=unprotected,
-                further=self._recorders(),
-                progress=progress,
-            )
         from blast_env.plots.film import write_film
 
-        return write_film(blast, self.film, beside=unprotected, progress=progress)
+        return write_film(
+            blast,
+            self.film,
+            beside=beside[0] if beside else None,
+            recorders=self._recorders(),
+            progress=progress,
+        )
 
     def draw(self, results: Sequence[Any]) -> list[Path]:
         """Draw the pictures of the results of `run`; return their files.

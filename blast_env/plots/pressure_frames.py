@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final, Literal, NamedTuple, Protocol
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from scipy.sparse import csr_matrix
 from blast_env.arrays import FloatArray
 from blast_env.errors import UnknownNameError
 from blast_env.evaluation.engines.gas import GasResult
-from blast_env.gas.engine import GasRun
-from blast_env.gas.probes import Snapshot
+from blast_env.gas.probes import Snapshots
 from blast_env.gas.spherical_stage import SphericalStage
 from blast_env.geometry import Rectangle
 from blast_env.plots.canvas import BAR_LABELS_PX, Frame, Sheet
@@ -109,45 +108,6 @@ def default_section(site: BlastSite) -> VerticalSection:
     return VerticalSection("y", y_m) if across >= along else VerticalSection("x", x_m)
 
 
-class Plane(Protocol):
-    """Pictures of the overpressure in a plane of cells, as in `Snapshots`.
-
-    Attributes:
-        axis: Axis normal to the plane.
-        layer: The layer of cells along it.
-        frames: The pictures, by time.
-    """
-
-    axis: int
-    layer: int
-
-    @property
-    def frames(self) -> Sequence[Snapshot]:
-        """The pictures, by time."""
-
-
-class PlaneNow:
-    """A plane of a blast in progress, with a single picture: that of the present state.
-
-    Args:
-        run: The blast.
-        axis: Axis normal to the plane.
-        layer: The layer of cells along it.
-    """
-
-    def __init__(self, run: GasRun, axis: int, layer: int) -> None:
-        self.axis, self.layer = axis, layer
-        self._solver = run.solver
-        self._solid = np.take(run.grid.solid, layer, axis=axis)
-
-    @property
-    def frames(self) -> Sequence[Snapshot]:
-        """The picture of the present state."""
-        plane = self._solver.overpressure_in(self.axis, self.layer)
-        pressure = np.where(self._solid, np.nan, plane).astype(np.float32)
-        return [Snapshot(self._solver.time_s, pressure)]
-
-
 @dataclass(frozen=True, eq=False)
 class PressureShot:
     """A blast with pictures of the overpressure in two planes.
@@ -162,7 +122,7 @@ class PressureShot:
     result: GasResult
     section: VerticalSection
     opening: SphericalStage
-    planes: tuple[Plane, Plane]
+    planes: tuple[Snapshots, Snapshots]
 
     def at(self, time_s: float, plane: int) -> FloatArray | None:
         """Return the overpressure in a plane at a time, Pa, along its two axes; NaN in solids.

@@ -9,7 +9,7 @@ import pytest
 
 import blast_env
 from blast_env.layout import write_layout
-from blast_env.plots import pressure_film
+from blast_env.plots import film
 from blast_env.site import Scenario, save_scenario
 from tests.cli.running import run
 from tests.gas_sites import WALL, hut
@@ -53,13 +53,12 @@ def test_a_layout_and_the_empty_site_are_shown_in_every_picture(
     site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(matplotlib.rcParams, "svg.fonttype", "none")  # text stays text
-    short = partial(pressure_film.write_pressure_film, frames_per_s=0.5)
-    monkeypatch.setattr(pressure_film, "write_pressure_film", short)
+    monkeypatch.setattr(film, "write_film", partial(film.write_film, frames_per_s=0.5))
     layout = write_layout(tmp_path / "wall.json", hut(), WALL, {"made by": "hand"})
     names = ("heat-map", "history", "impulse-map")
     options = [text for name in names for text in (f"--{name}", tmp_path / f"{name}.svg")]
-    film = ("--film", tmp_path / "film.gif")
-    chosen = ("--gauge", "behind", "--quantity", "peak", "--side-by-side", *film)
+    moving = ("--film", tmp_path / "film.gif")
+    chosen = ("--gauge", "behind", "--quantity", "peak", "--side-by-side", *moving)
     result = run("simulate", site, "--engine", "gas", "--layout", layout, *options, *chosen)
     assert result.exit_code == 0, result.output
     for name in names:

@@ -13,7 +13,8 @@ from PIL import Image
 
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.engines import Blast, BlastResult
-from blast_env.plots.film import FilmPlan, plan_film, write_film
+from blast_env.plots.film import write_film
+from blast_env.plots.film_files import FilmPlan, plan_until
 from blast_env.plots.frames import FramePainter
 from blast_env.plots.style import shown_until_s
 
@@ -21,7 +22,7 @@ from blast_env.plots.style import shown_until_s
 def test_an_mp4_has_the_planned_frames_and_even_sizes(blast: Blast, tmp_path: Path) -> None:
     path = tmp_path / "blast.mp4"
     (result,) = write_film(blast, path, frames_per_s=10.0, slow_motion=60.0, width_px=401)
-    plan = plan_film(result, 10.0, 60.0)
+    plan = plan_until(shown_until_s(result), 10.0, 60.0)
     reader: Any = imageio.get_reader(path, format="FFMPEG")
     try:
         assert reader.count_frames() == plan.frame_count > 5
@@ -43,7 +44,7 @@ def test_a_gif_loops_and_states_the_real_time_factor(blast: Blast, tmp_path: Pat
     (result,) = write_film(blast, path, frames_per_s=10.0, slow_motion=60.0, width_px=401)
     with Image.open(path) as film:
         assert film.format == "GIF"
-        assert film.n_frames == plan_film(result, 10.0, 60.0).frame_count  # type: ignore[attr-defined]
+        assert film.n_frames == plan_until(shown_until_s(result), 10.0, 60.0).frame_count  # type: ignore[attr-defined]
         assert film.info["loop"] == 0
         assert film.info["duration"] == 100
         assert b"1/60 of real time" in film.info["comment"]
@@ -85,14 +86,14 @@ def test_the_real_time_factor_in_words(slow_motion: float, words: str) -> None:
 
 
 @pytest.mark.parametrize("slow_motion", [0.0, -1.0, float("nan"), float("inf")])
-def test_slow_motion_must_be_positive(result: BlastResult, slow_motion: float) -> None:
+def test_slow_motion_must_be_positive(slow_motion: float) -> None:
     with pytest.raises(BlastEnvError, match=r"slow_motion is .*, must be positive"):
-        plan_film(result, slow_motion=slow_motion)
+        plan_until(0.1, slow_motion=slow_motion)
 
 
-def test_a_film_without_end_is_refused(result: BlastResult) -> None:
+def test_a_film_without_end_is_refused() -> None:
     with pytest.raises(BlastEnvError, match="lower slow_motion or frames_per_s"):
-        plan_film(result, slow_motion=1e6)
+        plan_until(0.1, slow_motion=1e6)
 
 
 # --- Two blasts in one film: the same moment, the same colours, nothing shifted.
@@ -125,7 +126,7 @@ def test_two_blasts_in_one_film_are_shown_to_the_end_of_the_longer_one(
     results = write(blast, barrier_blast, path)
     frames = frames_of(path)
     assert [each.digest for each in results] == [blast.run().digest, barrier_blast.run().digest]
-    plans = [plan_film(each, 5.0, 40.0) for each in results]
+    plans = [plan_until(shown_until_s(each), 5.0, 40.0) for each in results]
     assert len(frames) == max(plan.frame_count for plan in plans) > 3
     assert frames.shape[2] == WIDTH_PX
     assert frames.shape[1] % 2 == 0

@@ -17,10 +17,11 @@ from blast_env.errors import BlastEnvError, UnknownNameError
 from blast_env.evaluation.engines.gas import GasBlast, GasEngine, GasResult
 from blast_env.gas.probes import GroundMap
 from blast_env.particles.calibration.references import kingery_bulmash
-from blast_env.plots.film import plan_until
+from blast_env.plots.film import write_film
+from blast_env.plots.film_files import plan_until
 from blast_env.plots.gas import facades, full_load, gauge_history
 from blast_env.plots.ground_map import ground_map, ground_recorders, ground_values
-from blast_env.plots.pressure_film import record_planes, write_pressure_film
+from blast_env.plots.pressure_film import record_planes
 from blast_env.plots.pressure_frames import (
     PressurePainter,
     PressureShot,
@@ -55,7 +56,7 @@ def protected(barrier_blast: GasBlast) -> GasResult:
 
 @pytest.fixture(scope="module")
 def shots(blast: GasBlast, barrier_blast: GasBlast) -> list[PressureShot]:
-    return [record_planes(each, HEIGHT_M, CUT) for each in (blast, barrier_blast)]
+    return [record_planes(each, CUT, height_m=HEIGHT_M) for each in (blast, barrier_blast)]
 
 
 def images_of(figure: Figure) -> list[AxesImage]:
@@ -326,11 +327,10 @@ def short(blast: GasBlast) -> tuple[GasBlast, GasBlast]:
 
 def test_a_film_has_the_planned_frames(short: tuple[GasBlast, GasBlast], tmp_path: Path) -> None:
     shares: list[float] = []
-    results = write_pressure_film(
+    results = write_film(
         short[1],
         tmp_path / "film.gif",
         beside=short[0],
-        height_m=HEIGHT_M,
         section=VerticalSection("x", 4.25),
         frames_per_s=10.0,
         slow_motion=100.0,
@@ -353,7 +353,6 @@ def test_a_film_has_the_planned_frames(short: tuple[GasBlast, GasBlast], tmp_pat
     ("changes", "words"),
     [
         ({"width_px": 100}, "width_px is 100, must be 480"),
-        ({"height_m": 9.0}, "z = 9.0 m is outside the grid"),
         ({"section": VerticalSection("y", 90.0)}, "y = 90.0 m is outside the grid"),
         ({"path": "film.avi"}, "suffix '.avi'"),
     ],
@@ -364,5 +363,5 @@ def test_what_is_no_film_is_refused(
     options: dict[str, Any] = {"path": "film.mp4", **changes}
     path = tmp_path / options.pop("path")
     with pytest.raises(BlastEnvError, match=words):
-        write_pressure_film(blast, path, **options)
+        write_film(blast, path, **options)
     assert list(tmp_path.iterdir()) == []
