@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from blast_env.app import placing
 from blast_env.app.blasts import BlastTask
-from blast_env.app.cost import CostGuess, ReportCost
 from blast_env.app.design import SLOTS, Design, History
 from blast_env.app.folder import DesignFolder, WorkFolder
 from blast_env.app.jobs import Workers, jobs_of, settle
@@ -43,6 +42,7 @@ from blast_env.evaluation.capacity import MOST_BLASTS
 from blast_env.evaluation.consequences import Consequences
 from blast_env.evaluation.engines.gas import GasEngine
 from blast_env.evaluation.probability import Uncertainty
+from blast_env.gas.cost import CostGuess
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout, Measure
 from blast_env.layout import check_layout
@@ -52,6 +52,7 @@ from blast_env.site import AnyCharge, Scenario
 
 if TYPE_CHECKING:
     from blast_env.report import StudyOptions
+    from blast_env.report.cost import ReportCost
 
 NO_FACADE = "Give structures windows or wall panels first (on the left)."
 """Message where no structure has a facade, so that there is no level of protection."""
@@ -424,12 +425,14 @@ class Session:
         """The engine of searches: with coarser cells than those of final statements."""
         return self.engine.coarser or self.engine
 
-    def cost_of_report(self, **contents: Any) -> ReportCost:
+    def cost_of_report(self, **contents: Any) -> "ReportCost":
         """Return the cost of a report on the active layout; see `report`.
 
         Raises:
             BlastEnvError: If the layout is empty, or there are too many threats.
         """
+        from blast_env.report.cost import ReportCost  # needs an extra
+
         options = self._study_options(contents)
         return ReportCost.of(self.scenario, self.design.layout, options)
 

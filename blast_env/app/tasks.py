@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from blast_env.app import placing
-from blast_env.app.cost import ReportCost
 from blast_env.app.records import write_kept
 from blast_env.app.work import ANSWER, Answer, Question, Teller
 from blast_env.design.search import DesignProblem, Need, Progress, ProposerKind, find_proposer
@@ -205,6 +204,7 @@ class ReportTask:
         """
         # Reports need an extra, and most work is no report.
         from blast_env.report import run_study, write_report
+        from blast_env.report.cost import ReportCost
 
         cost = ReportCost.of(self.site, self.layout, self.options)
         teller.tell(grace_s=_WRITING_S)

@@ -22,6 +22,7 @@ from rich.text import Text
 
 from blast_env.errors import BlastEnvError, MissingExtraError
 from blast_env.evaluation.answers import AnswerPart, AnswerTable
+from blast_env.gas.cost import CostGuess, cost_words
 from blast_env.geometry import Element
 from blast_env.site import AnyCharge, Scenario
 from blast_env.values import printable, printable_line
@@ -30,7 +31,6 @@ if TYPE_CHECKING:  # a third of a second to import
     from matplotlib.figure import Figure
 
     from blast_env.evaluation.engines import Engine
-    from blast_env.gas.cost import CostGuess
 
 _PIPE_COLUMNS = 120
 _LINE_EVERY_S: Final = 30.0
@@ -199,8 +199,6 @@ def print_cost(asked: "Iterable[tuple[Engine | None, Scenario, AnyCharge]]") -> 
         costs.append(known[key])
     found = [each for each in costs if each is not None]
     if found:
-        from blast_env.app.cost import cost_words  # the page's words; takes long to import
-
         print_line(f"up to {cost_words(found)}")
 
 

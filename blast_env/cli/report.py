@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from blast_env.app.cost import ReportCost
 from blast_env.cli.command import writes
 from blast_env.cli.options import (
     CHARGE,
@@ -88,6 +87,7 @@ def report(
     elements = load_layout(layout, site)
     # Here, because reports need extras, and Numba half a second.
     from blast_env.report import run_study, write_report
+    from blast_env.report.cost import ReportCost
     from blast_env.report.page import check_targets
 
     check_targets(out, pdf)

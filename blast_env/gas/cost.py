@@ -5,6 +5,7 @@ middle of the site, the number of steps until the loads are known, and the numbe
 core updates per second. docs/howto/app.md compares estimates with measured costs.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cbrt, ceil, expm1, prod
 from typing import Final
@@ -34,6 +35,7 @@ _PARTS: Final = 100
 _CELLS_PER_S: Final = 15e6
 _BYTES_PER_CELL: Final = 28.0
 _PROCESS_BYTES: Final = 270e6
+_DRAWING_S: Final = 2.5
 
 
 @dataclass(frozen=True)
@@ -124,3 +126,29 @@ def _cells_in(
     around = ceil(settings.margin_m / cell_m) + layers + outside
     more = (2 * around, 2 * around, layers + 2 * outside)
     return tuple(ceil(round(a / cell_m, 9)) + n for a, n in zip(sides_m, more, strict=True))
+
+
+def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
+    """Return the cost of blasts one after the other, in words.
+
+    Args:
+        costs: The cost of each.
+        drawn: Number of blasts with a film, maps or walls.
+    """
+    if not costs:
+        return "nothing to run: all results are available"
+    blasts = "a blast" if len(costs) == 1 else f"{len(costs)} blasts"
+    seconds = sum(each.seconds for each in costs) + drawn * _DRAWING_S
+    memory_gb = max(each.memory_bytes for each in costs) / 1e9
+    return f"{blasts} of gas: about {time_words(seconds)} on a busy core, {memory_gb:.1f} GB"
+
+
+def time_words(seconds: float) -> str:
+    """Return a time in words, rounded."""
+    if seconds < 10.0:
+        return f"{max(ceil(seconds), 1)} s"
+    if seconds < 100.0:
+        return f"{5.0 * round(seconds / 5.0):.0f} s"
+    if seconds < 5400.0:
+        return f"{seconds / 60.0:.0f} min"
+    return f"{seconds / 3600.0:.1f} h"

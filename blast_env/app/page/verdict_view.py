@@ -5,7 +5,6 @@ from pathlib import Path
 
 from nicegui import ui
 
-from blast_env.app.cost import cost_words
 from blast_env.app.page.numbers import NumberField
 from blast_env.app.page.tables import cells, text_table
 from blast_env.app.page.uploads import complain
@@ -13,6 +12,7 @@ from blast_env.app.session import Session
 from blast_env.app.work import Answer, Question
 from blast_env.errors import BlastEnvError
 from blast_env.evaluation.answers import AnswerTable
+from blast_env.gas.cost import cost_words
 from blast_env.response.buildings import LevelOfProtection
 
 _HEADINGS = {

@@ -11,7 +11,6 @@ from typing import Final
 from nicegui import ui
 
 from blast_env.app import placing
-from blast_env.app.cost import cost_words, time_words
 from blast_env.app.design import SLOTS
 from blast_env.app.editor import Editor, Tool
 from blast_env.app.offers import offered, runs_blasts
@@ -20,6 +19,7 @@ from blast_env.app.session import Session
 from blast_env.app.threats import threats_of
 from blast_env.app.work import Status
 from blast_env.errors import BlastEnvError
+from blast_env.gas.cost import cost_words, time_words
 from blast_env.gas.settings import Cells
 from blast_env.geometry import Layout
 from blast_env.site import Scenario

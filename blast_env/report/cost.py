@@ -1,19 +1,12 @@
-"""The cost of work by gas dynamics, estimated before it starts; see `physics.gas.cost`."""
+"""The cost of a report, estimated before it starts."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
-from typing import TYPE_CHECKING, Final
 
 from blast_env.evaluation.engines.gas import GasEngine
-from blast_env.gas.cost import CostGuess as CostGuess
+from blast_env.gas.cost import CostGuess, cost_words
 from blast_env.geometry import Layout
+from blast_env.report.study import StudyOptions, blasts_of, threats_of
 from blast_env.site import Scenario
-
-if TYPE_CHECKING:
-    from blast_env.report import StudyOptions
-
-_DRAWING_S: Final = 2.5
 
 
 @dataclass(frozen=True)
@@ -29,15 +22,12 @@ class ReportCost:
     drawn: int
 
     @classmethod
-    def of(cls, scenario: Scenario, layout: Layout, options: "StudyOptions") -> "ReportCost":
+    def of(cls, scenario: Scenario, layout: Layout, options: StudyOptions) -> "ReportCost":
         """Return the estimated cost of a report; nothing is run for it.
 
         Raises:
             BlastEnvError: If there are too many threats.
         """
-        # Imported here, because reports need an extra.
-        from blast_env.report.study import blasts_of, threats_of
-
         threats = threats_of(scenario, options)
         parts = blasts_of(scenario, layout, options, threats)
         asked = {(each.cells, charge) for each in parts for charge in each.charges}
@@ -64,29 +54,3 @@ class ReportCost:
         names = list(costs_s)
         before_s = sum(costs_s[name] for name in names[: names.index(label)])
         return min((before_s + share * costs_s[label]) / sum(costs_s.values()), 1.0)
-
-
-def cost_words(costs: Sequence[CostGuess], drawn: int = 0) -> str:
-    """Return the cost of blasts one after the other, in words.
-
-    Args:
-        costs: The cost of each.
-        drawn: Number of blasts with a film, maps or walls.
-    """
-    if not costs:
-        return "nothing to run: all results are available"
-    blasts = "a blast" if len(costs) == 1 else f"{len(costs)} blasts"
-    seconds = sum(each.seconds for each in costs) + drawn * _DRAWING_S
-    memory_gb = max(each.memory_bytes for each in costs) / 1e9
-    return f"{blasts} of gas: about {time_words(seconds)} on a busy core, {memory_gb:.1f} GB"
-
-
-def time_words(seconds: float) -> str:
-    """Return a time in words, rounded."""
-    if seconds < 10.0:
-        return f"{max(ceil(seconds), 1)} s"
-    if seconds < 100.0:
-        return f"{5.0 * round(seconds / 5.0):.0f} s"
-    if seconds < 5400.0:
-        return f"{seconds / 60.0:.0f} min"
-    return f"{seconds / 3600.0:.1f} h"
